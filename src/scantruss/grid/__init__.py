@@ -1,0 +1,1 @@
+"""The grid and what improves it (Sec. 4)."""

@@ -1,0 +1,96 @@
+"""Grid: nodes, triangles and the tables that follow from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from .quality import GridQuality, Topology
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A triangular grid truss: its nodes lie on the scan, its edges are the members."""
+
+    nodes: np.ndarray  #: (V, 3) float64 [scan unit], relative to `origin`
+    triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
+    fixed: np.ndarray  #: (V,) bool, nodes at positions that the user appointed
+    origin: np.ndarray  #: (3,) float64 [scan unit]
+    unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
+    settings: Settings | None = None  #: what the grid was made with
+    before: GridQuality | None = None  #: quality before the optimization (Table 2)
+    seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
+
+    def replace(self, **changes: Any) -> Grid:
+        """Return a copy with some fields changed."""
+        return replace(self, **changes)
+
+    @cached_property
+    def _half_edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        key = low * max(len(self.nodes), 1) + high
+        _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+        return ends, np.stack([low[first], high[first]], axis=1), inverse.ravel()
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(E, 2) the members, smaller node first, sorted."""
+        return self._half_edges[1]
+
+    @cached_property
+    def edge_triangles(self) -> np.ndarray:
+        """(E, 2) the triangles at each member, -1 where the boundary is; (E, 2) needs a manifold grid."""
+        _, edges, inverse = self._half_edges
+        triangle = np.tile(np.arange(len(self.triangles)), 3)
+        order = np.argsort(inverse, kind="stable")
+        count = np.bincount(inverse, minlength=len(edges))
+        start = np.cumsum(count) - count
+        table = np.full((len(edges), 2), -1, np.int64)
+        table[:, 0] = triangle[order[start]]
+        two = count > 1
+        table[two, 1] = triangle[order[start[two] + 1]]
+        return table
+
+    @cached_property
+    def boundary_loops(self) -> list[np.ndarray]:
+        """Ordered node ids of each boundary loop, in the direction of its triangles."""
+        ends, edges, inverse = self._half_edges
+        single = np.bincount(inverse, minlength=len(edges))[inverse] == 1
+        following: dict[int, list[int]] = {}
+        for a, b in ends[single].tolist():
+            following.setdefault(a, []).append(b)
+        loops = []
+        for start in sorted(following):
+            while following.get(start):
+                loop, node = [start], following[start].pop()
+                while node != start and following.get(node):
+                    loop.append(node)
+                    node = following[node].pop()
+                loops.append(np.array(loop, np.int64))
+        return loops
+
+    @cached_property
+    def lengths(self) -> np.ndarray:
+        """(E,) length of each member [scan unit]."""
+        return np.linalg.norm(self.nodes[self.edges[:, 0]] - self.nodes[self.edges[:, 1]], axis=1)
+
+    @cached_property
+    def quality(self) -> GridQuality:
+        """The figures of Table 2 and more."""
+        from .quality import measure_quality
+
+        return measure_quality(self)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Components, boundary loops, Euler number, manifold, orientable."""
+        from .quality import measure_topology
+
+        return measure_topology(self)

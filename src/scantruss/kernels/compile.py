@@ -1,0 +1,87 @@
+"""The one decorator of all kernels: compile, cache, never fail for want of a folder.
+
+numba looks only at the file of the kernel itself when it decides whether its stored machine code is still good, so after an
+edit of a callee in another file it would silently run old code. The machine code is therefore kept in a folder that is named
+after the contents of *all* kernel files. Where no folder can be written the kernels compile in memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def _contents() -> str:
+    """Digest of all kernel files and of what compiles them."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    digest.update(os.environ.get("NUMBA_BOUNDSCHECK", "").encode())
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _home() -> Path:
+    """Where machine code is kept: NUMBA_CACHE_DIR, else the user's cache folder."""
+    named = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    if named:
+        return Path(named)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home())
+    return Path.home() / (".cache" if sys.platform != "darwin" else "Library/Caches")
+
+
+def _folder() -> Path | None:
+    """The folder of the machine code, made and tried; None where nothing can be written."""
+    try:
+        homes = [_home()]
+    except RuntimeError:  # no home folder
+        homes = []
+    for home in (*homes, Path(tempfile.gettempdir()) / f"scantruss-{os.getuid() if hasattr(os, 'getuid') else 'user'}"):
+        folder = home / "scantruss" / f"kernels-{_contents()}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return None
+
+
+FOLDER = _folder()
+
+
+def is_compiled() -> bool:
+    """Whether machine code of these kernels is on disk already (False: the next call compiles)."""
+    return FOLDER is not None and any(FOLDER.rglob("*.nbc"))
+
+
+def kernel(function: F) -> F:
+    """Compile a function of arrays and numbers on its first call; releases the GIL.
+
+    Parameters
+    ----------
+    function : callable
+        A loop over arrays, numbers and NamedTuples of arrays.
+
+    Returns
+    -------
+    callable
+        The compiled function; the plain one where NUMBA_DISABLE_JIT is set.
+    """
+    kept = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(FOLDER or "")
+    try:
+        return numba.njit(cache=FOLDER is not None, nogil=True)(function)
+    except RuntimeError:  # numba: "cannot cache function"
+        return numba.njit(nogil=True)(function)
+    finally:
+        numba.config.CACHE_DIR = kept

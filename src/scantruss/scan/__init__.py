@@ -1,0 +1,1 @@
+"""From files to one clean point cloud (Sec. 2)."""
