@@ -1,0 +1,269 @@
+"""The local surface of the scan: moving least squares on the points of one sheet.
+
+Nodes are kept on it while they move. Each node caches one quadric patch, a row of `patches`:
+
+    0:3 centre   3:6 unit normal (oriented)   6:9 tangent u (v = normal x u)   9:15 coefficients of 1 u v uu uv vv
+    15 site nearest to the centre   16 fitted (1) or not (0)   17 mean distance of the points from the patch
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .compile import kernel
+from .vectors import Vector, across, along, cross, dot, norm, row, smallest_eigenvector, subtract
+
+PATCH = 20  # columns of a patch row
+
+
+class Surface(NamedTuple):
+    """The scan at the scale of a member: sites, their links and points."""
+
+    points: np.ndarray  #: (N, 3) the points, grouped by site
+    start: np.ndarray  #: (S + 1,) points of site s are start[s]:start[s + 1]
+    mean: np.ndarray  #: (S, 3) mean of the points of each site
+    normals: np.ndarray  #: (S, 3) oriented unit normals
+    neighbors: np.ndarray  #: (S, K) nearest sites on the same sheet, -1 at the end
+    scale: np.ndarray  #: (4,) member length, thinning radius, radius of a patch, most points of a site that a patch uses
+    stamp: np.ndarray  #: (S,) int64 scratch of `flood`
+    queue: np.ndarray  #: (S,) int64 scratch of `flood`
+    counter: np.ndarray  #: (1,) int64 number of the last flood
+
+
+@kernel
+def walk(surface: Surface, site: int, place: Vector) -> int:
+    """Site nearest to a place, reached by going downhill over the links: never leaves the sheet."""
+    d = subtract(row(surface.mean, site), place)
+    best = dot(d, d)
+    while True:
+        to = -1
+        for k in range(surface.neighbors.shape[1]):
+            n = surface.neighbors[site, k]
+            if n < 0:
+                break
+            d = subtract(row(surface.mean, n), place)
+            dd = dot(d, d)
+            if dd < best:
+                best, to = dd, n
+        if to < 0:
+            return site
+        site = to
+
+
+@kernel
+def flood(surface: Surface, site: int, place: Vector, reach: float) -> int:
+    """Sites within `reach` of a place that are linked to `site` within that reach, into surface.queue; returns their number."""
+    surface.counter[0] += 1
+    mark = surface.counter[0]
+    surface.queue[0] = site
+    surface.stamp[site] = mark
+    count, at = 1, 0
+    while at < count:
+        s = surface.queue[at]
+        at += 1
+        for k in range(surface.neighbors.shape[1]):
+            n = surface.neighbors[s, k]
+            if n < 0:
+                break
+            if surface.stamp[n] != mark:
+                surface.stamp[n] = mark
+                d = subtract(row(surface.mean, n), place)
+                if dot(d, d) <= reach * reach:
+                    surface.queue[count] = n
+                    count += 1
+    return count
+
+
+@kernel
+def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> bool:
+    """Whether site b can be reached from site a over links within `reach` of a place."""
+    if a == b:
+        return True
+    count = flood(surface, a, place, reach)
+    for i in range(count):
+        if surface.queue[i] == b:
+            return True
+    return False
+
+
+@kernel
+def _solve(matrix: np.ndarray, size: int) -> bool:
+    """Solve the symmetric system in matrix[:size, :size + 1] in place; the last column gets the solution."""
+    for i in range(size):
+        pivot = matrix[i, i]
+        if pivot <= 1e-10:
+            return False
+        for r in range(i + 1, size):
+            factor = matrix[r, i] / pivot
+            for c in range(i, size + 1):
+                matrix[r, c] -= factor * matrix[i, c]
+    for i in range(size - 1, -1, -1):
+        value = matrix[i, size]
+        for c in range(i + 1, size):
+            value -= matrix[i, c] * matrix[c, size]
+        matrix[i, size] = value / matrix[i, i]
+    return True
+
+
+@kernel
+def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
+    """Fit the quadric of a patch (one row) to the points around a place, on the sheet of `site`; returns the points used.
+
+    Points weigh (1 - d^2 / R^2)^2; where some lie far off the first fit (plants, noise) they are weighed down and it is fitted again.
+    """
+    site = walk(surface, site, place)
+    facing = row(surface.normals, site)
+    radius, most = surface.scale[2], int(surface.scale[3])
+    patch[15] = site
+    taken = 0
+    while True:
+        count = flood(surface, site, place, radius + surface.scale[1])
+        if count < 1:
+            count = 1
+        buffer = np.empty((most * count, 5))
+        taken = 0
+        for i in range(count):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), facing) > 0.0:
+                first, last = surface.start[s], surface.start[s + 1]
+                step = 1 + (last - first - 1) // most
+                for p in range(first, last, step):
+                    d = subtract(row(surface.points, p), place)
+                    w = 1.0 - dot(d, d) / (radius * radius)
+                    if w > 0.0 and taken < len(buffer):
+                        buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
+                        buffer[taken, 3] = w * w
+                        taken += 1
+        if taken >= 12 or radius >= 1.6 * surface.scale[2]:
+            break
+        radius *= 1.26
+    _plane_of(buffer, taken, facing, patch)
+    normal, u = (patch[3], patch[4], patch[5]), (patch[6], patch[7], patch[8])
+    v = cross(normal, u)
+    _heights(buffer, taken, radius, normal, u, v, patch)
+    mean = 0.0
+    for i in range(taken):
+        mean += buffer[i, 4]
+    mean = mean / max(taken, 1)
+    if mean > 0.002 * surface.scale[0] and taken > 12:
+        for i in range(taken):
+            r = buffer[i, 4] / (2.0 * mean)
+            buffer[i, 3] /= (1.0 + r * r) * (1.0 + r * r)
+        _heights(buffer, taken, radius, normal, u, v, patch)
+    patch[0], patch[1], patch[2] = place
+    patch[16], patch[17] = 1.0, mean
+    return taken
+
+
+@kernel
+def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray) -> None:
+    """Normal and tangent of the weighted least-squares plane, turned to face as the site does."""
+    total = cx = cy = cz = 0.0
+    for i in range(taken):
+        w = buffer[i, 3]
+        total += w
+        cx, cy, cz = cx + w * buffer[i, 0], cy + w * buffer[i, 1], cz + w * buffer[i, 2]
+    normal = facing
+    if taken >= 4 and total > 0.0:
+        cx, cy, cz = cx / total, cy / total, cz / total
+        xx = xy = xz = yy = yz = zz = 0.0
+        for i in range(taken):
+            w = buffer[i, 3]
+            x, y, z = buffer[i, 0] - cx, buffer[i, 1] - cy, buffer[i, 2] - cz
+            xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+            yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+        normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+        side = dot(normal, facing)
+        if side < 0.0:
+            normal = (-normal[0], -normal[1], -normal[2])
+        if abs(side) < 0.5:
+            normal = facing
+    patch[3], patch[4], patch[5] = normal
+    patch[6], patch[7], patch[8] = across(normal)
+
+
+@kernel
+def _heights(buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Vector, v: Vector, patch: np.ndarray) -> None:
+    """Least-squares heights over the plane: a quadric, a plane for few points; buffer[:, 4] gets the distances from it."""
+    size = 6 if taken >= 10 else (3 if taken >= 4 else 1)
+    solved = False
+    matrix = np.zeros((6, 7))
+    term = np.empty(7)
+    while not solved and size > 0:
+        matrix[:, :] = 0.0
+        for i in range(taken):
+            d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+            a, b = dot(d, u) / radius, dot(d, v) / radius
+            term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, a, b, a * a, a * b, b * b
+            term[size] = dot(d, normal)
+            for r in range(size):
+                wr = buffer[i, 3] * term[r]
+                for c in range(r, size + 1):
+                    matrix[r, c] += wr * term[c]
+        for r in range(size):
+            for c in range(r):
+                matrix[r, c] = matrix[c, r]
+            matrix[r, r] += 1e-9 * matrix[0, 0]
+        solved = _solve(matrix, size)
+        if not solved:
+            size = 3 if size == 6 else (1 if size == 3 else 0)
+    for c in range(6):
+        power = 1.0 if c == 0 else (radius if c < 3 else radius * radius)
+        patch[9 + c] = matrix[c, size] / power if c < size else 0.0
+    for i in range(taken):
+        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        buffer[i, 4] = abs(dot(d, normal) - height(patch, dot(d, u), dot(d, v)))
+
+
+@kernel
+def height(patch: np.ndarray, a: float, b: float) -> float:
+    """Height of a patch over its plane at (a, b) [scan unit]."""
+    return patch[9] + a * (patch[10] + a * patch[12] + b * patch[13]) + b * (patch[11] + b * patch[14])
+
+
+@kernel
+def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
+    """Foot of a place on a patch, nearly at right angles to it."""
+    centre = (patch[0], patch[1], patch[2])
+    normal = (patch[3], patch[4], patch[5])
+    u = (patch[6], patch[7], patch[8])
+    v = cross(normal, u)
+    d = subtract(place, centre)
+    a, b, h = dot(d, u), dot(d, v), dot(d, normal)
+    for _ in range(2):
+        z = height(patch, a, b)
+        slope_a = patch[10] + 2.0 * a * patch[12] + b * patch[13]
+        slope_b = patch[11] + 2.0 * b * patch[14] + a * patch[13]
+        t = (h - z) / (1.0 + slope_a * slope_a + slope_b * slope_b)
+        a, b, h = a - t * slope_a, b - t * slope_b, z + t * (slope_a * slope_a + slope_b * slope_b)
+        h = height(patch, a, b)
+    return along(along(along(centre, a, u), b, v), h, normal)
+
+
+@kernel
+def patch_normal(patch: np.ndarray, place: Vector) -> Vector:
+    """Unit normal of a patch over a place."""
+    normal = (patch[3], patch[4], patch[5])
+    u = (patch[6], patch[7], patch[8])
+    v = cross(normal, u)
+    d = subtract(place, (patch[0], patch[1], patch[2]))
+    a, b = dot(d, u), dot(d, v)
+    slope_a = patch[10] + 2.0 * a * patch[12] + b * patch[13]
+    slope_b = patch[11] + 2.0 * b * patch[14] + a * patch[13]
+    n = along(along(normal, -slope_a, u), -slope_b, v)
+    length = norm(n)
+    return n[0] / length, n[1] / length, n[2] / length
+
+
+@kernel
+def onto_surface(surface: Surface, patches: np.ndarray, node: int, x: float, y: float, z: float) -> Vector:
+    """Foot of a place on the scanned surface by the patch of a node; fitted anew when the place has left the middle of it."""
+    patch = patches[node]
+    place = (x, y, z)
+    d = subtract(place, (patch[0], patch[1], patch[2]))
+    reach = 0.25 * surface.scale[0]
+    if patch[16] == 0.0 or dot(d, d) > reach * reach:
+        fit_patch(surface, patch, int(patch[15]), place)
+    return onto_patch(patch, place)

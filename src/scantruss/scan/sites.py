@@ -1,0 +1,133 @@
+"""The scan prepared for one member length: sites with oriented normals, linked on each sheet."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels import sites as kernels
+from ..kernels.boxes import SearchBoxes, new_boxes
+from ..kernels.surface import Surface
+from ..settings import Settings
+from .cloud import PointCloud, measure_spacing
+
+NEIGHBORS = 12  # links of a site
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """What all later steps look up in the scan."""
+
+    surface: Surface
+    boxes: SearchBoxes  #: the sites by box
+    piece: np.ndarray  #: (S,) int64 number of the connected piece of each site, the largest piece is 0
+    spacing: float  #: typical distance between neighbouring points [scan unit]
+
+
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float], Sites]] = weakref.WeakKeyDictionary()
+
+
+def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
+    """Return the sites of a cloud for a member length; kept as long as the cloud lives.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+        `length` and `box_size` decide how far apart sites are.
+    """
+    key = (settings.length, settings.box_size)
+    kept = _KEPT.setdefault(cloud, {})
+    if key not in kept:
+        kept.clear()
+        kept[key] = _prepare(cloud.points, *key)
+    return kept[key]
+
+
+def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
+    """Return the local surface of the scan for the kernels."""
+    return prepare_sites(cloud, settings).surface
+
+
+def _prepare(points: np.ndarray, length: float, box_size: float) -> Sites:
+    spacing = measure_spacing(points)
+    radius = max(box_size * length, 0.25 * spacing)
+    owner, chosen, boxes = _thin(points, radius)
+    start = np.zeros(len(chosen) + 1, np.int64)
+    grouped, index, mean = np.empty_like(points), np.empty(len(points), np.int64), np.zeros((len(chosen), 3))
+    kernels.group_points(points, owner, start, grouped, index, mean)
+    neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
+    place = points[chosen]
+    far = max(0.7 * length, 3.0 * spacing)
+    kernels.nearest_sites(place, boxes, max(2.1 * radius, 1.5 * spacing), far, neighbors)
+    normals = np.empty_like(mean)
+    kernels.site_normals(mean, neighbors, normals)
+    kernels.cut_steep_links(mean, normals, neighbors, 0.75)
+    weights = np.empty(neighbors.shape)
+    kernels.link_weights(mean, normals, neighbors, weights)
+    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
+    piece = np.empty(len(mean), np.int64)
+    kernels.orient_normals(mean, normals, neighbors, order, piece)
+    smoothed = np.empty_like(normals)
+    kernels.smooth_normals(normals, neighbors, smoothed)
+    _face_outside(mean, smoothed, piece)
+    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), 24.0])
+    scratch = np.zeros(len(mean), np.int64)
+    surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
+    return Sites(surface, boxes, _number(piece), spacing)
+
+
+def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, SearchBoxes]:
+    """Return the site of each point, the point of each site and the sites by box."""
+    owner = np.full(len(points), -1, np.int64)
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    capacity, begin, count = 1 << 14, 0, 0
+    chosen = np.full(capacity, -1, np.int64)
+    boxes = new_boxes(lower, upper, radius, capacity, capacity)
+    while True:
+        begin, count = kernels.thin_points(points, radius, boxes, owner, chosen, begin, count)
+        if begin == len(points):
+            return owner, chosen[:count].copy(), boxes
+        capacity *= 4
+        chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
+        boxes = new_boxes(lower, upper, radius, capacity, capacity)
+        kernels.put_all(boxes, points, chosen[:count])
+
+
+def _number(piece: np.ndarray) -> np.ndarray:
+    """Number the pieces by size, largest first."""
+    _, inverse, counts = np.unique(piece, return_inverse=True, return_counts=True)
+    rank = np.empty(len(counts), np.int64)
+    rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
+    return rank[inverse.ravel()]
+
+
+def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
+    """Turn the normals of each piece away from its centre; upwards where that does not tell (a plate)."""
+    _, inverse = np.unique(piece, return_inverse=True)
+    inverse = inverse.ravel()
+    count = np.bincount(inverse)
+    centre = np.stack([np.bincount(inverse, mean[:, c]) / count for c in range(3)], axis=1)
+    arm = mean - centre[inverse]
+    size = np.sqrt(np.bincount(inverse, (arm**2).sum(axis=1)) / count)
+    bulge = np.bincount(inverse, (arm * normals).sum(axis=1)) / count
+    up = np.stack([np.bincount(inverse, normals[:, c]) / count for c in range(3)], axis=1)
+    for i in range(len(count)):
+        side = bulge[i]
+        if abs(side) < 1e-6 * max(size[i], 1e-300):
+            side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
+        if side < 0:
+            normals[inverse == i] *= -1.0
+
+
+def check_two_sided(sites: Sites) -> None:
+    """Refuse a one-sided surface (Moebius strip): no choice of normals fits all links."""
+    surface = sites.surface
+    site, k = np.nonzero(surface.neighbors >= 0)
+    other = surface.neighbors[site, k]
+    agree = (surface.normals[site] * surface.normals[other]).sum(axis=1)
+    if (agree < -0.7).mean() > 0.0:
+        raise InputError("one-sided")
