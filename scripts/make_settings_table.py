@@ -1,0 +1,45 @@
+"""Write docs/settings.md from the fields of Settings: python scripts/make_settings_table.py."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from scantruss.settings import Settings
+
+PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
+HEAD = """# Settings
+
+Every number that steers the method, one record: `scantruss.Settings`. Each field is also an option of `scantruss grid`. This page
+is made from the fields by `scripts/make_settings_table.py`.
+
+| setting | option | symbol | unit | default | choices | what it is | source |
+| --- | --- | --- | --- | --- | --- | --- | --- |
+"""
+
+
+def settings_table() -> str:
+    """Return the page."""
+    rows = []
+    for spec in fields(Settings):
+        about = spec.metadata
+        default = (
+            "needed" if spec.default is MISSING else "none" if spec.default in ("", (), None) else str(spec.default)
+        )
+        cells = (
+            f"`{spec.name}`",
+            f"`--{spec.name.replace('_', '-')}`",
+            about["symbol"],
+            about["unit"],
+            default,
+            ", ".join(about["choices"]),
+            about["help"],
+            about["source"],
+        )
+        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n")
+    return HEAD + "".join(rows)
+
+
+if __name__ == "__main__":
+    PLACE.write_text(settings_table(), encoding="utf-8", newline="\n")
+    print(f"wrote {PLACE}")

@@ -1,0 +1,241 @@
+"""The commands: what each one takes, does and says.
+
+Outputs and settings are checked before anything is read; everything heavy is imported inside the functions.
+"""
+
+from __future__ import annotations
+
+import os
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import FormatError, InputError
+
+if TYPE_CHECKING:
+    from .grid.grid import Grid
+    from .options import Parser
+    from .report.terminal import Bars
+    from .scan.cloud import PointCloud
+    from .settings import Settings
+
+
+def info_parser() -> Parser:
+    """Options of ``scantruss info``."""
+    from .options import Parser, add_settings
+
+    parser = Parser(
+        "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
+    )
+    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    add_settings(parser, ("length", "unit", "method"))
+    return parser
+
+
+def info(values: Namespace) -> None:
+    """Print what a scan holds."""
+    from .options import settings_of
+    from .pipeline import check_length, suggest_length
+    from .report.figures import cloud_lines, loop_rows
+    from .report.terminal import Bars, print_lines, print_table
+
+    given = "length" in values
+    settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
+    with Bars() as bars:
+        cloud = read_scan(values.scan, settings, bars)
+        print_lines(cloud_lines(cloud))
+        settings = settings if given else settings.replace(length=suggest_length(cloud))
+        check_length(cloud, settings)
+
+        from .boundary import find_boundary
+
+        boundary = find_boundary(cloud, settings, progress=bars)
+    print_lines([f"boundaries for members of {settings.length:g} {cloud.unit}".rstrip() + ":"])
+    if boundary.loops:
+        print_table(("boundary", "length", "corners"), loop_rows(boundary))
+    else:
+        print_lines(["none, the scan is closed"])
+
+
+def grid_parser() -> Parser:
+    """Options of ``scantruss grid``."""
+    from .options import Parser, add_settings
+
+    parser = Parser(
+        "grid",
+        "SCAN OUT [OUT ...] --length L [options]",
+        "Turn a scan into a triangular grid truss of a desired member length.",
+    )
+    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("outs", metavar="OUT", nargs="+", help="results; the suffix names the format")
+    files = parser.add_argument_group("files")
+    files.add_argument(
+        "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here win"
+    )
+    files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    files.add_argument("--report", metavar="FILE.json", help="save all figures of the run")
+    add_settings(parser)
+    return parser
+
+
+def grid(values: Namespace) -> None:
+    """Make a grid and save it with its settings."""
+    from .options import settings_of
+    from .report.figures import report_of
+    from .report.saving import SaveTogether
+    from .report.terminal import Bars
+
+    settings = settings_of(values)
+    outs = [Path(out) for out in values.outs]
+    settings_file = outs[0].with_suffix(".settings.json")
+    report = Path(values.report) if values.report else None
+    check_outputs(values, outs, settings_file, report)
+    with Bars() as bars:
+        cloud = read_scan(values.scan, settings, bars)
+        result = make_grid(cloud, settings, bars)
+    from .export.formats import write
+
+    with SaveTogether() as save:
+        for out in outs:
+            write(result, save.beside(out), cloud=cloud)
+        save.json(settings_file, settings.to_dict())
+        if report is not None:
+            save.json(report, report_of(result, len(cloud.points)))
+    show_grid(result, len(cloud.points), [*outs, settings_file, *([report] if report else [])])
+
+
+def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
+    """Refuse outputs that cannot be written, before anything is read or computed."""
+    from .report.saving import check_place
+
+    taken: dict[Path, str] = {}
+    for name, what in (
+        (values.scan, "scan"),
+        (values.settings, "settings"),
+        (values.fixed_file, "list of fixed nodes"),
+    ):
+        if name and Path(name).exists():
+            taken[Path(name).resolve()] = what
+    for path, what in [*((out, "grid") for out in outs), *([(report, "report")] if report else [])]:
+        check_place(path, what)
+        if (before := taken.get(path.resolve())) is not None:
+            raise FormatError(f"the {what} {path} would overwrite the {before}; name another file")
+        taken[path.resolve()] = what
+    check_place(settings_file, "settings")
+    if taken.get(settings_file.resolve(), "settings") != "settings":
+        raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
+    from .export.formats import check_output
+
+    for out in outs:
+        check_output(out)
+
+
+def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan, and say so where points were left out or kernels must be compiled."""
+    from .scan.readers import read_points
+
+    bars("read", 0.0)
+    cloud = read_points(path, unit=settings.unit)
+    bars("read", 1.0)
+    if cloud.dropped:
+        bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
+    from .kernels.compile import is_compiled
+
+    if not is_compiled() and os.environ.get("NUMBA_DISABLE_JIT", "0") == "0":
+        bars.note("compiling kernels, once on this machine")
+    return cloud
+
+
+def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
+    """Run the chain."""
+    from .pipeline import grid_from_cloud
+
+    return grid_from_cloud(cloud, settings, progress=bars)
+
+
+def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
+    """Print the figures of Table 2 and what was written."""
+    from .report.figures import grid_lines, quality_rows
+    from .report.terminal import print_lines, print_table
+
+    print_table(("", "before", "after optimization"), quality_rows(result))
+    print_lines([*grid_lines(result, points), "wrote " + " ".join(map(str, written))])
+
+
+def print_parser() -> Parser:
+    """Options of ``scantruss print``."""
+    from .options import Parser, number
+
+    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
+    parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
+    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    parser.add_argument("out", metavar="OUT", help="model, .3mf or .stl")
+    parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
+    parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
+    parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
+    return parser
+
+
+def print_solid(values: Namespace) -> None:
+    """Make the printable model of a saved grid."""
+    from .report.saving import SaveTogether, check_place
+    from .report.terminal import print_lines
+
+    out = check_place(values.out, "model")
+    if out.suffix.lower() not in (".3mf", ".stl"):
+        raise FormatError(f"no model format for {out.suffix or out.name!r}; use .3mf or .stl")
+    if not Path(values.grid).exists():
+        raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
+    if out.exists() and out.samefile(values.grid):
+        raise FormatError(f"the model {out} would overwrite the grid; name another file")
+    from .export.json_file import read_grid
+    from .export.solid import print_model
+
+    result = read_grid(values.grid)
+    with SaveTogether() as save:
+        print_model(
+            result,
+            save.beside(out),
+            member_diameter=values.member_diameter,
+            node_diameter=values.node_diameter,
+            scale=values.scale,
+        )
+    print_lines([f"wrote {out}: one solid of {len(result.edges)} members and {len(result.nodes)} nodes"])
+
+
+def demo_parser() -> Parser:
+    """Options of ``scantruss demo``."""
+    from .options import Parser
+
+    parser = Parser(
+        "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
+    )
+    parser.add_argument(
+        "folder", metavar="FOLDER", nargs="?", default="scantruss-demo", help="default ./scantruss-demo"
+    )
+    return parser
+
+
+def demo(values: Namespace) -> None:
+    """Do the main job on the bundled scan."""
+    from .demo import SCAN, demo_settings, save_demo
+    from .report.terminal import Bars
+
+    folder = Path(values.folder)
+    if folder.exists() and not folder.is_dir():
+        raise FormatError(f"{folder} is a file; name a folder for the demo")
+    with Bars() as bars:
+        cloud = read_scan(str(SCAN), demo_settings(), bars)
+        result = make_grid(cloud, demo_settings(), bars)
+        bars("picture, solid", 0.0)
+        written = save_demo(folder, result, cloud)
+    show_grid(result, len(cloud.points), written)
+
+
+COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
+    "info": (info_parser, info),
+    "grid": (grid_parser, grid),
+    "print": (print_parser, print_solid),
+    "demo": (demo_parser, demo),
+}

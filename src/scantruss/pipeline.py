@@ -1,0 +1,149 @@
+"""The whole chain in one call: scan -> boundary -> front -> grid (Fig. 4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from .errors import InputError
+from .settings import Settings
+
+if TYPE_CHECKING:
+    from .grid.grid import Grid
+    from .scan.cloud import PointCloud
+
+Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
+
+SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a rim from a gap
+LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
+USUAL_SPACINGS = 5.0  #: and never fewer point spacings than this
+
+
+def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progress | None = None) -> Grid:
+    """Return the grid of an array of points.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        Measured points [scan unit].
+    settings : Settings
+        Desired member length and all the rest.
+    progress : callable, optional
+        ``progress(stage, share)``, called now and then; may raise to cancel.
+
+    Returns
+    -------
+    Grid
+        With `settings`, `before` (quality before the optimization) and `seconds` of each stage.
+    """
+    from .scan.cloud import PointCloud
+
+    started = perf_counter()
+    cloud = PointCloud.from_array(points, unit=settings.unit)
+    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+
+
+def grid_from_scan(path: str | Path, settings: Settings, *, progress: Progress | None = None) -> Grid:
+    """Return the grid of a scan file; see `grid_from_points`."""
+    from .scan.readers import read_points
+
+    started = perf_counter()
+    cloud = read_points(path, unit=settings.unit)
+    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+
+
+def grid_from_cloud(
+    cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, read_seconds: float = 0.0
+) -> Grid:
+    """Return the grid of a point cloud; see `grid_from_points`.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        What was read.
+    settings : Settings
+        Desired member length and all the rest.
+    progress : callable, optional
+        ``progress(stage, share)``.
+    read_seconds : float
+        What reading took [s], for the table of times.
+    """
+    from .boundary import find_boundary
+    from .front import advance_front
+    from .grid.optimize import optimize_grid
+
+    started = perf_counter()
+    check_length(cloud, settings)
+    checked = perf_counter()
+    boundary = find_boundary(cloud, settings, progress=progress)
+    found = perf_counter()
+    front = advance_front(cloud, boundary, settings, progress=progress)
+    advanced = perf_counter()
+    grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
+    ended = perf_counter()
+    seconds = {
+        "read": read_seconds + checked - started,
+        "boundary": found - checked,
+        "front": advanced - found,
+        "optimize": ended - advanced,
+        "total": read_seconds + ended - started,
+    }
+    return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
+
+
+def check_length(cloud: PointCloud, settings: Settings) -> None:
+    """Refuse a member length that this scan cannot carry.
+
+    Raises
+    ------
+    InputError
+        The length is larger than the scan, or smaller than about three point spacings.
+    """
+    low, _ = length_range(cloud)
+    extent = extent_of(cloud)
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    if settings.length > extent:
+        raise InputError(
+            f"length {settings.length:g}{unit} is larger than the scan, whose longest side is {extent:.4g}{unit};"
+            f" use at most {round_length(extent / LARGEST, 'down'):g}"
+        )
+    if settings.length < low * (1 - 1e-9):  # the length that this message names must do
+        raise InputError(
+            f"length {settings.length:g}{unit} is too small for points that are {low / SPACINGS:.3g}{unit} apart;"
+            f" use at least {round_length(low, 'up'):g} ({SPACINGS:g} point spacings)"
+        )
+
+
+def extent_of(cloud: PointCloud) -> float:
+    """Longest side of the box around the points [scan unit]."""
+    return float(np.ptp(cloud.points, axis=0).max())
+
+
+def length_range(cloud: PointCloud) -> tuple[float, float]:
+    """Return the smallest and the largest sensible member length [scan unit], not rounded."""
+    from .scan.cloud import measure_spacing
+
+    return SPACINGS * measure_spacing(cloud.points), extent_of(cloud) / LARGEST
+
+
+def suggest_length(cloud: PointCloud) -> float:
+    """Return a member length that suits the scan, rounded to two digits [scan unit]."""
+    low, high = length_range(cloud)
+    wished = max(extent_of(cloud) / USUAL, low * USUAL_SPACINGS / SPACINGS)
+    return max(round_length(min(wished, high), "nearest"), round_length(low, "up"))
+
+
+def round_length(value: float, way: Literal["up", "down", "nearest"]) -> float:
+    """Round to two significant digits."""
+    if not value > 0:
+        return 0.0
+    digits = 1 - math.floor(math.log10(value))
+    steps = value * 10.0**digits
+    whole = {"up": math.ceil(steps - 1e-9), "down": math.floor(steps + 1e-9), "nearest": round(steps)}[way]
+    return float(f"{whole}e{-digits}")

@@ -1,0 +1,136 @@
+"""The figures of a run: plain values for `--report`, rows for the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+
+if TYPE_CHECKING:
+    from ..boundary import Boundary
+    from ..grid.grid import Grid
+    from ..scan.cloud import PointCloud
+
+
+def report_of(grid: Grid, points: int) -> dict[str, Any]:
+    """Return everything that `--report` saves, as plain values.
+
+    Parameters
+    ----------
+    grid : Grid
+        The result.
+    points : int
+        Points of the scan that were used.
+    """
+    return {
+        "points": points,
+        "nodes": len(grid.nodes),
+        "members": len(grid.edges),
+        "triangles": len(grid.triangles),
+        "quality": grid.quality.to_dict(),
+        "before": grid.before.to_dict() if grid.before is not None else None,
+        "topology": grid.topology.to_dict(),
+        "seconds": dict(grid.seconds),
+        "settings": grid.settings.to_dict() if grid.settings is not None else None,
+        "version": __version__,
+    }
+
+
+def count_holes(grid: Grid) -> int:
+    """Count the loops that are not the outer rim of their piece: every piece with a boundary has one."""
+    label = np.arange(len(grid.nodes))
+    first, second = grid.edges.T
+    while True:
+        lowest = np.minimum(label[first], label[second])
+        after = label.copy()
+        np.minimum.at(after, first, lowest)
+        np.minimum.at(after, second, lowest)
+        after = after[after]
+        if np.array_equal(after, label):
+            break
+        label = after
+    pieces = {int(label[loop[0]]) for loop in grid.boundary_loops}
+    return len(grid.boundary_loops) - len(pieces)
+
+
+def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
+    """Return the figures of Table 2: name, before, after optimization."""
+    rows = (
+        ("shape quality, mean", "shape_mean", "{:.4f}"),
+        ("shape quality, std", "shape_std", "{:.4f}"),
+        ("shape quality, smallest", "shape_min", "{:.3f}"),
+        ("member length, mean", "length_mean", "{:.4g}"),
+        ("member length, std", "length_std", "{:.3g}"),
+        ("length std / mean", "length_cv", "{:.4f}"),
+        ("smallest angle", "angle_min", "{:.1f}"),
+        ("largest angle", "angle_max", "{:.1f}"),
+        ("nodes of six members", "valence6", "{:.0%}"),
+    )
+    after, before = grid.quality.to_dict(), grid.before.to_dict() if grid.before is not None else {}
+    unit = f" [{grid.unit}]" if grid.unit else ""
+    return [
+        (
+            name + (unit if key.startswith("length_") and key != "length_cv" else ""),
+            form.format(before[key]) if key in before else "",
+            form.format(after[key]),
+        )
+        for name, key, form in rows
+    ]
+
+
+def grid_lines(grid: Grid, points: int) -> list[str]:
+    """Return counts, topology, deviation and times in words."""
+    topology, quality, unit = grid.topology, grid.quality, f" {grid.unit}" if grid.unit else ""
+    loops = topology.boundary_loops
+    lines = [
+        f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.triangles)} triangles from {points} points",
+        f"{topology.components} {'piece' if topology.components == 1 else 'pieces'}, "
+        + (
+            f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {count_holes(grid)} of them holes"
+            if loops
+            else "closed"
+        )
+        + ("" if topology.manifold and topology.orientable else "; WARNING: the grid is not an oriented manifold"),
+    ]
+    if quality.node_deviation_mean is not None and quality.node_deviation_max is not None:
+        lines.append(
+            f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the scan on average,"
+            f" {quality.node_deviation_max:.3g}{unit} at most"
+        )
+    if grid.seconds:
+        lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
+    return lines
+
+
+def cloud_lines(cloud: PointCloud) -> list[str]:
+    """Return points, extent, spacing, unit and a sensible range for the member length, in words."""
+    from ..pipeline import length_range, round_length, suggest_length
+    from ..scan.cloud import measure_spacing
+
+    low, high = length_range(cloud)
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    extent = " x ".join(f"{side:.4g}" for side in np.ptp(cloud.points, axis=0))
+    lowest = [f"{value:.10g}" for value in cloud.origin + cloud.points.min(axis=0)]
+    lines = [
+        f"points   {len(cloud.points)}"
+        + (f" ({cloud.dropped} more left out: NaN or infinite)" if cloud.dropped else ""),
+        f"extent   {extent}{unit}, from {' '.join(lowest)}",
+        f"spacing  {measure_spacing(cloud.points):.4g}{unit}",
+        f"unit     {cloud.unit or 'not known; --unit mm|cm|m|inch|foot says it'}",
+    ]
+    low, high = round_length(low, "up"), round_length(high, "down")
+    if low > high:
+        lines.append(f"--length {low:g} at least; the points are too far apart for a good grid of this scan")
+    else:
+        lines.append(f"--length {low:g} to {high:g}{unit}; try {suggest_length(cloud):g}")
+    return lines
+
+
+def loop_rows(boundary: Boundary) -> list[tuple[str, ...]]:
+    """Return kind, length and corners of each loop."""
+    return [
+        ("external" if loop.external else "internal", f"{loop.length:.4g}", str(len(loop.corners)))
+        for loop in boundary.loops
+    ]

@@ -1,0 +1,86 @@
+"""The terminal: a progress bar a stage, and tables; rich is imported only when there is something to draw."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as RichProgress
+    from rich.progress import TaskID
+
+
+class Bars(AbstractContextManager["Bars"]):
+    """A progress bar a stage on stderr; nothing at all where stderr is not a terminal.
+
+    An object is a ``progress(stage, share)`` for the functions of the library.
+    """
+
+    def __init__(self) -> None:
+        self._rich: RichProgress | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._current = ""
+
+    def __enter__(self) -> Bars:
+        """Start drawing, if there is somebody to look."""
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+            columns = (TextColumn("{task.description:<12}"), BarColumn(), TimeElapsedColumn())
+            self._rich = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._rich.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bars away."""
+        if self._rich is not None:
+            self._rich.stop()
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Show how far a stage is."""
+        if self._rich is None:
+            return
+        if stage != self._current:
+            if self._current:
+                self._rich.update(self._tasks[self._current], completed=1.0)
+            self._current = stage
+        if stage not in self._tasks:
+            self._tasks[stage] = self._rich.add_task(stage, total=1.0)
+        self._rich.update(self._tasks[stage], completed=min(max(share, 0.0), 1.0))
+
+    def note(self, line: str) -> None:
+        """Say one line above the bars."""
+        if self._rich is not None:
+            self._rich.console.print(line, highlight=False, markup=False)
+        else:
+            print(line, file=sys.stderr, flush=True)
+
+
+def print_lines(lines: list[str]) -> None:
+    """Print plain lines as they are."""
+    print("\n".join(lines))
+
+
+def print_table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    """Print a table: drawn by rich on a terminal, plain columns elsewhere."""
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(*head, box=None, pad_edge=False)
+        for column in table.columns[1:]:
+            column.justify = "right"
+        for row in rows:
+            table.add_row(*row)
+        Console().print(table)
+        return
+    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
+    for row in [head, *rows]:
+        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        print("  ".join(cells).rstrip())
