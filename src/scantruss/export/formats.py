@@ -1,0 +1,75 @@
+"""The table of formats a grid can be written in, and `write`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import FormatError
+from ..grid.grid import Grid
+from ..scan.cloud import PointCloud
+from .csv_file import encode_csv, nodes_path
+from .files import check_place, write_files
+from .json_file import encode_json
+from .obj_file import encode_obj
+from .picture import encode_picture
+from .ply_file import encode_ply
+
+Encoder = Callable[[Grid, Path, PointCloud | None], dict[Path, bytes]]
+
+#: suffix -> what the files of that format hold; all of them are pure functions of the grid (and the cloud, where it is drawn)
+FORMATS: dict[str, Encoder] = {
+    ".csv": lambda grid, path, cloud: encode_csv(grid, path),
+    ".json": lambda grid, path, cloud: {path: encode_json(grid)},
+    ".obj": lambda grid, path, cloud: {path: encode_obj(grid)},
+    ".ply": lambda grid, path, cloud: {path: encode_ply(grid)},
+    ".png": lambda grid, path, cloud: {path: encode_picture(grid, cloud)},
+}
+
+SOLID_SUFFIXES = (".3mf", ".stl")
+
+
+def check_output(path: str | Path) -> Path:
+    """Return the path if a grid can be written there; for the command line to call before the long work.
+
+    Raises
+    ------
+    FormatError
+        The suffix is unknown, the folder does not exist or cannot be written to, or a folder has this name.
+    """
+    path = Path(path)
+    if path.suffix.lower() in SOLID_SUFFIXES:
+        raise FormatError(
+            f'no format for "{path.suffix}" of a grid; use one of {" ".join(sorted(FORMATS))}, '
+            f"or write a .json and make the solid from it with: scantruss print"
+        )
+    path = check_place(path, FORMATS)
+    if path.suffix.lower() == ".csv":
+        check_place(nodes_path(path), (".csv", path.suffix))
+    return path
+
+
+def write(grid: Grid, path: str | Path, *, cloud: PointCloud | None = None) -> list[Path]:
+    """Write a grid; the suffix of the path tells the format.
+
+    Parameters
+    ----------
+    grid : Grid
+        What to write.
+    path : str or Path
+        File ending in .csv, .json, .obj, .ply or .png.
+    cloud : PointCloud, optional
+        The scan, drawn in the picture (.png).
+
+    Returns
+    -------
+    list of Path
+        The files written; two for .csv, one otherwise.
+
+    Raises
+    ------
+    FormatError
+        Unknown suffix, no such folder, no space; nothing half-written is left.
+    """
+    path = check_output(path)
+    return write_files(FORMATS[path.suffix.lower()](grid, path, cloud))

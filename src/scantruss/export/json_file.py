@@ -1,0 +1,149 @@
+"""Our own format: JSON that holds a grid without loss.
+
+What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) is read back to the
+last bit. What follows from it (members, boundary loops, quality, topology) is written for other programs and not read back. No dates and
+no names are written: the same grid gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import FormatError, InputError
+from ..grid.grid import Grid
+from ..grid.quality import GridQuality
+from ..settings import UNITS, Settings
+
+FORMAT = "scantruss-grid"
+FORMAT_VERSION = 1
+
+
+def encode_json(grid: Grid) -> bytes:
+    """Return the text of the JSON file, one line per node, member and triangle."""
+    deviation = None if grid.deviation is None else [None if math.isnan(d) else d for d in np.asarray(grid.deviation, float).tolist()]
+    values: dict[str, Any] = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "version": __version__,
+        "unit": grid.unit,
+        "origin": np.asarray(grid.origin, np.float64).tolist(),
+        "settings": None if grid.settings is None else grid.settings.to_dict(),
+        "quality": grid.quality.to_dict(),
+        "before": None if grid.before is None else grid.before.to_dict(),
+        "topology": grid.topology.to_dict(),
+        "fixed": np.flatnonzero(grid.fixed).tolist(),
+        "boundary_loops": [loop.tolist() for loop in grid.boundary_loops],
+        "nodes": np.asarray(grid.nodes, np.float64).tolist(),
+        "members": grid.edges.tolist(),
+        "triangles": grid.triangles.tolist(),
+        "deviation": deviation,
+    }
+    parts = [f"{json.dumps(key)}: {_lines(value) if key in ROWS else _text(value)}" for key, value in values.items()]
+    return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
+
+
+ROWS = ("nodes", "members", "triangles", "boundary_loops")
+
+
+def _text(value: Any) -> str:
+    """Return JSON of a value on one line; numbers of numpy count as numbers."""
+    return json.dumps(value, allow_nan=False, ensure_ascii=False, default=lambda number: number.item())
+
+
+def _lines(rows: list[Any]) -> str:
+    """Return JSON of a list, one line per row."""
+    return "[\n" + ",\n".join(map(_text, rows)) + "\n]" if rows else "[]"
+
+
+def read_grid(path: str | Path) -> Grid:
+    """Read a grid from our own JSON format, without loss.
+
+    Parameters
+    ----------
+    path : str or Path
+        File written by `write(grid, "....json")` or the command `scantruss grid`.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, or it is not a grid of ours.
+    """
+    try:
+        values = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+    except OSError as error:
+        raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise FormatError(f"{path} is not a grid of ScanTruss; a .json file written by scantruss grid is needed") from None
+    if not isinstance(values, dict) or values.get("format") != FORMAT:
+        raise FormatError(f'{path} is not a grid of ScanTruss (no "format": "{FORMAT}"); a .json written by scantruss grid is needed')
+    version = values.get("format_version")
+    if not isinstance(version, int) or not 1 <= version <= FORMAT_VERSION:
+        raise FormatError(f"{path} has version {version!r} of the format, this program reads up to {FORMAT_VERSION}; install a newer ScanTruss")
+    try:
+        return _grid_from(values)
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        words = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
+        raise FormatError(f"{path} is a damaged grid: {words}; write it again with scantruss grid") from None
+
+
+def _refuse_constant(word: str) -> float:
+    """Refuse NaN and Infinity, which are not JSON."""
+    raise ValueError(f"{word} is not a number")
+
+
+def _grid_from(values: dict[str, Any]) -> Grid:
+    """Return the grid that the plain values describe; ValueError, TypeError or KeyError where they do not."""
+    unit = values["unit"]
+    if unit not in UNITS:
+        raise ValueError(f"unknown unit {unit!r}")
+    nodes = _floats(values["nodes"], "nodes", 3)
+    triangles = _ids(values["triangles"], "triangles", len(nodes), 3)
+    fixed = np.zeros(len(nodes), bool)
+    fixed[_ids(values["fixed"], "fixed", len(nodes), 1).ravel()] = True
+    deviation = values.get("deviation")
+    if deviation is not None:
+        deviation = _floats([math.nan if d is None else d for d in deviation], "deviation", 1).ravel()
+        if len(deviation) != len(nodes):
+            raise ValueError(f"{len(deviation)} deviations for {len(nodes)} nodes")
+    settings, before = values.get("settings"), values.get("before")
+    return Grid(
+        nodes=nodes,
+        triangles=triangles,
+        fixed=fixed,
+        origin=_floats([values["origin"]], "origin", 3)[0],
+        unit=unit,
+        deviation=deviation,
+        settings=None if settings is None else Settings.from_dict(settings),
+        before=None if before is None else GridQuality(**before, unit=unit),
+    )
+
+
+def _floats(rows: Any, name: str, columns: int) -> np.ndarray:
+    """Return rows of numbers as an (N, columns) float64 array; strings and ragged rows are refused."""
+    array = np.asarray(rows)
+    if array.size and array.dtype.kind not in "if":
+        raise ValueError(f"{name} must be numbers")
+    return _shaped(array.astype(np.float64), name, columns)
+
+
+def _ids(rows: Any, name: str, limit: int, columns: int) -> np.ndarray:
+    """Return rows of ids from 0 to below `limit` as an (N, columns) int64 array."""
+    array = np.asarray(rows)
+    if array.size and (array.dtype.kind != "i" or array.min() < 0 or array.max() >= limit):
+        raise ValueError(f"{name} must be ids of nodes, 0 to {limit - 1}")
+    return _shaped(array.astype(np.int64), name, columns)
+
+
+def _shaped(array: np.ndarray, name: str, columns: int) -> np.ndarray:
+    """Return the array with the given number of columns, or refuse."""
+    if array.size == 0:
+        return array.reshape(0, columns)
+    if array.shape != ((len(array), columns) if columns > 1 else (len(array),)):
+        raise ValueError(f"{name} must have {columns} columns, got shape {array.shape}")
+    return array.reshape(-1, columns)

@@ -1,0 +1,33 @@
+"""Wavefront OBJ: nodes and triangles in the scan's own frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import __version__
+from ..grid.grid import Grid
+
+
+def header_lines(grid: Grid) -> list[str]:
+    """Return what the comments of a file say: the program, unit, length and counts; no dates and no file names."""
+    lines = [
+        f"ScanTruss {__version__}: triangular grid truss",
+        f"unit: {grid.unit or 'not known'}",
+        f"nodes: {len(grid.nodes)}, members: {len(grid.edges)}, triangles: {len(grid.triangles)}",
+    ]
+    if grid.settings is not None:
+        lines.insert(2, f"desired member length: {float(grid.settings.length)!r}")
+    return lines
+
+
+def own_frame(grid: Grid) -> np.ndarray:
+    """Return the nodes in the scan's own frame, (V, 3) float64 [scan unit]."""
+    return np.asarray(grid.nodes, np.float64).reshape(-1, 3) + np.asarray(grid.origin, np.float64)
+
+
+def encode_obj(grid: Grid) -> bytes:
+    """Return the text of an OBJ file: `v` with every digit of a float64, `f` counted from 1."""
+    lines = [f"# {line}" for line in header_lines(grid)]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in own_frame(grid).tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode("ascii")

@@ -1,0 +1,234 @@
+"""The printed model of Sec. 6: members and nodes as one watertight manifold solid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..grid.grid import Grid
+from .files import check_place, write_files
+
+SUFFIXES = (".3mf", ".stl")
+BLOCK = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed surface around the members and nodes of a grid."""
+
+    vertices: np.ndarray  #: (N, 3) float64 [printed unit], relative to the grid's origin
+    triangles: np.ndarray  #: (M, 3) int64, anticlockwise seen from outside
+    unit: str  #: unit of the grid, "" where it is not known
+    volume: float  #: [printed unit cubed]
+    components: int  #: bodies that do not touch
+    genus: int  #: openings one could pull a thread through, of all components together
+    expected_components: int  #: pieces of the grid
+    expected_genus: int  #: E - V + 1 summed over the pieces of the grid
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of it, in words; empty where the solid has every opening of the grid."""
+        lines = []
+        if self.components < self.expected_components:
+            lines.append(f"pieces of the grid touch in the solid: {self.expected_components} pieces, {self.components} bodies")
+        if self.genus != self.expected_genus:
+            lines.append(
+                f"{abs(self.expected_genus - self.genus)} of {self.expected_genus} openings are "
+                f"{'closed' if self.genus < self.expected_genus else 'added'} where members touch; thinner members keep them"
+            )
+        return lines
+
+
+def print_model(
+    grid: Grid, path: str | Path, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12
+) -> Solid:
+    """Write the grid as one watertight solid for a 3D printer.
+
+    Parameters
+    ----------
+    grid : Grid
+        The grid; its coordinates are multiplied by `scale`.
+    path : str or Path
+        File ending in .3mf (carries the unit) or .stl.
+    member_diameter, node_diameter : float
+        Diameters of the printed members and nodes, not scaled [unit of the grid].
+    scale : float
+        Size of the model over the size of the grid.
+    sides : int
+        Sides of a member.
+
+    Returns
+    -------
+    Solid
+        What was written.
+
+    Raises
+    ------
+    InputError
+        Diameters that do not suit the grid.
+    FormatError
+        The file cannot be written.
+    """
+    path = check_place(path, SUFFIXES)
+    solid = build_solid(grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides)
+    from .solid_files import encode_3mf, encode_stl
+
+    encode = encode_3mf if path.suffix.lower() == ".3mf" else encode_stl
+    write_files({path: encode(solid)})
+    return solid
+
+
+def build_solid(grid: Grid, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12) -> Solid:
+    """Return members (cylinders) and nodes (geodesic balls) of a grid, united.
+
+    Parameters
+    ----------
+    grid : Grid
+        The grid; its coordinates are multiplied by `scale`.
+    member_diameter, node_diameter : float
+        Diameters in the solid, not scaled [unit of the grid].
+    scale : float
+        Size of the solid over the size of the grid.
+    sides : int
+        Sides of a member.
+
+    Raises
+    ------
+    InputError
+        Diameters that do not suit the grid, in words and figures.
+    """
+    check_diameters(grid, member_diameter, node_diameter, scale, sides)
+    used, edges = np.unique(grid.edges, return_inverse=True)
+    edges = edges.reshape(-1, 2)
+    nodes = np.asarray(grid.nodes[used], np.float64) * scale
+    body = _unite(_parts(nodes, edges, member_diameter / 2, node_diameter / 2, sides))
+    mesh = body.to_mesh64()
+    pieces = _count_pieces(len(nodes), edges)
+    solid = Solid(
+        vertices=np.ascontiguousarray(mesh.vert_properties[:, :3], np.float64),
+        triangles=np.ascontiguousarray(mesh.tri_verts, np.int64),
+        unit=grid.unit,
+        volume=float(body.volume()),
+        components=len(body.decompose()),
+        genus=0,
+        expected_components=pieces,
+        expected_genus=len(edges) - len(nodes) + pieces,
+    )
+    return _checked(solid)
+
+
+def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, scale: float, sides: int) -> None:
+    """Refuse numbers from which no solid can be made that looks like the grid."""
+    for name, value in (("member diameter", member_diameter), ("node diameter", node_diameter), ("scale", scale)):
+        if not (isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0):
+            raise InputError(f"the {name} must be a positive number, got {value}")
+    if not (isinstance(sides, int | np.integer) and 3 <= sides <= 256):
+        raise InputError(f"sides must be a whole number between 3 and 256, got {sides}")
+    if len(grid.edges) == 0:
+        raise InputError("the grid has no members, so there is nothing to print; give a grid with at least one triangle")
+    unit = f" {grid.unit}" if grid.unit else ""
+    if node_diameter < member_diameter:
+        raise InputError(
+            f"the node diameter {node_diameter:g}{unit} is smaller than the member diameter {member_diameter:g}{unit}; "
+            f"a node must cover the ends of its members, so give at least {member_diameter:g}"
+        )
+    shortest = int(np.argmin(grid.lengths))
+    length = float(grid.lengths[shortest]) * scale
+    for name, value in (("member", member_diameter), ("node", node_diameter)):
+        if value >= length:
+            a, b = grid.edges[shortest].tolist()
+            raise InputError(
+                f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {length:.4g}{unit} long at scale {scale:g} "
+                f"(nodes {a} and {b}); give a smaller diameter or a larger scale"
+            )
+
+
+def _parts(nodes: np.ndarray, edges: np.ndarray, member_radius: float, node_radius: float, sides: int) -> list[Any]:
+    """Return one ball per node and one cylinder per member, neighbours near each other in the list."""
+    from manifold3d import Manifold
+
+    ball = Manifold.sphere(node_radius, sides)
+    bar = Manifold.cylinder(1.0, member_radius, member_radius, sides)
+    frames = _frames(nodes, edges)
+    balls = [ball.translate(tuple(node)) for node in nodes.tolist()]
+    bars = [bar.transform(frame) for frame in frames]
+    places = np.concatenate([nodes, nodes[edges].mean(axis=1)])
+    parts = [*balls, *bars]
+    return [parts[k] for k in _curve_order(places)]
+
+
+def _frames(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return (E, 3, 4) what turns, stretches and moves a bar of length 1 along z onto each member."""
+    axis = nodes[edges[:, 1]] - nodes[edges[:, 0]]
+    along = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    helper = np.eye(3)[np.argmin(np.abs(along), axis=1)]
+    first = np.cross(helper, along)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(along, first), axis, nodes[edges[:, 0]]], axis=2)
+
+
+def _curve_order(places: np.ndarray) -> np.ndarray:
+    """Return the order of places along a curve that keeps neighbours together (bits of three coordinates interleaved)."""
+    low = places.min(axis=0)
+    size = float((places.max(axis=0) - low).max()) or 1.0
+    cell = np.minimum((places - low) / size * 1024, 1023).astype(np.int64)
+    key = np.zeros(len(places), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            key |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    return np.argsort(key, kind="stable")
+
+
+def _unite(parts: list[Any]) -> Any:
+    """Return the union of all parts, block by block."""
+    from manifold3d import Manifold, OpType
+
+    while len(parts) > 1:
+        parts = [Manifold.batch_boolean(parts[k : k + BLOCK], OpType.Add) for k in range(0, len(parts), BLOCK)]
+    return parts[0]
+
+
+def _count_pieces(count: int, edges: np.ndarray) -> int:
+    """Return how many connected pieces the nodes form by their members."""
+    label = np.arange(count)
+    while True:
+        lowest = label.copy()
+        np.minimum.at(lowest, edges[:, 0], label[edges[:, 1]])
+        np.minimum.at(lowest, edges[:, 1], label[edges[:, 0]])
+        lowest = lowest[lowest]
+        if np.array_equal(lowest, label):
+            return len(np.unique(label))
+        label = lowest
+
+
+def is_watertight(triangles: np.ndarray) -> bool:
+    """Whether every side of a triangle is met exactly once by a side in the opposite direction.
+
+    Parameters
+    ----------
+    triangles : np.ndarray
+        (M, 3) ids of vertices.
+    """
+    start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
+    count = int(triangles.max(initial=-1)) + 1
+    there, back = start * count + end, end * count + start
+    distinct = np.unique(there)
+    return len(triangles) > 0 and len(distinct) == len(there) and np.array_equal(distinct, np.unique(back))
+
+
+def _checked(solid: Solid) -> Solid:
+    """Return the solid with its genus, refused if it is not one closed surface around a volume."""
+    euler = len(np.unique(solid.triangles)) - len(solid.triangles) * 3 // 2 + len(solid.triangles)
+    if not (solid.volume > 0 and solid.components >= 1 and is_watertight(solid.triangles)):
+        raise InputError(
+            f"no watertight solid came of the grid (volume {solid.volume:.4g}, {solid.components} bodies); "
+            f"check the grid and try slightly different diameters"
+        )
+    from dataclasses import replace
+
+    return replace(solid, genus=solid.components - euler // 2)

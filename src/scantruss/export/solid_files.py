@@ -1,0 +1,150 @@
+"""Files for 3D printers: 3MF, which carries the unit, and binary STL.
+
+Readers of these files keep coordinates as float32, and those of STL know which vertices are one only by equal coordinates. Vertices of a
+union lie so near to each other at places that rounding would weld them and tear the surface open. All vertices are therefore put on a
+lattice that float32 holds exactly, and those that fall together are moved apart by a step or two of it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+
+import numpy as np
+
+from .. import __version__
+from ..errors import FormatError
+from .solid import Solid
+
+UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}  #: 3MF's words; else millimeter
+ROUNDS = 32  #: of moving apart
+
+CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>
+"""
+RELATIONS = """<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>
+"""
+MODEL = """<?xml version="1.0" encoding="UTF-8"?>
+<model unit="{unit}" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+<metadata name="Application">ScanTruss {version}</metadata>
+<resources>
+<object id="1" name="grid truss" type="model"><mesh>
+<vertices>
+{vertices}
+</vertices>
+<triangles>
+{triangles}
+</triangles>
+</mesh></object>
+</resources>
+<build><item objectid="1"/></build>
+</model>
+"""
+
+
+def lattice_step(vertices: np.ndarray) -> float:
+    """Return the step of a lattice around 0 whose points float32 holds exactly [printed unit].
+
+    A power of two, 2^-22 of the size; not below 2^-25, as some readers weld what is nearer than 1e-8 whatever the unit.
+    """
+    size = 2.0 ** math.ceil(math.log2(max(float(np.abs(vertices).max()), 1e-30)))
+    return max(size * 2.0**-22, min(2.0**-25, size * 2.0**-16))
+
+
+def put_on_lattice(solid: Solid, rounds: int = ROUNDS) -> tuple[np.ndarray, int]:
+    """Return the vertices on the lattice, each at a place of its own, and how many are still at another's place.
+
+    Parameters
+    ----------
+    solid : Solid
+        What to write.
+    rounds : int
+        How often those that fall together are moved apart.
+
+    Returns
+    -------
+    vertices : np.ndarray
+        (N, 3) float32 [printed unit].
+    together : int
+        Vertices at the place of another one; 0 if the cure worked.
+    """
+    step = lattice_step(solid.vertices)
+    cell = np.rint(solid.vertices / step).astype(np.int64)
+    inward = None
+    for turn in range(rounds + 1):
+        late = _later_ones(cell)
+        if len(late) == 0 or turn == rounds:
+            return (cell * step).astype(np.float32), len(late)
+        inward = -_vertex_normals(solid) if inward is None else inward
+        shift = np.rint(inward[late] * (turn + 1)).astype(np.int64)
+        shift[:, 0] += (shift == 0).all(axis=1)
+        cell[late] += shift
+    raise AssertionError
+
+
+def _later_ones(cell: np.ndarray) -> np.ndarray:
+    """Return the ids of the rows that an earlier row equals."""
+    order = np.lexsort((np.arange(len(cell)), *cell.T))
+    same = (cell[order[1:]] == cell[order[:-1]]).all(axis=1)
+    return np.sort(order[1:][same])
+
+
+def _vertex_normals(solid: Solid) -> np.ndarray:
+    """Return (N, 3) unit normals pointing out of the solid; zero where there is none."""
+    a, b, c = solid.vertices[solid.triangles.T]
+    normal = np.cross(b - a, c - a)
+    total = np.zeros_like(solid.vertices)
+    for corner in solid.triangles.T:
+        for axis in range(3):
+            total[:, axis] += np.bincount(corner, normal[:, axis], len(total))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+
+def encode_3mf(solid: Solid) -> bytes:
+    """Return a 3MF package; the unit is that of the grid, millimetre where it is not known. No dates, no random ids."""
+    vertices, _ = put_on_lattice(solid)
+    model = MODEL.format(
+        unit=UNITS.get(solid.unit, "millimeter"),
+        version=__version__,
+        vertices="\n".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in vertices.tolist()),
+        triangles="\n".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in solid.triangles.tolist()),
+    )
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as package:
+        for name, text in (("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS), ("3D/3dmodel.model", model)):
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            entry.create_system = 3
+            package.writestr(entry, text.encode("utf-8"))
+    return stream.getvalue()
+
+
+def encode_stl(solid: Solid) -> bytes:
+    """Return a binary STL file; watertight after welding equal coordinates, or refused.
+
+    Raises
+    ------
+    FormatError
+        Some vertices cannot be told apart in float32.
+    """
+    vertices, together = put_on_lattice(solid)
+    if together:
+        raise FormatError(f"STL cannot hold this solid watertight ({together} vertices coincide in float32); write a .3mf instead")
+    corners = vertices[solid.triangles]
+    wide = corners.astype(np.float64)
+    normal = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    table = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]))
+    table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    table["corners"] = corners
+    header = f"ScanTruss {__version__}, unit: {solid.unit or 'not known'}".encode("ascii").ljust(80)
+    return header + np.uint32(len(corners)).astype("<u4").tobytes() + table.tobytes()
