@@ -6,13 +6,13 @@ import runpy
 from dataclasses import fields
 from pathlib import Path
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import pytest
 from scantruss.errors import FormatError, InputError
-from scantruss.options import add_settings, option_of, read_positions, settings_of
 from scantruss.options import Parser as OptionParser
+from scantruss.options import add_settings, option_of, read_positions, settings_of
 from scantruss.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -39,7 +39,8 @@ def test_a_length_that_is_no_positive_number_is_refused(length):
     ("name", "value"),
     [
         ("method", "best"), ("unit", "furlong"), ("advance_from", "inside"), ("case3", "split"), ("max_deviation", 0.0),
-        ("max_deviation", math.nan), ("merge_angle", 30.0), ("smooth_passes", -1), ("fixed", ((1, 2),)), ("fixed", (("a", 2, 3),)),
+        ("max_deviation", math.nan), ("merge_angle", 30.0), ("smooth_passes", -1), ("fixed", ((1, 2),)),
+        ("fixed", (("a", 2, 3),)),
         ("fixed", ((1, 2, math.nan),)),
     ],
 )  # fmt: skip
@@ -99,11 +100,17 @@ def test_options_override_a_settings_file_field_by_field(tmp_path):
 @pytest.mark.parametrize(
     "text",
     [
-        "1,2,-3\n4,5,6.5\n", "x,y,z\n1,2,-3\n4,5,6.5", "1;2;-3\r\n4;5;6,5\r\n", "1\t2\t-3\n4\t5\t6.5", "# fixed\n1 2 -3\n\n 4  5  6.5 \n",
-        "name,x,y,z\na,1,2,-3\nb,4,5,6.5\n", "\ufeffx;y;z\n1;2;-3\n4;5;6.5\n", '"x","y","z"\n"1","2","-3"\n"4","5","6.5"\n',
+        "1,2,-3\n4,5,6.5\n",
+        "x,y,z\n1,2,-3\n4,5,6.5",
+        "1;2;-3\r\n4;5;6,5\r\n",
+        "1\t2\t-3\n4\t5\t6.5",
+        "# fixed\n1 2 -3\n\n 4  5  6.5 \n",
+        "name,x,y,z\na,1,2,-3\nb,4,5,6.5\n",
+        "\ufeffx;y;z\n1;2;-3\n4;5;6.5\n",
+        '"x","y","z"\n"1","2","-3"\n"4","5","6.5"\n',
         "1, 2, -3, first\n4, 5, 6.5, second\n",
     ],
-)  # fmt: skip
+)
 def test_fixed_nodes_are_read_from_any_text(tmp_path, text):
     (tmp_path / "fixed.csv").write_text(text, encoding="utf-8")
     assert read_positions(tmp_path / "fixed.csv") == [(1, 2, -3), (4, 5, 6.5)]

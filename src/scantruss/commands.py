@@ -107,28 +107,25 @@ def grid(values: Namespace) -> None:
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
-    from .report.saving import check_place
-
-    taken: dict[Path, str] = {}
-    for name, what in (
-        (values.scan, "scan"),
-        (values.settings, "settings"),
-        (values.fixed_file, "list of fixed nodes"),
-    ):
-        if name and Path(name).exists():
-            taken[Path(name).resolve()] = what
-    for path, what in [*((out, "grid") for out in outs), *([(report, "report")] if report else [])]:
-        check_place(path, what)
-        if (before := taken.get(path.resolve())) is not None:
-            raise FormatError(f"the {what} {path} would overwrite the {before}; name another file")
-        taken[path.resolve()] = what
-    check_place(settings_file, "settings")
-    if taken.get(settings_file.resolve(), "settings") != "settings":
-        raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
+    from .export.files import check_place
     from .export.formats import check_output
 
+    inputs = ((values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes"))
+    taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
-        check_output(out)
+        _take(check_output(out), "grid", taken)
+    if report is not None:
+        _take(check_place(report, (".json",)), "report", taken)
+    check_place(settings_file, (".json",))
+    if taken.get(settings_file.resolve(), "settings") != "settings":  # a run may repeat the settings it saved itself
+        raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
+
+
+def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
+    """Claim a path for an output, unless something else is there."""
+    if (before := taken.get(path.resolve())) is not None:
+        raise FormatError(f"the {what} {path} would overwrite the {before}; name another file")
+    taken[path.resolve()] = what
 
 
 def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
@@ -179,12 +176,11 @@ def print_parser() -> Parser:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
-    from .report.saving import SaveTogether, check_place
+    from .export.files import check_place
+    from .report.saving import SaveTogether
     from .report.terminal import print_lines
 
-    out = check_place(values.out, "model")
-    if out.suffix.lower() not in (".3mf", ".stl"):
-        raise FormatError(f"no model format for {out.suffix or out.name!r}; use .3mf or .stl")
+    out = check_place(values.out, (".3mf", ".stl"))
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
     if out.exists() and out.samefile(values.grid):

@@ -1,7 +1,7 @@
 """Options of the command line: one for every field of `Settings`, made from the fields.
 
-The front is argparse and not cyclopts for the sake of the start: in runs side by side ``--help`` took 0.4 s with cyclopts
-and 0.05 s with argparse, while the aim is a quarter of the 1.2 s in which numpy, scipy.spatial and numba are imported.
+The front is argparse and not cyclopts for the sake of the start: side by side, ``--help`` took 0.4 s with cyclopts and
+0.05 s with argparse, while the aim is a quarter of the 1.2 s in which numpy, scipy.spatial and numba are imported.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -41,6 +40,8 @@ class SaveTogether:
             if kind is None:
                 self._move()
                 self._made.clear()
+            elif isinstance(error, FormatError):
+                raise FormatError(self._in_place(str(error))) from None
         finally:
             for folder in self._folders.values():
                 shutil.rmtree(folder, ignore_errors=True)
@@ -68,6 +69,12 @@ class SaveTogether:
         text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
         self.beside(path).write_text(text + "\n", encoding="utf-8", newline="\n")
 
+    def _in_place(self, message: str) -> str:
+        """Name the places that the user knows in a message of a writer."""
+        for place, folder in self._folders.items():
+            message = message.replace(str(folder), str(place))
+        return message
+
     def _move(self) -> None:
         """Rename all files into place."""
         moves = [
@@ -78,28 +85,3 @@ class SaveTogether:
                 raise FormatError(f"cannot write {target}: it is a folder; name a file")
         for file, target in moves:
             file.replace(target)
-
-
-def check_place(path: str | Path, what: str) -> Path:
-    """Return the path of a file to be written, refused before anything is computed.
-
-    Parameters
-    ----------
-    path : path
-        Where the file shall go.
-    what : str
-        What it is, for the message.
-
-    Raises
-    ------
-    FormatError
-        The folder does not exist or cannot be written, or the path is a folder itself.
-    """
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise FormatError(f"cannot write the {what} {path}: there is no folder {path.parent}; make it first")
-    if path.is_dir():
-        raise FormatError(f"cannot write the {what} {path}: it is a folder; name a file")
-    if not os.access(path.parent, os.W_OK):
-        raise FormatError(f"cannot write the {what} {path}: the folder {path.parent} may not be written to")
-    return path

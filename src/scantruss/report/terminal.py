@@ -55,11 +55,11 @@ class Bars(AbstractContextManager["Bars"]):
         self._rich.update(self._tasks[stage], completed=min(max(share, 0.0), 1.0))
 
     def note(self, line: str) -> None:
-        """Say one line above the bars."""
+        """Say one line, above the bars where there are any."""
         if self._rich is not None:
             self._rich.console.print(line, highlight=False, markup=False)
         else:
-            print(line, file=sys.stderr, flush=True)
+            print(line, flush=True)
 
 
 def print_lines(lines: list[str]) -> None:

@@ -1,0 +1,398 @@
+"""The command line: what it writes, what it says, and that every refusal is one line with nothing written."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss import commands, pipeline
+from scantruss.cli import main
+from scantruss.errors import FrontError
+from scantruss.grid.grid import Grid
+from scantruss.scan.cloud import PointCloud
+
+LENGTH = "4"
+
+
+def plate(count=4000, seed=3):
+    """Points on a slightly arched plate of 40 x 30."""
+    chance = np.random.default_rng(seed)
+    x, y = chance.uniform(0, 40, count), chance.uniform(0, 30, count)
+    return np.stack([x, y, 0.02 * x * (40 - x)], axis=1)
+
+
+def moebius(count=12000, seed=3):
+    """Points on a one-sided strip, radius 40, width 24."""
+    chance = np.random.default_rng(seed)
+    turn, across = chance.uniform(0, 2 * np.pi, count), chance.uniform(-12, 12, count)
+    radius = 40 + across * np.cos(turn / 2)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), across * np.sin(turn / 2)], axis=1)
+
+
+def hexagon():
+    """A grid of six triangles around one node."""
+    turn = np.arange(6) * np.pi / 3
+    nodes = np.vstack([np.zeros(3), np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)])
+    triangles = np.array([(0, i + 1, (i + 1) % 6 + 1) for i in range(6)])
+    return Grid(nodes, triangles, np.zeros(7, bool), np.zeros(3), settings=st.Settings(length=1.0))
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder with a scan in it, which is where the command runs."""
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("scan.xyz", plate(), fmt="%.6f")
+    return tmp_path
+
+
+@pytest.fixture
+def ready(place, monkeypatch):
+    """The same, with a finished grid in place of the long work."""
+    monkeypatch.setattr(commands, "read_scan", lambda *_: PointCloud.from_array(plate()))
+    monkeypatch.setattr(commands, "make_grid", lambda *_: hexagon())
+    return place
+
+
+def refused(capsys, *words, status=2):
+    """Run a command that must be refused; return the one line that it says."""
+    names = sorted(entry.name for entry in os.scandir("."))
+    assert main(words) == status
+    said = capsys.readouterr()
+    assert said.err.startswith("scantruss: ")
+    assert said.err.count("\n") == 1 and said.err.endswith("\n")
+    assert sorted(entry.name for entry in os.scandir(".")) == names, "something was written"
+    return said.err
+
+
+# ---- refused: words ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("cut a b", "no command 'cut'"),
+        ("grid", "missing SCAN, OUT"),
+        ("grid scan.xyz", "missing OUT"),
+        ("grid scan.xyz a.obj", "--length is missing"),
+        ("grid scan.xyz a.obj --length", "--length: expected one argument"),
+        ("grid scan.xyz a.obj --length abc", "--length: needs a number, got 'abc'"),
+        ("grid scan.xyz a.obj --length 4,7", "--length: needs a number, got '4,7'"),
+        ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),
+        ("grid scan.xyz a.obj --length 4 --merge-angle wide", "--merge-angle: needs a number"),
+        ("grid scan.xyz a.obj --length 4 --smooth-passes 1.5", "--smooth-passes: needs a whole number"),
+        ("grid scan.xyz a.obj --length 4 --fixed 1,2", "--fixed: needs three numbers X,Y,Z, got '1,2'"),
+        ("grid scan.xyz a.obj --length 4 --fixed -1,-2", "--fixed: needs three numbers X,Y,Z, got '-1,-2'"),
+        ("grid scan.xyz a.obj --length 4 --fixed 1,2,nan", "three finite coordinates"),
+        ("grid scan.xyz a.obj --length 4 --fixed-file no.csv", "no.csv"),
+        ("grid scan.xyz a.obj --settings no.json", "no.json"),
+        ("grid scan.xyz a.obj --settings scan.xyz", "scan.xyz is not a settings file"),
+        ("grid scan.xyz a.obj --length 4 --method best", "method must be one of default paper"),
+        ("grid scan.xyz a.obj --length 4 --unit furlong", "unit must be one of mm cm m inch foot"),
+        ("grid scan.xyz a.obj --length 4 --advance-from inside", "advance_from must be one of external all"),
+        ("grid scan.xyz a.obj --length 4 --max-deviation -1", "max_deviation must be positive"),
+        ("info", "missing SCAN"),
+        ("info scan.xyz other.xyz", "too many arguments: other.xyz"),
+        ("print grid.json", "missing "),
+        ("demo a b", "too many arguments: b"),
+    ],
+)
+def test_words_that_cannot_be_understood_are_refused(place, capsys, words, line):
+    assert line in refused(capsys, *words.split())
+
+
+@pytest.mark.parametrize("length", ["0", "-3", "-.5", "-1e3", "nan", "inf", "-inf"])
+@pytest.mark.parametrize("command", ["grid scan.xyz a.obj", "info scan.xyz"])
+def test_a_length_that_is_no_positive_number_is_refused(place, capsys, command, length):
+    assert "length must be a positive number" in refused(capsys, *command.split(), "--length", length)
+
+
+# ---- refused: files ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("out", "line"),
+    [
+        ("a.xyzzy", "no format for"),
+        ("a", "no format for"),
+        ("a.stl", "scantruss print"),
+        ("missing/a.obj", "missing does not exist"),
+        ("scan.xyz/a.obj", "is a file, not a folder"),
+        ("folder.obj", "it is a folder"),
+    ],
+)
+def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(place, capsys, monkeypatch, out, line):
+    (place / "folder.obj").mkdir()
+    monkeypatch.setattr(commands, "read_scan", lambda *_: pytest.fail("the scan was read"))
+    assert line in refused(capsys, "grid", "scan.xyz", "good.obj", out, "--length", LENGTH)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        ("a.obj a.obj", "would overwrite the grid"),
+        ("a.obj --report missing/a.json", "missing does not exist"),
+        ("a.obj --report a.txt", "no format for"),
+        ("a.json --report a.json", "would overwrite the grid"),
+        ("a.obj --report a.settings.json", "is where the settings of this run are saved"),
+        ("a.obj a.settings.json", "is where the settings of this run are saved"),
+    ],
+)
+def test_outputs_in_each_others_way_are_refused(ready, capsys, words, line):
+    assert line in refused(capsys, "grid", "scan.xyz", *words.split(), "--length", LENGTH)
+
+
+def test_the_scan_is_never_overwritten(ready, capsys):
+    (ready / "scan.ply").write_bytes(b"the scan")
+    assert "would overwrite the scan" in refused(capsys, "grid", "scan.ply", "scan.ply", "--length", LENGTH)
+
+
+WRONG = {
+    "empty": b"",
+    "picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 4,
+    "prose": b"It was a dark and stormy night;\nthe rain fell in torrents.\n",
+    "half a ply": b"ply\nformat binary_little_endian 1.0\nelement vertex 1000\nproperty float x\n",
+}
+
+
+@pytest.mark.parametrize(
+    "suffix", [".ply", ".xyz", ".csv", ".pts", ".las", ".laz", ".obj", ".stl", ".off", ".npy", ".npz"]
+)
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize("command", ["grid {} a.obj --length 4", "info {}"])
+def test_a_scan_that_is_not_what_its_suffix_says_is_refused(place, capsys, suffix, kind, command):
+    (place / f"bad{suffix}").write_bytes(WRONG[kind])
+    assert f"bad{suffix}" in refused(capsys, *command.format(f"bad{suffix}").split())
+
+
+@pytest.mark.parametrize("command", ["grid {} a.obj --length 4", "info {}"])
+@pytest.mark.parametrize("name", ["missing.ply", "scan.docx", "folder.ply"])
+def test_a_scan_that_is_not_there_is_refused(place, capsys, command, name):
+    (place / "folder.ply").mkdir()
+    (place / "scan.docx").write_bytes(b"PK")
+    assert name.partition(".")[2] in refused(capsys, *command.format(name).split())
+
+
+@pytest.mark.parametrize(
+    ("points", "line"),
+    [
+        (np.array([[0.0, 0, 0], [1, 0, 0]]), "point"),
+        (np.outer(np.linspace(0, 9, 50), [1, 2, 3.0]), "line"),
+        (np.zeros((50, 3)), ""),
+        (np.full((50, 3), np.nan), ""),
+        (np.full((50, 3), np.inf), ""),
+    ],
+    ids=["two points", "a line", "one place", "nan", "infinite"],
+)
+@pytest.mark.parametrize("command", ["grid bad.xyz a.obj --length 4", "info bad.xyz"])
+def test_points_that_span_no_surface_are_refused(place, capsys, points, line, command):
+    np.savetxt("bad.xyz", points)
+    assert line in refused(capsys, *command.split())
+
+
+# ---- refused: lengths that the scan cannot carry -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["grid scan.xyz a.obj", "info scan.xyz"])
+def test_a_length_larger_than_the_scan_is_refused(place, capsys, command):
+    assert "larger than the scan" in refused(capsys, *command.split(), "--length", "41")
+
+
+def test_a_length_of_less_than_three_spacings_is_refused_with_one_that_does(place, capsys):
+    line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
+    smallest = float(line.split("at least")[1].split()[0])
+    cloud = st.read_points("scan.xyz")
+    pipeline.check_length(cloud, st.Settings(length=smallest))
+    with pytest.raises(st.InputError, match="too small"):
+        pipeline.check_length(cloud, st.Settings(length=0.9 * smallest))
+
+
+@pytest.mark.parametrize("value", [1e-7, 0.0123, 0.99, 1.0, 9.99, 12345.6, 8e9])
+def test_rounding_keeps_two_digits_and_its_direction(value):
+    assert pipeline.round_length(value, "down") <= value * (1 + 1e-9)
+    assert pipeline.round_length(value, "up") >= value * (1 - 1e-9)
+    assert pipeline.round_length(value, "nearest") == pytest.approx(value, rel=0.05)
+
+
+def test_a_one_sided_surface_is_refused(place, capsys):
+    np.savetxt("moebius.xyz", moebius(), fmt="%.6f")
+    assert "one-sided" in refused(capsys, "grid", "moebius.xyz", "a.obj", "--length", "5")
+
+
+# ---- refused: runs that end early ----------------------------------------------------------------------------------
+
+
+def test_a_full_disk_leaves_nothing_behind(ready, capsys):
+    resource = pytest.importorskip("resource")
+    kept = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (300, kept[1]))
+        line = refused(capsys, "grid", "scan.xyz", "a.csv", "a.json", "--length", LENGTH)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, kept)
+    assert "a.json" in line and ".scantruss" not in line
+
+
+@pytest.mark.parametrize(("stop", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_stopped_run_leaves_nothing_behind(ready, capsys, monkeypatch, stop, status):
+    monkeypatch.setattr("scantruss.report.saving.SaveTogether.json", lambda *_: os.kill(os.getpid(), stop))
+    refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=status)
+
+
+def test_a_failing_run_keeps_the_files_of_the_run_before(ready, capsys, monkeypatch):
+    (ready / "a.obj").write_text("before")
+    error = FrontError("the front stopped", where=(1.0, 2.0, 3.0))
+    monkeypatch.setattr("scantruss.report.saving.SaveTogether.json", lambda *_: (_ for _ in ()).throw(error))
+    assert "near 1, 2, 3" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH)
+    assert (ready / "a.obj").read_text() == "before"
+
+
+# ---- what is said and written --------------------------------------------------------------------------------------
+
+
+def test_help_and_version_import_nothing_heavy():
+    heavy = "numpy numba rich scipy trimesh laspy matplotlib"
+    code = (
+        "import sys, scantruss.cli as cli\n"
+        "for words in '--help', 'grid --help', 'info -h', 'print --help', 'demo -h', '--version', '':\n"
+        "    assert cli.main(words.split()) == 0\n"
+        f"assert not set('{heavy}'.split()) & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert all(f"--{spec.name.replace('_', '-')} " in done.stdout for spec in fields(st.Settings))
+    assert f"scantruss {st.__version__}\n" in done.stdout
+
+
+def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
+    fixed = "20,15,8"
+    words = [
+        "grid",
+        "scan.xyz",
+        "a.obj",
+        "--length",
+        LENGTH,
+        "b.json",
+        "--unit",
+        "mm",
+        "--fixed",
+        fixed,
+        "--report",
+        "r.json",
+    ]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "shape quality, mean" in said and "boundary loop" in said and "seconds" in said
+    assert sorted(entry.name for entry in place.iterdir()) == [
+        "a.obj",
+        "a.settings.json",
+        "b.json",
+        "r.json",
+        "scan.xyz",
+    ]
+    assert st.Settings.read("a.settings.json") == st.Settings(length=4.0, unit="mm", fixed=((20, 15, 8),))
+
+
+def test_the_report_holds_every_figure(place):
+    assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
+    report = json.loads((place / "r.json").read_text())
+    figures = (
+        "shape_mean shape_std shape_min length_mean length_std length_cv angle_min angle_max valence6"
+        " node_deviation_mean node_deviation_max"
+    )
+    names = "points nodes members triangles quality before topology seconds settings version"
+    assert set(report) == set(names.split())
+    assert set(report["quality"]) == set(report["before"]) == set(figures.split())
+    assert set(report["topology"]) == set("components boundary_loops euler manifold orientable".split())
+    assert set(report["seconds"]) == {"read", "boundary", "front", "optimize", "total"}
+    assert report["seconds"]["total"] == pytest.approx(sum(report["seconds"].values()) / 2)
+    assert report["settings"] == json.loads((place / "a.settings.json").read_text())
+    assert report["points"] == 4000
+    assert report["topology"] == {
+        "components": 1,
+        "boundary_loops": 1,
+        "euler": 1,
+        "manifold": True,
+        "orientable": True,
+    }
+    assert report["nodes"] - report["members"] + report["triangles"] == 1
+
+
+def test_saved_settings_repeat_a_run_to_the_byte(place):
+    words = "--length 4 --merge-angle 85 --case3 quadrangle --fixed 20,15,8".split()
+    assert main(["grid", "scan.xyz", "a.obj", "a.json", *words]) == 0
+    assert main(["grid", "scan.xyz", "b.obj", "b.json", "--settings", "a.settings.json"]) == 0
+    for suffix in ("obj", "json", "settings.json"):
+        assert (place / f"a.{suffix}").read_bytes() == (place / f"b.{suffix}").read_bytes()
+    assert main(["grid", "scan.xyz", "c.obj", "--settings", "b.json", "--length", "5"]) == 0
+    assert st.Settings.read("c.settings.json") == st.Settings.read("a.settings.json").replace(length=5.0)
+
+
+def test_a_few_bad_points_are_left_out_and_counted(place, capsys):
+    points = plate()
+    points[[5, 50]] = np.nan
+    np.savetxt("scan.xyz", points)
+    assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
+    assert "2 points with NaN or infinite coordinates are left out" in capsys.readouterr().out
+    assert json.loads((place / "r.json").read_text())["points"] == 3998
+
+
+def test_info_says_what_a_length_can_be(place, capsys):
+    assert main(["info", "scan.xyz", "--unit", "mm"]) == 0
+    said = capsys.readouterr().out
+    for word in ("points   4000", "extent   ", "spacing  ", "unit     mm", "--length ", "external", "4"):
+        assert word in said
+    low, high = (float(word) for word in said.split("--length ")[1].split(" mm")[0].split(" to "))
+    wished = float(said.split("try ")[1].split()[0])
+    assert low <= wished <= high
+    assert main(["info", "scan.xyz", "--length", "3"]) == 0
+    assert "members of 3:" in capsys.readouterr().out
+
+
+def test_print_makes_a_watertight_solid_of_a_saved_grid(ready, capsys):
+    import trimesh
+
+    assert main(["grid", "scan.xyz", "a.json", "--length", LENGTH]) == 0
+    sizes = ["--member-diameter", "0.1", "--node-diameter", "0.2"]
+    for name in ("a.stl", "a.3mf"):
+        assert main(["print", "a.json", name, *sizes, "--scale", "2"]) == 0
+        solid = trimesh.load(name, force="mesh")
+        assert solid.is_watertight
+    capsys.readouterr()
+    assert "no.json" in refused(capsys, "print", "no.json", "b.stl", *sizes)
+    assert "a.json" in refused(capsys, "print", "scan.xyz", "b.stl", *sizes).replace("scan.xyz", "a.json")
+    assert "no format" in refused(capsys, "print", "a.json", "b.obj", *sizes)
+    for word in ("0", "-1", "nan"):
+        assert "diameter" in refused(
+            capsys, "print", "a.json", "b.stl", "--member-diameter", word, "--node-diameter", "1"
+        )
+        assert "scale" in refused(capsys, "print", "a.json", "b.stl", *sizes, "--scale", word)
+
+
+def test_the_demo_makes_all_of_it(tmp_path, capsys):
+    assert main(["demo", str(tmp_path / "deep" / "demo")]) == 0
+    names = ["grid.json", "grid.obj", "grid.png", "grid.settings.json", "model.3mf", "report.json"]
+    assert sorted(entry.name for entry in (tmp_path / "deep" / "demo").iterdir()) == names
+    report = json.loads((tmp_path / "deep" / "demo" / "report.json").read_text())
+    assert report["topology"]["manifold"] and report["topology"]["orientable"]
+    assert report["topology"]["boundary_loops"] == 0
+
+
+def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
+    monkeypatch.setattr(
+        "scantruss.export.solid.print_model", lambda *_, **__: (_ for _ in ()).throw(OSError(28, "No space"))
+    )
+    assert "No space" in refused(capsys, "demo", "deep/demo")
+
+
+def test_the_command_itself_refuses_with_status_two(place):
+    done = subprocess.run(
+        [sys.executable, "-m", "scantruss", "grid", "no.ply", "a.obj", "--length", "-3"], capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("scantruss: length must be a positive number") and done.stderr.count("\n") == 1
+    assert done.stdout == ""
