@@ -47,6 +47,7 @@ def hexagon():
 def place(tmp_path, monkeypatch):
     """An empty folder with a scan in it, which is where the command runs."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
     np.savetxt("scan.xyz", plate(), fmt="%.6f")
     return tmp_path
 
@@ -387,6 +388,12 @@ def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
         "scantruss.export.solid.print_model", lambda *_, **__: (_ for _ in ()).throw(OSError(28, "No space"))
     )
     assert "No space" in refused(capsys, "demo", "deep/demo")
+
+
+def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
+    monkeypatch.delenv("SCANTRUSS_TRACEBACK")
+    monkeypatch.setattr(commands, "make_grid", lambda *_: 1 // 0)
+    assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 
 def test_the_command_itself_refuses_with_status_two(place):

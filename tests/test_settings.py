@@ -6,10 +6,10 @@ import runpy
 from dataclasses import fields
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import pytest
 from scantruss.errors import FormatError, InputError
 from scantruss.options import Parser as OptionParser
 from scantruss.options import add_settings, option_of, read_positions, settings_of

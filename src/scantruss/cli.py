@@ -79,6 +79,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(f"{error.strerror or error}{f': {names}' if names else ''}")
     except MemoryError:
         return refuse("not enough memory; use fewer points or a larger --length")
+    except Exception as error:
+        if os.environ.get("SCANTRUSS_TRACEBACK"):
+            raise
+        words = f"{type(error).__name__}: {error}"
+        return refuse(f"a fault of ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
     finally:
         try_signal(signal.SIGTERM, kept)
     return 0

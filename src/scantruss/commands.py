@@ -190,14 +190,16 @@ def print_solid(values: Namespace) -> None:
 
     result = read_grid(values.grid)
     with SaveTogether() as save:
-        print_model(
+        solid = print_model(
             result,
             save.beside(out),
             member_diameter=values.member_diameter,
             node_diameter=values.node_diameter,
             scale=values.scale,
         )
-    print_lines([f"wrote {out}: one solid of {len(result.edges)} members and {len(result.nodes)} nodes"])
+    size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
+    bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
+    print_lines([*solid.notes, f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
 
 
 def demo_parser() -> Parser:
