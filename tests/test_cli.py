@@ -15,12 +15,12 @@ from scantruss import commands, pipeline
 from scantruss.cli import main
 from scantruss.errors import FrontError
 from scantruss.grid.grid import Grid
-from scantruss.scan.cloud import PointCloud
+from scantruss.scan.cloud import PointCloud, measure_spacing
 
 LENGTH = "4"
 
 
-def plate(count=4000, seed=3):
+def plate(count=8000, seed=3):
     """Points on a slightly arched plate of 40 x 30."""
     chance = np.random.default_rng(seed)
     x, y = chance.uniform(0, 40, count), chance.uniform(0, 30, count)
@@ -207,10 +207,19 @@ def test_a_length_larger_than_the_scan_is_refused(place, capsys, command):
 def test_a_length_of_less_than_three_spacings_is_refused_with_one_that_does(place, capsys):
     line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
     smallest = float(line.split("at least")[1].split()[0])
-    cloud = st.read_points("scan.xyz")
+    cloud = PointCloud.from_array(plate())
     pipeline.check_length(cloud, st.Settings(length=smallest))
+    spacing = measure_spacing(cloud.points)
+    pipeline.check_length(cloud, st.Settings(length=3.01 * spacing))
     with pytest.raises(st.InputError, match="too small"):
-        pipeline.check_length(cloud, st.Settings(length=0.9 * smallest))
+        pipeline.check_length(cloud, st.Settings(length=2.99 * spacing))
+
+
+def test_the_gap_is_that_of_a_known_pattern():
+    x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    triangular = np.stack([(x + 0.5 * (y % 2)).ravel(), (y * np.sqrt(0.75)).ravel(), 0 * x.ravel()], axis=1)
+    assert pipeline.measure_gap(7 * triangular) == pytest.approx(7)
+    assert 2 < pipeline.measure_gap(plate()) / measure_spacing(plate()) < 3.5
 
 
 @pytest.mark.parametrize("value", [1e-7, 0.0123, 0.99, 1.0, 9.99, 12345.6, 8e9])
@@ -312,7 +321,7 @@ def test_the_report_holds_every_figure(place):
     assert set(report["seconds"]) == {"read", "boundary", "front", "optimize", "total"}
     assert report["seconds"]["total"] == pytest.approx(sum(report["seconds"].values()) / 2)
     assert report["settings"] == json.loads((place / "a.settings.json").read_text())
-    assert report["points"] == 4000
+    assert report["points"] == 8000
     assert report["topology"] == {
         "components": 1,
         "boundary_loops": 1,
@@ -339,13 +348,13 @@ def test_a_few_bad_points_are_left_out_and_counted(place, capsys):
     np.savetxt("scan.xyz", points)
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
     assert "2 points with NaN or infinite coordinates are left out" in capsys.readouterr().out
-    assert json.loads((place / "r.json").read_text())["points"] == 3998
+    assert json.loads((place / "r.json").read_text())["points"] == 7998
 
 
 def test_info_says_what_a_length_can_be(place, capsys):
     assert main(["info", "scan.xyz", "--unit", "mm"]) == 0
     said = capsys.readouterr().out
-    for word in ("points   4000", "extent   ", "spacing  ", "unit     mm", "--length ", "external", "4"):
+    for word in ("points   8000", "extent   ", "spacing  ", "unit     mm", "--length ", "external", "4"):
         assert word in said
     low, high = (float(word) for word in said.split("--length ")[1].split(" mm")[0].split(" to "))
     wished = float(said.split("try ")[1].split()[0])

@@ -20,9 +20,11 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
 
 SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a rim from a gap
-LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+GAPS = 2.2  #: ... and where points lie at random, this many distances to the sixth neighbour
+USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
-USUAL_SPACINGS = 5.0  #: and never fewer point spacings than this
+LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+SAMPLE = 200  #: points at which the gap is measured
 
 
 def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progress | None = None) -> Grid:
@@ -105,18 +107,20 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     InputError
         The length is larger than the scan, or smaller than about three point spacings.
     """
-    low, _ = length_range(cloud)
+    from .scan.cloud import measure_spacing
+
     extent = extent_of(cloud)
+    spacing = measure_spacing(cloud.points)
     unit = f" {cloud.unit}" if cloud.unit else ""
     if settings.length > extent:
         raise InputError(
             f"length {settings.length:g}{unit} is larger than the scan, whose longest side is {extent:.4g}{unit};"
-            f" use at most {round_length(extent / LARGEST, 'down'):g}"
+            f" use at most {length_range(cloud)[1]:g}"
         )
-    if settings.length < low * (1 - 1e-9):  # the length that this message names must do
+    if settings.length < SPACINGS * spacing * (1 - 1e-9):
         raise InputError(
-            f"length {settings.length:g}{unit} is too small for points that are {low / SPACINGS:.3g}{unit} apart;"
-            f" use at least {round_length(low, 'up'):g} ({SPACINGS:g} point spacings)"
+            f"length {settings.length:g}{unit} is too small for points that are {spacing:.3g}{unit} apart;"
+            f" use at least {length_range(cloud)[0]:g}"
         )
 
 
@@ -126,17 +130,40 @@ def extent_of(cloud: PointCloud) -> float:
 
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the smallest and the largest sensible member length [scan unit], not rounded."""
+    """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
     from .scan.cloud import measure_spacing
 
-    return SPACINGS * measure_spacing(cloud.points), extent_of(cloud) / LARGEST
+    low = max(SPACINGS * measure_spacing(cloud.points), GAPS * measure_gap(cloud.points))
+    return round_length(low, "up"), round_length(extent_of(cloud) / LARGEST, "down")
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
     low, high = length_range(cloud)
-    wished = max(extent_of(cloud) / USUAL, low * USUAL_SPACINGS / SPACINGS)
-    return max(round_length(min(wished, high), "nearest"), round_length(low, "up"))
+    wished = max(extent_of(cloud) / USUAL, USUAL_GAPS * measure_gap(cloud.points))
+    return max(round_length(min(wished, high), "nearest"), low)
+
+
+def measure_gap(points: np.ndarray) -> float:
+    """Return the median distance to the sixth neighbour, which tells the density however evenly the points lie.
+
+    Parameters
+    ----------
+    points : (N, 3) array [scan unit]
+
+    Returns
+    -------
+    float
+        About one spacing for points in a triangular pattern, 2.7 times the distance to the nearest for random ones.
+    """
+    sixth = min(6, len(points) - 1)
+    gaps = []
+    for place in points[np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)]:
+        squared = np.zeros(len(points))
+        for axis in range(3):
+            squared += (points[:, axis] - place[axis]) ** 2
+        gaps.append(np.partition(squared, sixth)[sixth])
+    return float(np.sqrt(np.median(gaps)))
 
 
 def round_length(value: float, way: Literal["up", "down", "nearest"]) -> float:

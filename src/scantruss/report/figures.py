@@ -106,7 +106,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
 
 def cloud_lines(cloud: PointCloud) -> list[str]:
     """Return points, extent, spacing, unit and a sensible range for the member length, in words."""
-    from ..pipeline import length_range, round_length, suggest_length
+    from ..pipeline import length_range, suggest_length
     from ..scan.cloud import measure_spacing
 
     low, high = length_range(cloud)
@@ -120,7 +120,6 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
         f"spacing  {measure_spacing(cloud.points):.4g}{unit}",
         f"unit     {cloud.unit or 'not known; --unit mm|cm|m|inch|foot says it'}",
     ]
-    low, high = round_length(low, "up"), round_length(high, "down")
     if low > high:
         lines.append(f"--length {low:g} at least; the points are too far apart for a good grid of this scan")
     else:
