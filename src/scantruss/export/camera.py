@@ -1,0 +1,145 @@
+"""Where to look at a grid from, and what is seen from there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """An eye that looks at the middle of a grid."""
+
+    middle: np.ndarray  #: (3,) [scan unit]
+    right: np.ndarray  #: (3,) unit vector, to the right in the picture
+    up: np.ndarray  #: (3,) unit vector, upwards in the picture
+    back: np.ndarray  #: (3,) unit vector, from the middle to the eye
+    ground: np.ndarray  #: (3,) unit vector, upwards in space
+    distance: float  #: from the middle to the eye [scan unit]
+    zoom: float = 1.0  #: [pixel] per scan unit at the middle
+    shift: tuple[float, float] = (0.0, 0.0)  #: [pixel]
+
+    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (N, 2) places in the picture [pixel] and (N,) nearness, larger in front [scan unit]."""
+        local = points - self.middle
+        near = local @ self.back
+        factor = self.zoom * self.distance / np.maximum(self.distance - near, 0.05 * self.distance)
+        flat = np.stack([local @ self.right, local @ self.up], axis=1) * factor[:, None]
+        return flat + np.array(self.shift), near
+
+    def around(self, points: np.ndarray) -> Camera:
+        """Return a camera that looks the same way at the middle of other points."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        radius = float(np.linalg.norm(high - low)) / 2 or 1.0
+        return replace(self, middle=(low + high) / 2, distance=DISTANCE * radius, zoom=1.0, shift=(0.0, 0.0))
+
+    def framed(self, points: np.ndarray, box: tuple[float, float, float, float]) -> Camera:
+        """Return the camera with zoom and shift such that the points fill a box (left, bottom, right, top) [pixel]."""
+        flat, _ = replace(self, zoom=1.0, shift=(0.0, 0.0)).project(points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        left, bottom, right, top = box
+        wide, tall = np.maximum(high - low, 1e-300)
+        zoom = min((right - left) / wide, (top - bottom) / tall)
+        middle = (low + high) / 2 * zoom
+        shift = ((left + right) / 2 - float(middle[0]), (bottom + top) / 2 - float(middle[1]))
+        return replace(self, zoom=float(zoom), shift=shift)
+
+
+def choose_camera(nodes: np.ndarray, triangles: np.ndarray) -> Camera:
+    """Return a camera that looks from above and aside, from the side to which the triangles face.
+
+    Open shells face one way on the whole: that way is up, and the more they do, the more the eye looks down on them. What is nearly
+    closed stands upright along its longest side, or lies flat if it is flat.
+
+    Parameters
+    ----------
+    nodes : np.ndarray
+        (V, 3) [scan unit].
+    triangles : np.ndarray
+        (T, 3) ids of nodes.
+    """
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    a, b, c = nodes[triangles.T]
+    normal = np.cross(b - a, c - a)
+    area = float(np.linalg.norm(normal, axis=1).sum()) or 1.0
+    facing = normal.sum(axis=0) / area
+    openness = float(np.linalg.norm(facing))
+    ground, openness = (_upward(facing / openness), openness) if openness > 0.08 else _standing(high - low)
+    front = _front(nodes, ground, openness)
+    rise = math.radians(12 + 36 * min(openness / 0.8, 1.0))
+    back = math.cos(rise) * front + math.sin(rise) * ground
+    right = np.cross(ground, back)
+    right /= np.linalg.norm(right)
+    return Camera(np.zeros(3), right, np.cross(back, right), back, ground, 1.0).around(nodes)
+
+
+def _upward(facing: np.ndarray) -> np.ndarray:
+    """Return the direction itself, or the axis it is nearly along."""
+    axis = int(np.argmax(np.abs(facing)))
+    return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > math.cos(math.radians(25)) else facing
+
+
+def _standing(extent: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the axis along which something closed stands, and how much one should look down on it: 0 to 1."""
+    short, middle, long = np.argsort(extent, kind="stable")
+    if extent[long] > 1.15 * extent[middle]:
+        return np.eye(3)[long], 0.0
+    if extent[short] < 0.5 * extent[middle]:
+        return np.eye(3)[short], 0.45
+    return np.eye(3)[1], 0.1
+
+
+def _front(nodes: np.ndarray, ground: np.ndarray, openness: float) -> np.ndarray:
+    """Return a horizontal direction to the eye: a little aside of the front; across the longer side of what lies."""
+    forward = np.array([0.0, 0.0, 1.0]) if abs(ground[1]) > 0.8 else np.array([0.0, -1.0, 0.0])
+    first = forward - (forward @ ground) * ground
+    first /= np.linalg.norm(first)
+    second = np.cross(ground, first)  # to the right of one who looks from the front
+    turn = math.radians(28)
+    if openness > 0.5:
+        width, depth = np.ptp(nodes @ second), np.ptp(nodes @ first)
+        if depth > 1.1 * width:
+            first, second = second, -first
+    return math.cos(turn) * first - math.sin(turn) * second
+
+
+def map_depth(corners: np.ndarray, near: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is in front at each pixel.
+
+    Parameters
+    ----------
+    corners : np.ndarray
+        (T, 3, 2) corners of triangles [pixel].
+    near : np.ndarray
+        (T, 3) nearness of the corners [scan unit].
+    shape : tuple of int
+        Rows and columns of the map.
+
+    Returns
+    -------
+    nearest : np.ndarray
+        (rows, columns) nearness of what is in front, -inf where nothing is [scan unit].
+    triangle : np.ndarray
+        (rows, columns) int64 triangle in front, -1 where none is.
+    """
+    nearest, triangle = np.full(shape, -np.inf), np.full(shape, -1, np.int64)
+    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, (shape[1], shape[0]))
+    high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, (shape[1], shape[0]))
+    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    double_area = side[:, 0] * other[:, 1] - side[:, 1] * other[:, 0]
+    for t in np.flatnonzero((np.abs(double_area) > 1e-9) & (high > low).all(axis=1)).tolist():
+        columns = np.arange(low[t, 0], high[t, 0])
+        rows = np.arange(low[t, 1], high[t, 1])[:, None]
+        x, y = columns - corners[t, 0, 0], rows - corners[t, 0, 1]
+        u = (x * other[t, 1] - y * other[t, 0]) / double_area[t]
+        v = (side[t, 0] * y - side[t, 1] * x) / double_area[t]
+        depth = near[t, 0] + u * (near[t, 1] - near[t, 0]) + v * (near[t, 2] - near[t, 0])
+        window = np.s_[low[t, 1] : high[t, 1], low[t, 0] : high[t, 0]]
+        front = (u >= 0) & (v >= 0) & (u + v <= 1) & (depth > nearest[window])
+        nearest[window][front] = depth[front]
+        triangle[window][front] = t
+    return nearest, triangle
