@@ -7,6 +7,8 @@ a second sheet nearby.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from .boxes import SearchBoxes, box_index, put, search, slot_of
@@ -121,8 +123,8 @@ def nearest_sites(positions: np.ndarray, boxes: SearchBoxes, near: float, far: f
 
 
 @kernel
-def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray) -> None:
-    """Normal of the least-squares plane of each site and its neighbours; sign not settled yet."""
+def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray) -> None:
+    """Normal of the least-squares plane of each site and its neighbours, and their rms distance from it; sign not settled yet."""
     for s in range(len(mean)):
         cx = cy = cz = 0.0
         count = 1
@@ -144,6 +146,72 @@ def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray) -
                 yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
         v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
+        square = v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+        thickness[s] = math.sqrt(max(square, 0.0) / count)
+
+
+@kernel
+def settle_sites(mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray) -> None:
+    """Move each rough site (thickness over `rough`) to the plane of the sites linked to it within a wider radius.
+
+    Noise, plants and doubled layers thicker than a site leave a cloud of sites instead of a sheet; this gives the sheet back.
+    Sites far off the plane weigh less.
+    """
+    count = len(mean)
+    stamp = np.full(count, -1, np.int64)
+    queue = np.empty(count, np.int64)
+    weight = np.empty(count)
+    for s in range(count):
+        place = row(mean, s)
+        settled[s, 0], settled[s, 1], settled[s, 2] = place
+        if thickness[s] <= rough:
+            continue
+        queue[0] = s
+        stamp[s] = s
+        found, at = 1, 0
+        while at < found:
+            q = queue[at]
+            at += 1
+            for k in range(neighbors.shape[1]):
+                n = neighbors[q, k]
+                if n >= 0 and stamp[n] != s:
+                    stamp[n] = s
+                    d = subtract(row(mean, n), place)
+                    if dot(d, d) < radius * radius:
+                        queue[found] = n
+                        found += 1
+        for i in range(found):
+            d = subtract(row(mean, queue[i]), place)
+            w = 1.0 - dot(d, d) / (radius * radius)
+            weight[i] = w * w
+        for turn in range(3):
+            total = cx = cy = cz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                total, cx, cy, cz = total + w, cx + w * d[0], cy + w * d[1], cz + w * d[2]
+            cx, cy, cz = cx / total, cy / total, cz / total
+            xx = xy = xz = yy = yz = zz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                x, y, z = d[0] - cx, d[1] - cy, d[2] - cz
+                xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+                yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+            off = cx * v[0] + cy * v[1] + cz * v[2]
+            if turn < 2:
+                spread = 0.0
+                for i in range(found):
+                    spread += weight[i] * abs(dot(subtract(row(mean, queue[i]), place), v) - off)
+                spread = max(spread / total, 1e-300)
+                for i in range(found):
+                    d = subtract(row(mean, queue[i]), place)
+                    w = 1.0 - dot(d, d) / (radius * radius)
+                    r = (dot(d, v) - off) / (1.5 * spread)
+                    weight[i] = w * w / (1.0 + r * r)
+        for c in range(3):
+            settled[s, c] = place[c] + off * v[c]
 
 
 @kernel
@@ -227,8 +295,8 @@ def orient_normals(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray,
 
 
 @kernel
-def smooth_normals(normals: np.ndarray, neighbors: np.ndarray, smoothed: np.ndarray) -> None:
-    """Mean normal of each site and of those neighbours that face the same side."""
+def smooth_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray) -> None:
+    """Mean normal of each site and of those neighbours whose normals have a cosine over `facing` with its own."""
     for s in range(len(normals)):
         a = row(normals, s)
         x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
@@ -236,7 +304,7 @@ def smooth_normals(normals: np.ndarray, neighbors: np.ndarray, smoothed: np.ndar
             n = neighbors[s, k]
             if n >= 0:
                 b = row(normals, n)
-                if dot(a, b) > 0.7:
+                if dot(a, b) > facing:
                     x, y, z = x + b[0], y + b[1], z + b[2]
         smoothed[s, 0], smoothed[s, 1], smoothed[s, 2] = unit((x, y, z))
 

@@ -15,6 +15,7 @@ from ..settings import Settings
 from .cloud import PointCloud, measure_spacing
 
 NEIGHBORS = 12  # links of a site
+ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,16 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     return kept[key]
 
 
+def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
+    """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
+    normals = surface.normals
+    for _ in range(passes):
+        smoothed = np.empty_like(normals)
+        kernels.smooth_normals(normals, surface.neighbors, 0.0, smoothed)
+        normals = smoothed
+    return normals
+
+
 def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     """Return the local surface of the scan for the kernels."""
     return prepare_sites(cloud, settings).surface
@@ -56,15 +67,17 @@ def _prepare(points: np.ndarray, length: float, box_size: float) -> Sites:
     spacing = measure_spacing(points)
     radius = max(box_size * length, 0.25 * spacing)
     owner, chosen, boxes = _thin(points, radius)
-    start = np.zeros(len(chosen) + 1, np.int64)
-    grouped, index, mean = np.empty_like(points), np.empty(len(points), np.int64), np.zeros((len(chosen), 3))
-    kernels.group_points(points, owner, start, grouped, index, mean)
-    neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
+    grouped, start, mean = _group(points, owner, len(chosen))
     place = points[chosen]
-    far = max(0.7 * length, 3.0 * spacing)
-    kernels.nearest_sites(place, boxes, max(2.1 * radius, 1.5 * spacing), far, neighbors)
-    normals = np.empty_like(mean)
-    kernels.site_normals(mean, neighbors, normals)
+    neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
+    rough = ROUGH * length
+    if (thickness > rough).mean() > 0.002:
+        settled = np.empty_like(mean)
+        kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
+        joined, chosen, boxes = _thin(settled, radius)
+        grouped, start, _ = _group(points, joined[owner], len(chosen))
+        place = mean = settled[chosen]
+        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
     kernels.cut_steep_links(mean, normals, neighbors, 0.75)
     weights = np.empty(neighbors.shape)
     kernels.link_weights(mean, normals, neighbors, weights)
@@ -72,12 +85,32 @@ def _prepare(points: np.ndarray, length: float, box_size: float) -> Sites:
     piece = np.empty(len(mean), np.int64)
     kernels.orient_normals(mean, normals, neighbors, order, piece)
     smoothed = np.empty_like(normals)
-    kernels.smooth_normals(normals, neighbors, smoothed)
+    kernels.smooth_normals(normals, neighbors, 0.7, smoothed)
     _face_outside(mean, smoothed, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), 24.0])
     scratch = np.zeros(len(mean), np.int64)
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
     return Sites(surface, boxes, _number(piece), spacing)
+
+
+def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the points sorted by site, where each site's points start, and their means."""
+    start, mean = np.zeros(sites + 1, np.int64), np.zeros((sites, 3))
+    grouped, index = np.empty_like(points), np.empty(len(points), np.int64)
+    kernels.group_points(points, owner, start, grouped, index, mean)
+    return grouped, start, mean
+
+
+def _link(
+    place: np.ndarray, mean: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the neighbours of each site, its normal (either sign) and the thickness of the points there."""
+    neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
+    far = max(0.7 * length, 3.0 * spacing)
+    kernels.nearest_sites(place, boxes, max(2.1 * radius, 1.5 * spacing), far, neighbors)
+    normals, thickness = np.empty_like(mean), np.empty(len(mean))
+    kernels.site_normals(mean, neighbors, normals, thickness)
+    return neighbors, normals, thickness
 
 
 def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, SearchBoxes]:

@@ -1,0 +1,357 @@
+"""Boundary of a point cloud: ordered loops, corners and the nodes on them (Sec. 3.3, 3.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .kernels import boundary as kernels
+from .kernels.surface import Surface
+from .scan.cloud import PointCloud
+from .scan.sites import Sites, broad_normals, prepare_sites
+from .settings import Settings
+
+Progress = Callable[[str, float], None]
+
+STEP = 0.05  # distance of the points of a boundary curve, in member lengths
+SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member lengths
+ARM = (0.1, 0.8)  # part of the curve at each side of a place that tells its direction there, in member lengths
+TRIES = 20  # of rolling the disc from one place
+WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
+
+
+class Rim(NamedTuple):
+    """The smoothed boundary curves, for the kernels: nodes of the boundary slide along them."""
+
+    points: np.ndarray  #: (M, 3) points of all curves, each curve closed
+    arc: np.ndarray  #: (M,) arc length from the start of the curve
+    start: np.ndarray  #: (L + 1,) points of curve c are start[c]:start[c + 1]
+    total: np.ndarray  #: (L,) length of each curve
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One boundary loop, the surface to its left."""
+
+    points: np.ndarray  #: (M, 3) smoothed closed curve, relative to the cloud's origin
+    corner_at: np.ndarray  #: (C,) int64, points of the curve that are corners
+    external: bool  #: the outer boundary of its piece; False: a hole
+    length: float  #: [scan unit]
+    piece: int  #: number of the piece of the cloud it bounds
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(C, 3) the corners."""
+        return self.points[self.corner_at]
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """All boundary loops of a cloud, and the sites they were found in."""
+
+    loops: tuple[Loop, ...]
+    sites: Sites
+
+    @property
+    def external(self) -> tuple[Loop, ...]:
+        """The outer boundaries."""
+        return tuple(loop for loop in self.loops if loop.external)
+
+    @property
+    def internal(self) -> tuple[Loop, ...]:
+        """The boundaries of holes."""
+        return tuple(loop for loop in self.loops if not loop.external)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(C, 3) the corners of all loops."""
+        return np.concatenate([np.zeros((0, 3)), *(loop.corners for loop in self.loops)])
+
+    @property
+    def rim(self) -> Rim:
+        """The curves of all loops as arrays for the kernels."""
+        points = [loop.points for loop in self.loops]
+        steps = [np.linalg.norm(np.roll(p, -1, axis=0) - p, axis=1) for p in points]
+        arcs = [np.concatenate([[0.0], np.cumsum(s)[:-1]]) for s in steps]
+        start = np.cumsum([0, *(len(p) for p in points)]).astype(np.int64)
+        return Rim(
+            np.concatenate([np.zeros((0, 3)), *points]),
+            np.concatenate([np.zeros(0), *arcs]),
+            start,
+            np.array([s.sum() for s in steps], float),
+        )
+
+
+def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress | None = None) -> Boundary:
+    """Return the ordered boundary loops of a cloud (Sec. 3.3).
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `smallest_hole`, `length`.
+    progress : callable, optional
+        Called with ("boundary", share); may raise to stop.
+
+    Returns
+    -------
+    Boundary
+        External loops first, each piece's longest loop being external; empty for a closed surface.
+    """
+    sites = prepare_sites(cloud, settings)
+    if progress:
+        progress("boundary", 0.4)
+    length = settings.length
+    radius = max(settings.boundary_radius * length, 1.3 * sites.surface.scale[1], 1.9 * sites.spacing)
+    found: list[tuple[np.ndarray, int]] = []
+    surface = sites.surface._replace(normals=broad_normals(sites.surface))
+    for loop, piece in boundary_loops(surface, sites.piece, radius, 0.8 * settings.smallest_hole * length):
+        points = boundary_points(surface, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
+        if len(points) < 3:
+            continue
+        curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
+        if len(curve) >= 8:
+            found.append((curve, piece))
+    loops = []
+    for curve, piece in found:
+        loop = smooth_loop(curve, piece, settings)
+        if loop is not None:
+            loops.append(loop)
+    if progress:
+        progress("boundary", 1.0)
+    return Boundary(_external_first(loops), sites)
+
+
+def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: float) -> list[tuple[np.ndarray, int]]:
+    """Return the sites of each loop (H,) in order, as the rolled disc touches them, and the piece that they bound.
+
+    Loops shorter than `least` are left out.
+    """
+    free = np.empty(len(surface.mean))
+    kernels.free_directions(surface, radius, np.radians(75.0), free)
+    seen = np.full(len(surface.mean), -1, np.int64)
+    visit = np.full(len(surface.mean), -1, np.int64)
+    banned = np.zeros(len(surface.mean), np.bool_)
+    path = np.empty(2_000 + 4 * int((free < 9.0).sum()), np.int64)
+    loops = []
+    for site in np.flatnonzero(free < 9.0):
+        if seen[site] >= 0:
+            continue
+        centre = kernels.site_disc(surface, site, free[site], radius)
+        for _ in range(TRIES):
+            first, last = kernels.roll_disc(surface, site, centre, radius, path, seen, visit, banned)
+            loop = path[first:last]
+            turns = surface.mean[loop]
+            if last == first or _around(turns) > least:
+                break
+            if np.linalg.norm(turns - surface.mean[site], axis=1).min() < 2.0 * radius:
+                last = first  # a small gap: it is closed over
+                break
+            banned[loop[loop != site]] = True  # the disc is caught in a rough place: let it not feel those sites
+        if last - first < 3:
+            continue
+        loop = loop.copy()
+        fresh = seen[loop] < 0
+        seen[loop] = np.roll(loop, -1)
+        if fresh.mean() > 0.5:
+            loops.append((loop, int(piece[loop[0]])))
+    return loops
+
+
+def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: float) -> np.ndarray:
+    """Return the boundary points (M, 3) along a loop of sites: what a disc slid from outside touches, in order."""
+    turns = _smooth_turns(surface.mean[loop])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
+    places = resample(turns, step)
+    at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
+    near = loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
+    touched = np.empty_like(places)
+    for reach in (8, 4):
+        ahead = np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
+        kernels.touch_points(surface, places, ahead, near, radius, touched)
+        places = _smooth_turns(touched)
+    forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
+    return touched[forward]
+
+
+def _around(turns: np.ndarray) -> float:
+    """Length of a closed polyline."""
+    return float(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1).sum())
+
+
+def _smooth_turns(turns: np.ndarray) -> np.ndarray:
+    """A closed polyline with half its zigzag."""
+    return 0.5 * turns + 0.25 * (np.roll(turns, 1, axis=0) + np.roll(turns, -1, axis=0))
+
+
+def resample(points: np.ndarray, step: float) -> np.ndarray:
+    """Return places at equal arc length along a closed polyline, about `step` apart."""
+    closed = np.concatenate([points, points[:1]])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    count = max(int(round(arc[-1] / step)), 3)
+    at = np.arange(count) * (arc[-1] / count)
+    return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
+
+
+def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
+    """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
+
+    Two places nearer than `width`, with more than 2.5 widths but less than half the curve between them, are joined directly.
+    """
+    while True:
+        count = len(curve)
+        low, high = int(2.5 * width / step), count // 2
+        if high <= low:
+            return curve
+        best = (0, 0)
+        for gap in range(high, low, -1):
+            near = np.linalg.norm(curve - np.roll(curve, -gap, axis=0), axis=1) < width
+            if near.any():
+                best = (int(np.argmax(near)), gap)
+                break
+        if best[1] == 0:
+            return curve
+        curve = np.roll(curve, -best[0], axis=0)
+        curve = resample(np.concatenate([curve[:1], curve[best[1] :]]), step)
+
+
+def smooth_loop(curve: np.ndarray, piece: int, settings: Settings) -> Loop | None:
+    """Find the corners of a closed curve of equal steps, smooth it between them; None where it is too short to keep."""
+    at, places = find_corners(curve, settings)
+    smoothed, corner_at = smooth_between(curve, at, places, int(round(WINDOW / STEP)))
+    length = _around(smoothed)
+    if length < settings.smallest_hole * settings.length:
+        return None
+    return Loop(smoothed, corner_at, False, length, piece)
+
+
+def _quadratic_arm(curve: np.ndarray, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coefficients (M, 3 coordinates) of 1, s, s^2 fitted to the arm before (-1) or after (+1) each place; s in steps."""
+    offsets = sign * np.arange(round(ARM[0] / STEP), round(ARM[1] / STEP) + 1)
+    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
+    inverse = np.linalg.pinv(terms)
+    arms = np.stack([np.roll(curve, -o, axis=0) for o in offsets], axis=0)
+    a, b, c = np.einsum("ko,omc->kmc", inverse, arms)
+    return a, b, c
+
+
+def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a closed curve has corners (C,) and their exact places (C, 3).
+
+    The direction before and after each place comes from quadratics fitted to its two arms; a corner is where they differ most,
+    by more than `corner_angle`. Its place is where the two quadratics meet.
+    """
+    if len(curve) < 2 * round(ARM[1] / STEP) + 2:
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    before, after = _quadratic_arm(curve, -1), _quadratic_arm(curve, 1)
+    cosine = (before[1] * after[1]).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(before[1], axis=1) * np.linalg.norm(after[1], axis=1), 1e-300)
+    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    half = round(0.5 / STEP)
+    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
+    at, places = [], []
+    for i in np.flatnonzero((turn >= highest) & (turn > settings.corner_angle)):
+        place = _meeting([c[i] for c in before], [c[i] for c in after])
+        if np.linalg.norm(place - curve[i]) < 0.5 * settings.length and (not at or i - at[-1] > half):
+            at.append(i)
+            places.append(place)
+    if len(at) > 1 and at[0] + len(curve) - at[-1] <= half:
+        at, places = at[:-1], places[:-1]
+    return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
+
+
+def _meeting(before: list[np.ndarray], after: list[np.ndarray]) -> np.ndarray:
+    """Place where two quadratic curves come nearest to each other, near their parameter 0 (Gauss-Newton)."""
+    s = t = 0.0
+    for _ in range(6):
+        p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
+        slopes = np.stack([before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])], axis=1)
+        change = np.linalg.lstsq(slopes, q - p, rcond=None)[0]
+        s, t = np.clip([s + change[0], t + change[1]], -0.6 / STEP, 0.6 / STEP)
+    return 0.5 * (before[0] + s * before[1] + s * s * before[2] + after[0] + t * after[1] + t * t * after[2])
+
+
+def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """Smooth a closed curve by local quadratics (Savitzky-Golay), corners kept exactly.
+
+    Returns
+    -------
+    smoothed : (M, 3)
+    corner_at : (C,) indices of the corners in it
+    """
+    offsets = np.arange(-half, half + 1)
+    weights = (1 - (np.abs(offsets) / (half + 1)) ** 3) ** 3
+    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
+    filter_ = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
+    if len(at) == 0:
+        return sum(f * np.roll(curve, -o, axis=0) for f, o in zip(filter_, offsets, strict=True)), at
+    parts, corner_at, size = [], [], 0
+    for i in range(len(at)):
+        begin, end = at[i], at[(i + 1) % len(at)] + (len(curve) if i + 1 == len(at) else 0)
+        middle = curve[np.arange(begin + 1, end) % len(curve)]
+        part = np.concatenate([places[i : i + 1], middle, places[(i + 1) % len(at)][None]])
+        part = _drop_backsteps(part)
+        n = len(part)
+        reach = min(half, n - 1)
+        mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
+        taken = filter_ if reach == half else _narrow(filter_, half - reach)
+        smooth = sum(f * mirrored[o : o + n] for o, f in enumerate(taken))
+        smooth[0], smooth[-1] = part[0], part[-1]
+        corner_at.append(size)
+        parts.append(smooth[:-1])
+        size += n - 1
+    return np.concatenate(parts), np.array(corner_at, np.int64)
+
+
+def _narrow(filter_: np.ndarray, cut: int) -> np.ndarray:
+    """A smoothing filter cut at both ends, its sum kept at one."""
+    inner = filter_[cut : len(filter_) - cut]
+    return inner / inner.sum()
+
+
+def _drop_backsteps(part: np.ndarray) -> np.ndarray:
+    """Leave out places next to the ends that the exact corner has overtaken."""
+    keep = np.ones(len(part), bool)
+    for end, order in ((0, range(1, len(part) - 1)), (len(part) - 1, range(len(part) - 2, 0, -1))):
+        for i in order:
+            inward = part[i + 1 if end == 0 else i - 1] - part[i]
+            if np.dot(part[i] - part[end], inward) > 0.25 * np.dot(inward, inward):
+                break
+            keep[i] = False
+    return part[keep]
+
+
+def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
+    """Mark the longest loop of each piece as external; external loops first, then by length."""
+    longest: dict[int, int] = {}
+    for i, loop in enumerate(loops):
+        if loop.piece not in longest or loop.length > loops[longest[loop.piece]].length:
+            longest[loop.piece] = i
+    marked = [Loop(p.points, p.corner_at, longest[p.piece] == i, p.length, p.piece) for i, p in enumerate(loops)]
+    return tuple(sorted(marked, key=lambda p: (not p.external, -p.length)))
+
+
+def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Characteristic points of a loop: nodes about `length` apart, equally between corners, corners being nodes.
+
+    Returns
+    -------
+    nodes : (H, 3), at least three
+    is_corner : (H,) bool
+    """
+    count = len(loop.points)
+    ends = loop.corner_at if len(loop.corner_at) else np.zeros(1, np.int64)
+    least = 3 if len(ends) == 1 else (2 if len(ends) == 2 else 1)
+    nodes, is_corner = [], []
+    for i, begin in enumerate(ends):
+        end = ends[i + 1] if i + 1 < len(ends) else ends[0] + count
+        part = loop.points[np.arange(begin, end + 1) % count]
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
+        pieces = max(int(round(arc[-1] / length)), least)
+        at = np.arange(pieces) * (arc[-1] / pieces)
+        nodes.append(np.stack([np.interp(at, arc, part[:, c]) for c in range(3)], axis=1))
+        is_corner += [len(loop.corner_at) > 0] + [False] * (pieces - 1)
+    return np.concatenate(nodes), np.array(is_corner, bool)

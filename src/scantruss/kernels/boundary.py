@@ -1,0 +1,219 @@
+"""Boundary points and ordered boundary loops of a point cloud (Sec. 3.3).
+
+A disc is rolled along the edge of the sites in their tangent planes: it touches boundary sites one after the other, which gives
+ordered loops directly. Gaps narrower than the disc do not let it in. Then a disc is slid from outside against the points at each
+place of a loop: what it touches are the boundary points.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .compile import kernel
+from .surface import Surface, flood
+from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
+
+DIRECTIONS = 64
+BINS = 240
+FACING = 0.2  # sites whose normals have a smaller cosine are another sheet, or a plant
+
+
+@kernel
+def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, noise: float) -> tuple[float, float]:
+    """Direction of another place in the tangent plane, and its distance as if the surface were unrolled into the plane.
+
+    Heights over the plane below `noise` do not count: a rough scan is seen as a sheet.
+    """
+    d = subtract(other, place)
+    a, b = dot(d, u), dot(d, v)
+    h = max(abs(dot(d, normal)) - noise, 0.0)
+    return math.atan2(b, a), math.sqrt(a * a + b * b + h * h)
+
+
+@kernel
+def free_directions(surface: Surface, radius: float, widest: float, free: np.ndarray) -> None:
+    """For each site, a direction in which a disc that touches it would be empty, or 9 where there is none.
+
+    Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
+    the middle of the widest free range, counted from `across(normal)`.
+    """
+    blocked = np.zeros(DIRECTIONS, np.bool_)
+    angles = np.empty(surface.neighbors.shape[1])
+    noise = 0.2 * surface.scale[0]
+    for s in range(len(surface.mean)):
+        free[s] = 9.0
+        normal, place = row(surface.normals, s), row(surface.mean, s)
+        u = across(normal)
+        v = cross(normal, u)
+        count = 0
+        for k in range(surface.neighbors.shape[1]):
+            n = surface.neighbors[s, k]
+            if n >= 0:
+                angle, _ = _polar(place, normal, u, v, row(surface.mean, n), 0.0)
+                at = count
+                while at > 0 and angles[at - 1] > angle:
+                    angles[at] = angles[at - 1]
+                    at -= 1
+                angles[at] = angle
+                count += 1
+        if count == 0:
+            continue
+        gap = angles[0] + 2.0 * math.pi - angles[count - 1]
+        for k in range(1, count):
+            gap = max(gap, angles[k] - angles[k - 1])
+        if gap <= widest:
+            continue
+        blocked[:] = False
+        found = flood(surface, s, place, 2.0 * radius)
+        for i in range(1, found):
+            if dot(row(surface.normals, surface.queue[i]), normal) < FACING:
+                continue
+            angle, distance = _polar(place, normal, u, v, row(surface.mean, surface.queue[i]), noise)
+            if 0.0 < distance < 2.0 * radius:
+                half = math.acos(distance / (2.0 * radius))
+                low = int(math.ceil((angle - half) * DIRECTIONS / (2.0 * math.pi)))
+                high = int(math.floor((angle + half) * DIRECTIONS / (2.0 * math.pi)))
+                for b in range(low, high + 1):
+                    blocked[b % DIRECTIONS] = True
+        best, run = 0, 0
+        for b in range(2 * DIRECTIONS):
+            run = 0 if blocked[b % DIRECTIONS] else run + 1
+            if run > best and run <= DIRECTIONS:
+                best = run
+                free[s] = (b - 0.5 * (run - 1)) * 2.0 * math.pi / DIRECTIONS
+
+
+@kernel
+def site_disc(surface: Surface, site: int, direction: float, radius: float) -> Vector:
+    """Centre of the disc that touches a site from its free direction."""
+    normal = row(surface.normals, site)
+    u = across(normal)
+    place = along(row(surface.mean, site), radius * math.cos(direction), u)
+    return along(place, radius * math.sin(direction), cross(normal, u))
+
+
+@kernel
+def _nearest_clear(cover: np.ndarray) -> int:
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS where there is none.
+
+    cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
+    """
+    for b in range(1, BINS):
+        cover[b] += cover[b - 1]
+    for b in range(BINS * 5 // 24):
+        if cover[b] == 0:
+            return b
+        if cover[BINS - 1 - b] == 0:
+            return -1 - b
+    return BINS
+
+
+@kernel
+def roll_disc(surface: Surface, site: int, centre: Vector, radius: float, path: np.ndarray, seen: np.ndarray, visit: np.ndarray, banned: np.ndarray) -> tuple[int, int]:
+    """Roll an empty disc along the boundary from a site that it touches, the surface to its left.
+
+    Parameters
+    ----------
+    path : (M,) int64, filled with the touched sites
+    seen : (S,) int64, for each site the site that followed it on an earlier loop, -1: none
+    visit : (S,) int64 scratch, index in `path` of the last visit
+    banned : (S,) bool, sites that the disc does not feel
+
+    Returns
+    -------
+    first, last : path[first:last] is the loop; first = last where the disc fell off, came to an earlier loop or path is too short
+    """
+    path[0] = site
+    count, came_from = 1, -1
+    noise = 0.2 * surface.scale[0]
+    step = 2.0 * math.pi / BINS
+    cover = np.empty(BINS + 1, np.int64)
+    while count < len(path):
+        normal, place = row(surface.normals, site), row(surface.mean, site)
+        u = across(normal)
+        v = cross(normal, u)
+        d = subtract(centre, place)
+        phi = math.atan2(dot(d, v), dot(d, u))
+        found = flood(surface, site, place, 2.0 * radius)
+        cover[:] = 0
+        for i in range(1, found):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+                continue
+            angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
+            if distance < 2.0 * radius:
+                half = math.acos(distance / (2.0 * radius))
+                begin = int((angle - half - phi) % (2.0 * math.pi) / step)
+                end = int((angle + half - phi) % (2.0 * math.pi) / step) + 1
+                cover[begin] += 1
+                cover[end] -= 1
+                if end <= begin:
+                    cover[0] += 1
+        clear = _nearest_clear(cover)
+        phi += (clear + 0.5) * step if clear < BINS else 0.0
+        slack = 0.0 if clear < BINS else 0.35
+        least, to, to_angle = 1e300, -1, 0.0
+        for i in range(1, found):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+                continue
+            angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
+            if distance < 2.0 * radius:
+                touch = angle - math.acos(distance / (2.0 * radius))
+                turn = (touch - phi) % (2.0 * math.pi)
+                if turn > 2.0 * math.pi - slack and s != came_from:
+                    turn -= 2.0 * math.pi
+                if turn < least:
+                    least, to, to_angle = turn, s, touch
+        if to < 0:
+            return 0, 0
+        centre = along(along(place, radius * math.cos(to_angle), u), radius * math.sin(to_angle), v)
+        if seen[site] == to:
+            return 0, 0
+        i = visit[site]
+        if 0 <= i < count - 1 and path[i] == site and path[i + 1] == to:
+            return i, count - 1
+        visit[site] = count - 1
+        came_from = site
+        site = to
+        path[count] = site
+        count += 1
+    return 0, 0
+
+
+@kernel
+def touch_points(surface: Surface, places: np.ndarray, ahead: np.ndarray, sites: np.ndarray, radius: float, touched: np.ndarray) -> None:
+    """Slide a disc from outside against the points at each place of a loop.
+
+    Parameters
+    ----------
+    places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
+    sites : (M,) site near each place
+    touched : (M, 3) filled with the point that the disc touches first, in the plane of the site
+    """
+    noise = 0.35 * surface.scale[0]
+    for m in range(len(places)):
+        site, place = sites[m], row(places, m)
+        normal = row(surface.normals, site)
+        out = unit(cross(row(ahead, m), normal))
+        side = cross(normal, out)
+        touched[m, 0], touched[m, 1], touched[m, 2] = place
+        best = -1e300
+        count = flood(surface, site, row(surface.mean, site), radius + 2.0 * surface.scale[1])
+        for i in range(count):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING:
+                continue
+            for p in range(surface.start[s], surface.start[s + 1]):
+                d = subtract(row(surface.points, p), place)
+                y, h = dot(d, side), dot(d, normal)
+                if abs(y) < radius and abs(h) < noise:
+                    x = dot(d, out)
+                    t = x + math.sqrt(radius * radius - y * y)
+                    if t > best:
+                        best = t
+                        h = dot(subtract(row(surface.mean, s), place), normal)
+                        foot = along(along(along(place, x, out), y, side), h, normal)
+                        touched[m, 0], touched[m, 1], touched[m, 2] = foot
