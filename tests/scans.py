@@ -1,16 +1,17 @@
-"""Clouds that look like real scans, with known answers: bodies, busts, shells as mesh vertices, hillsides, single views.
+"""Shapes of clouds that look like real scans: bodies, busts, shells as mesh vertices, hillsides, single views.
 
-Importing this module adds them to `shapes.SHAPES`. Sizes are those of common scans; seeds inside the generators are part of the shape.
+Sizes are those of common scans; seeds inside the generators are part of the shape.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
-from shapes import SHAPES, Truth, _height, _plate, _round, scallop
 from surfaces import Floats, Surface, from_field
+from truths import Truth, dome, height, plate, scallop
 
 Field = Callable[[Floats], Floats]
 
@@ -34,7 +35,7 @@ def _limb(*path: Sequence[float], radius: float) -> Field:
 
     def distance(p: Floats) -> Floats:
         nearest = np.full(len(p), np.inf)
-        for a, b in zip(places[:-1], places[1:], strict=True):
+        for a, b in pairwise(places):
             share = np.clip((p - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
             nearest = np.minimum(nearest, np.linalg.norm(p - a - share[:, None] * (b - a), axis=1))
         return np.asarray(nearest - radius)
@@ -56,36 +57,41 @@ def _union(*fields: Field, soft: float) -> Field:
     return distance
 
 
-def _rough(field: Field, size: float, height: float, seed: int, waves: int = 12) -> Field:
-    """Return a body with bumps of about `size` and `height` all over."""
+def _rough(field: Field, size: float, rise: float, seed: int, waves: int = 12) -> Field:
+    """Return a body with bumps of about `size` and `rise` all over."""
     rng = np.random.default_rng(seed)
     direction = rng.normal(size=(waves, 3))
     direction *= (2 * np.pi / (size * rng.uniform(0.7, 1.6, waves)) / np.linalg.norm(direction, axis=1))[:, None]
     phase = rng.uniform(0, 2 * np.pi, waves)
-    return lambda p: np.asarray(field(p) + height * np.sqrt(2 / waves) * np.sin(p @ direction.T + phase).sum(axis=1))
+    return lambda p: np.asarray(field(p) + rise * np.sqrt(2 / waves) * np.sin(p @ direction.T + phase).sum(axis=1))
 
 
 def _wavy(seed: int, octaves: Sequence[tuple[float, float]]) -> Callable[[Floats, Floats], Floats]:
     """Return heights over a plane, a sum of waves (length, height)."""
     rng = np.random.default_rng(seed)
     parts = []
-    for length, height in octaves:
+    for length, rise in octaves:
         for _ in range(6):
             angle, phase = rng.uniform(0, 2 * np.pi, 2)
             parts.append(
                 (
                     2 * np.pi / (length * rng.uniform(0.8, 1.3)) * np.array([np.cos(angle), np.sin(angle)]),
                     phase,
-                    height / 1.8,
+                    rise / 1.8,
                 )
             )
     return lambda x, y: np.asarray(sum(h * np.sin(k[0] * x + k[1] * y + phase) for k, phase, h in parts))
 
 
 STATUE = _union(
-    _ball((0, 0, 0), (26, 22, 34)), _ball((4, 0, 46), (17, 15, 17)), _limb((6, 20, 14), (24, 24, -4), (30, 8, -16), radius=6),
-    _limb((6, -20, 14), (26, -22, 2), (32, -12, 16), radius=6), _ball((20, 0, 45), (5, 4, 4)), _ball((0, 0, -36), (28, 26, 8)), soft=8.0,
-)  # fmt: skip
+    _ball((0, 0, 0), (26, 22, 34)),
+    _ball((4, 0, 46), (17, 15, 17)),
+    _limb((6, 20, 14), (24, 24, -4), (30, 8, -16), radius=6),
+    _limb((6, -20, 14), (26, -22, 2), (32, -12, 16), radius=6),
+    _ball((20, 0, 45), (5, 4, 4)),
+    _ball((0, 0, -36), (28, 26, 8)),
+    soft=8.0,
+)
 
 
 def statuette() -> Truth:
@@ -97,12 +103,17 @@ def statuette() -> Truth:
 
 
 def cat() -> Truth:
-    """Return a closed small cat with a tail that makes a handle (Euler number 0) and two ears about one member thick."""
+    """Return a closed small cat: a tail makes a handle (Euler number 0), ears are about one member thick."""
     body = _union(
-        _ball((0, 0, 0), (0.22, 0.18, 0.3)), _ball((0.06, 0, 0.38), (0.16, 0.15, 0.14)), _ball((0.05, 0.11, 0.53), (0.035, 0.06, 0.1)),
-        _ball((0.05, -0.11, 0.53), (0.035, 0.06, 0.1)), _ball((0.16, 0.08, -0.25), (0.12, 0.06, 0.06)), _ball((0.16, -0.08, -0.25), (0.12, 0.06, 0.06)),
-        _limb((-0.15, 0, -0.2), (-0.33, 0, -0.18), (-0.38, 0, 0.0), (-0.32, 0, 0.14), (-0.14, 0, 0.17), radius=0.055), soft=0.05,
-    )  # fmt: skip
+        _ball((0, 0, 0), (0.22, 0.18, 0.3)),
+        _ball((0.06, 0, 0.38), (0.16, 0.15, 0.14)),
+        _ball((0.05, 0.11, 0.53), (0.035, 0.06, 0.1)),
+        _ball((0.05, -0.11, 0.53), (0.035, 0.06, 0.1)),
+        _ball((0.16, 0.08, -0.25), (0.12, 0.06, 0.06)),
+        _ball((0.16, -0.08, -0.25), (0.12, 0.06, 0.06)),
+        _limb((-0.15, 0, -0.2), (-0.33, 0, -0.18), (-0.38, 0, 0.0), (-0.32, 0, 0.14), (-0.14, 0, 0.17), radius=0.055),
+        soft=0.05,
+    )
     surface = from_field(_rough(body, 0.15, 0.006, 5), np.array([-0.5, -0.3, -0.4]), np.array([0.4, 0.3, 0.75]), 0.0125)
     return Truth((surface,), 0.07, count=5_200, noise=0.0, unit="", spread=(0.45, 0.9))
 
@@ -110,9 +121,13 @@ def cat() -> Truth:
 def bust() -> Truth:
     """Return a bust as the vertices of a coarse uneven mesh, open at the base with a ragged cut: one loop."""
     head = _union(
-        _ball((0, 0, 0.75), (0.5, 0.42, 0.62)), _ball((0.42, 0, 0.7), (0.16, 0.09, 0.2)), _limb((0, 0, 0.3), (-0.05, 0, -0.6), radius=0.27),
-        _ball((-0.1, 0, -0.85), (0.45, 0.85, 0.4)), _limb((0.3, 0.2, 0.25), (0.4, 0, 0.12), (0.3, -0.2, 0.25), radius=0.1), soft=0.15,
-    )  # fmt: skip
+        _ball((0, 0, 0.75), (0.5, 0.42, 0.62)),
+        _ball((0.42, 0, 0.7), (0.16, 0.09, 0.2)),
+        _limb((0, 0, 0.3), (-0.05, 0, -0.6), radius=0.27),
+        _ball((-0.1, 0, -0.85), (0.45, 0.85, 0.4)),
+        _limb((0.3, 0.2, 0.25), (0.4, 0, 0.12), (0.3, -0.2, 0.25), radius=0.1),
+        soft=0.15,
+    )
     surface = from_field(_rough(head, 0.22, 0.014, 8), np.array([-0.8, -1.1, -1.45]), np.array([0.8, 1.1, 1.5]), 0.03)
     base = _wavy(4, ((0.6, 0.03), (0.17, 0.02)))
     return Truth(
@@ -127,13 +142,17 @@ def bust() -> Truth:
 
 
 def rabbit() -> Truth:
-    """Return a body with ears about one member thick, three large openings in its base and small drop-outs that a grid closes."""
+    """Return a body with thin ears, three large openings in its base and small drop-outs that a grid closes."""
     length = 0.006
     body = _union(
-        _ball((0, 0, 0), (0.06, 0.048, 0.05)), _ball((-0.045, 0, 0.045), (0.032, 0.026, 0.028)), _ball((-0.03, 0.014, 0.085), (0.0055, 0.011, 0.03), 15),
-        _ball((-0.03, -0.014, 0.085), (0.0055, 0.011, 0.03), 15), _ball((0.06, 0, -0.015), (0.014, 0.014, 0.014)),
-        _ball((0, 0, -0.04), (0.062, 0.05, 0.018)), soft=0.012,
-    )  # fmt: skip
+        _ball((0, 0, 0), (0.06, 0.048, 0.05)),
+        _ball((-0.045, 0, 0.045), (0.032, 0.026, 0.028)),
+        _ball((-0.03, 0.014, 0.085), (0.0055, 0.011, 0.03), 15),
+        _ball((-0.03, -0.014, 0.085), (0.0055, 0.011, 0.03), 15),
+        _ball((0.06, 0, -0.015), (0.014, 0.014, 0.014)),
+        _ball((0, 0, -0.04), (0.062, 0.05, 0.018)),
+        soft=0.012,
+    )
     surface = from_field(
         _rough(body, 0.012, 0.0005, 2), np.array([-0.1, -0.07, -0.075]), np.array([0.09, 0.07, 0.13]), 0.0015
     )
@@ -172,13 +191,13 @@ def mask() -> Truth:
         )
         return np.asarray(80 - 70 * np.abs(s) ** 3.2 + nose + 2.5 * np.exp(-((x / 24) ** 2) - ((y + 42) / 5) ** 2))
 
-    return _round(radius, profile, 7.0, 88.0, count=10_400, noise=0.05, spread=(0.75, 1.2))
+    return dome(radius, profile, 7.0, 88.0, count=10_400, noise=0.05, spread=(0.75, 1.2))
 
 
 def hillside() -> Truth:
     """Return lidar ground: rough, an irregular ragged rim with bays, two strips of uneven density."""
     ragged = _wavy(21, ((2.0, 0.16), (0.5, 0.04), (0.12, 0.012)))
-    height = _wavy(22, ((260, 16), (90, 5), (30, 1.0), (13, 0.35)))
+    relief = _wavy(22, ((260, 16), (90, 5), (30, 1.0), (13, 0.35)))
 
     def radius(t: Floats) -> Floats:
         return np.asarray(
@@ -189,9 +208,9 @@ def hillside() -> Truth:
 
     def profile(s: Floats, t: Floats) -> Floats:
         x, y = s * radius(t) * np.cos(t), s * radius(t) * np.sin(t)
-        return height(x, y) + 0.35 * x
+        return relief(x, y) + 0.35 * x
 
-    return _round(
+    return dome(
         radius,
         profile,
         8.0,
@@ -210,10 +229,10 @@ def wooded_hillside() -> Truth:
 
 def quarry() -> Truth:
     """Return ground with a steep wall, a bay in the rim and two inner gaps without points."""
-    height = _wavy(31, ((200, 10), (60, 3)))
+    relief = _wavy(31, ((200, 10), (60, 3)))
 
     def z(x: Floats, y: Floats) -> Floats:
-        return np.asarray(height(x, y) + 30 * np.tanh((x + 30 * np.sin(y / 60)) / 18))
+        return np.asarray(relief(x, y) + 30 * np.tanh((x + 30 * np.sin(y / 60)) / 18))
 
     def keep(p: Floats) -> Floats:
         x, y = p[:, 0], p[:, 1]
@@ -223,7 +242,7 @@ def quarry() -> Truth:
 
     corners = [(-210.0, -230.0), (210, -230), (210, 230), (-210, 230)]
     return replace(
-        _plate(corners, _height(z), 12.0, centre=(0.0, 0.0), count=33_000, noise=0.1, unit="m"),
+        plate(corners, height(z), 12.0, centre=(0.0, 0.0), count=33_000, noise=0.1, unit="m"),
         keep=keep,
         corners=np.zeros((0, 3)),
     )
@@ -246,4 +265,3 @@ def view() -> Truth:
 
 
 SCANS = (statuette, cat, bust, rabbit, valve_vertices, mask, hillside, wooded_hillside, quarry, view)
-SHAPES.update({shape.__name__: shape for shape in SCANS})

@@ -1,4 +1,4 @@
-"""True surfaces as dense triangles: built from sheets or from a field, cut, measured, sampled, and distances to them."""
+"""True surfaces as dense triangles: built from sheets or from a field, cut, measured, sampled; distances to them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Lift = Callable[[Floats], Floats]
 class Surface:
     """A dense, noise-free triangulation of a true surface.
 
-    `lift` maps parameters (K, 2) to positions (K, 3) where the surface was built from parameters; `project` moves positions
-    (K, 3) onto a surface that was built from a field.
+    `lift` maps parameters (K, 2) to positions (K, 3) where the surface was built from parameters; `project` moves
+    positions (K, 3) onto a surface that was built from a field.
     """
 
     nodes: Floats  #: (V, 3)
@@ -141,8 +141,8 @@ def sheet(
 ) -> Surface:
     """Return a surface from a table of parameters (m, n, 2).
 
-    Closed: the last row (column) is the first again; twisted: the last row is the first one reversed. A row whose positions
-    are all one (a pole) becomes one node.
+    Closed: the last row (column) is the first again; twisted: the last row is the first one reversed. A row whose
+    positions are all one (a pole) becomes one node.
     """
     m, n = parameters.shape[:2]
     index = np.arange(m * n).reshape(m, n)
@@ -168,7 +168,7 @@ def sheet(
 
 
 def disc(outline: Floats, inner: Floats, rings: int, lift: Lift) -> Surface:
-    """Return the surface over the region between an inner loop (n, 2) or centre (2,) and an outline (n, 2) seen from it."""
+    """Return the surface over the region between a loop (n, 2) or centre (2,) and an outline (n, 2) seen from it."""
     outline = np.concatenate([outline, outline[:1]])
     start = np.broadcast_to(inner, outline.shape) if inner.ndim == 1 else np.concatenate([inner, inner[:1]])
     share = np.linspace(0, 1, rings + 1)[:, None, None]
@@ -217,7 +217,7 @@ def cut(surface: Surface, keep: Callable[[Floats], Floats]) -> Surface:
 
 
 def from_field(field: Callable[[Floats], Floats], low: Floats, high: Floats, step: float) -> Surface:
-    """Return the surface field = 0 (negative inside), by marching through tetrahedra on a grid of `step`, then Newton steps."""
+    """Return the surface field = 0 (negative inside), marching through tetrahedra of `step`, then Newton steps."""
     counts = np.ceil((np.asarray(high) - low) / step).astype(int) + 1
     lattice = np.stack(np.meshgrid(*(np.arange(k) for k in counts), indexing="ij"), axis=-1).reshape(-1, 3)
     coarse = lattice[(lattice % 4 == 0).all(axis=1)]

@@ -5,17 +5,34 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scans
-import shapes
-from shapes import make
-from surfaces import distance_to_triangles, from_field
+from shapes import SHAPES, make
+from surfaces import cut, distance_to_triangles, from_field
 
 KNOWN = {  # loops, Euler number, components, corners
-    "scallop": (1, 1, 1, 4), "clam": (1, 1, 1, 0), "limpet": (1, 1, 1, 0), "cloth": (1, 1, 1, 4), "two_holes": (3, -1, 1, 4),
-    "stadium": (2, 0, 1, 0), "great_court": (2, 0, 1, 4), "sphere": (0, 2, 1, 0), "torus": (0, 0, 1, 0), "saddle": (1, 1, 1, 4),
-    "two_patches": (2, 2, 2, 0), "thin_strip": (1, 1, 1, 4), "gable": (1, 1, 1, 6), "pantheon": (2, 0, 1, 0), "l_plate": (1, 1, 1, 6),
-    "flat_plate": (1, 1, 1, 4), "terrain": (1, 1, 1, 4), "moebius": (1, 0, 1, 0), "fold_over": (1, 1, 1, 4),
-    "cat": (0, 0, 1, 0), "mask": (1, 1, 1, 0), "hillside": (1, 1, 1, 0), "quarry": (3, -1, 1, 0),
-}  # fmt: skip
+    "scallop": (1, 1, 1, 4),
+    "clam": (1, 1, 1, 0),
+    "limpet": (1, 1, 1, 0),
+    "cloth": (1, 1, 1, 4),
+    "two_holes": (3, -1, 1, 4),
+    "stadium": (2, 0, 1, 0),
+    "great_court": (2, 0, 1, 4),
+    "sphere": (0, 2, 1, 0),
+    "torus": (0, 0, 1, 0),
+    "saddle": (1, 1, 1, 4),
+    "two_patches": (2, 2, 2, 0),
+    "thin_strip": (1, 1, 1, 4),
+    "gable": (1, 1, 1, 6),
+    "pantheon": (2, 0, 1, 0),
+    "l_plate": (1, 1, 1, 6),
+    "flat_plate": (1, 1, 1, 4),
+    "terrain": (1, 1, 1, 4),
+    "moebius": (1, 0, 1, 0),
+    "fold_over": (1, 1, 1, 4),
+    "cat": (0, 0, 1, 0),
+    "mask": (1, 1, 1, 0),
+    "hillside": (1, 1, 1, 0),
+    "quarry": (3, -1, 1, 0),
+}
 
 
 @pytest.mark.parametrize("name", KNOWN)
@@ -88,7 +105,7 @@ def test_field_of_a_ball_gives_its_area_and_euler_number() -> None:
     ball = from_field(lambda p: np.linalg.norm(p, axis=1) - 1, np.full(3, -1.3), np.full(3, 1.3), 0.05)
     assert ball.euler == 2 and not ball.loops
     assert ball.areas.sum() == pytest.approx(4 * np.pi, rel=3e-3)
-    half = shapes.cut(ball, lambda p: p[:, 2] - 0.013)
+    half = cut(ball, lambda p: p[:, 2] - 0.013)
     assert half.euler == 1 and len(half.loops) == 1
     assert half.areas.sum() == pytest.approx(2 * np.pi * (1 - 0.013), rel=3e-3)
 
@@ -106,4 +123,4 @@ def test_distance_to_triangles_is_that_to_many_points_in_them() -> None:
 
 def test_every_scan_is_listed() -> None:
     """The clouds that look like scans can be made by name."""
-    assert all(scan.__name__ in shapes.SHAPES for scan in scans.SCANS)
+    assert all(scan.__name__ in SHAPES for scan in scans.SCANS)
