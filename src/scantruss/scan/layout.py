@@ -1,0 +1,207 @@
+"""How a text file of points is laid out: separator, decimal sign, header, columns. Found from a part of the file."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FormatError
+from .columns import fit_columns
+from .kinds import is_text, kind_of, read_head, wrong_kind
+
+PART = 1 << 16  # bytes looked at, at the start and in the middle
+LINES = 1000  # lines looked at in each part
+ANY = "any"  # blanks, commas and semicolons in one line
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+MISSING = frozenset(
+    [
+        *(sign + word for sign in ("", "+", "-") for word in ("nan", "nan(ind)", "inf", "infinity")),
+        *(sign + word for sign in ("", "-") for word in ("1.#qnan", "1.#ind", "1.#inf")),
+        *("na", "n/a", "null", "none", "-", "--"),
+    ]
+)
+#: separator (None: blanks) and whether a comma may be the decimal sign; the first that fits best is taken
+GRAMMARS: tuple[tuple[str | None, bool], ...] = (
+    (";", False), (";", True), ("\t", False), ("\t", True), (",", False), (None, False), (None, True), (ANY, False),
+)  # fmt: skip
+_REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the coordinates of a text file are."""
+
+    encoding: str
+    separator: str | None  #: one sign, None for blanks, or ANY
+    comma: bool  #: a comma may be the decimal sign
+    skip: int  #: lines before the first point
+    columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number
+    promised: int | None  #: points that a count line promises
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Return the fields of a line without its comment; [] where nothing is left."""
+    for mark in ("#", "//"):
+        if mark in line:
+            line = line.partition(mark)[0]
+    return split_fields(line.strip(" \r\n") if separator == "\t" else line.strip(), separator)
+
+
+def split_fields(text: str, separator: str | None) -> list[str]:
+    """Return the fields of a text, without blanks and quotes around them; [] for an empty text."""
+    if not text:
+        return []
+    if separator == ANY:
+        fields = re.split(r"[,;\s]+", text.strip(" ,;\t"))
+    elif separator is None:
+        fields = text.split()
+    elif '"' in text:
+        fields = _split_quoted(text, separator)
+    else:
+        fields = text.split(separator)
+    return [field.strip().strip("\"'").strip() for field in fields]
+
+
+def _split_quoted(text: str, separator: str) -> list[str]:
+    try:
+        return next(csv.reader([text], delimiter=separator, skipinitialspace=True))
+    except csv.Error:
+        return text.split(separator)
+
+
+def is_number(field: str, comma: bool) -> bool:
+    """Return whether a field is a number, or a word for a missing one."""
+    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or field.lower() in MISSING
+
+
+def find_layout(path: Path) -> Layout:
+    """Return the layout of a text file of points; FormatError where it is no such file."""
+    head = read_head(path)
+    kind = kind_of(head)
+    if not is_text(head) or kind in _REFUSED or kind.startswith("a raster"):
+        raise wrong_kind(path, head, "a text file of points")
+    encoding = _encoding(head)
+    start, middle = _parts(path, encoding)
+    start, middle = start[:LINES], middle[:LINES]
+    rows = [row for row in start + middle if split_line(row, ANY)]
+    separator, comma = _find_grammar(rows)
+    split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
+    data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
+    behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
+    columns = _numeric_columns([row for _, row in data], comma)
+    if not data and not kind:
+        raise FormatError(f"{path} has no line with three numbers, so no points")
+    if len(data) * 2 < behind or len(columns) < 3:
+        raise wrong_kind(path, head, "a text file of points")
+    return _finish(start, data, columns, encoding, separator, comma)
+
+
+def _encoding(head: bytes) -> str:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    return "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "latin-1"
+
+
+def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
+    """Return the whole lines of the first part of a file and of a part in its middle."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        raw = file.read(PART)
+        file.seek(size // 2)
+        later = file.read(PART // 4) if size > 2 * PART and encoding != "utf-16" else b""
+    start = re.split(r"\r\n|\n|\r", raw.decode(encoding, errors="replace"))
+    middle = re.split(r"\r\n|\n|\r", later.decode("latin-1"))[1:-1]
+    return (start[:-1] if size > PART and len(start) > 1 else start), middle
+
+
+def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
+    """Return separator and decimal sign by which most lines hold three numbers."""
+    scores = []
+    for separator, comma in GRAMMARS:
+        scores.append(sum(_count_numbers(split_line(line, separator), comma) >= 3 for line in lines))
+    best = max(scores[:-1])
+    if 2 * best < scores[-1]:
+        return GRAMMARS[-1]
+    return GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+
+
+def _count_numbers(row: Sequence[str], comma: bool) -> int:
+    return sum(is_number(field, comma) for field in row)
+
+
+def _numeric_columns(rows: Sequence[Sequence[str]], comma: bool) -> list[int]:
+    """Return the columns that nearly all rows have and that hold numbers or nothing."""
+    columns = []
+    for column in range(max(map(len, rows), default=0)):
+        fields = [row[column] for row in rows if column < len(row)]
+        filled = [field for field in fields if field]
+        numbers = sum(is_number(field, comma) for field in filled)
+        if len(fields) >= 0.9 * len(rows) and numbers and numbers >= 0.9 * len(filled):
+            columns.append(column)
+    return columns
+
+
+def _finish(
+    start: Sequence[str],
+    data: list[tuple[int, list[str]]],
+    numeric: list[int],
+    encoding: str,
+    separator: str | None,
+    comma: bool,
+) -> Layout:
+    """Return the layout, with the columns by name where the header names them."""
+    while len(data) > 1 and not all(c < len(data[0][1]) and is_number(data[0][1][c], comma) for c in numeric[:3]):
+        data = data[1:]  # a line of the header that holds three numbers
+    width = Counter(len(row) for _, row in data).most_common(1)[0][0]
+    if _is_counted_header(data):  # pandas names the columns of an array 0, 1, 2
+        first = int(not data[0][1][0])
+        skip, columns = data[1][0], (first, first + 1, first + 2)
+        return Layout(encoding, separator, comma, skip, columns, None)
+    skip = data[0][0]
+    running = _is_running([row[0] for _, row in data])
+    named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
+    counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
+    four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
+    columns = named or tuple(numeric[: 4 if four else 3])
+    return Layout(encoding, separator, comma, skip, columns, int(counts[-1]) if counts else None)
+
+
+def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
+    """Return whether the first row of numbers just counts the columns, unlike the rows that follow."""
+    if len(data) < 3:
+        return False
+    names = data[0][1]
+    counted = [str(i) for i in range(len(names))]
+    if names[0] == "" and names[1:] == counted[:-1]:
+        return len(data[1][1]) == len(names)
+    return names == counted and any("." in field or "," in field for field in data[1][1][:3])
+
+
+def _is_running(fields: Sequence[str]) -> bool:
+    """Return whether the fields are whole numbers, each one more than the one before."""
+    if len(fields) < 3 or not all(re.fullmatch(r"\d{1,15}", field) for field in fields):
+        return False
+    return bool((np.diff([int(field) for field in fields]) == 1).all())
+
+
+def _named_columns(
+    header: Sequence[str], separator: str | None, width: int, has_row_names: bool
+) -> tuple[int, int, int] | None:
+    """Return the columns of x, y, z from the header line that names them, the one nearest to the points first."""
+    for exact in (True, False):
+        for line in reversed(header):
+            text = line.strip().lstrip("#/%!;* \t").strip()
+            for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
+                names = split_fields(text, sign)
+                if len(names) >= 3 and (len(names) == width or not exact):
+                    columns = fit_columns(names, width, has_row_names)
+                    if columns:
+                        return columns
+    return None

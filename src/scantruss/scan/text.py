@@ -1,0 +1,93 @@
+"""Points of a text file (XYZ, TXT, CSV, PTS, ASC): by numpy where it can, line by line where it cannot."""
+
+from __future__ import annotations
+
+import math
+import re
+from array import array
+from collections.abc import Iterator
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FormatError
+from .layout import ANY, MISSING, NUMBER, NUMBER_COMMA, Layout, find_layout, is_number, split_line
+
+
+def read_text(path: Path) -> np.ndarray:
+    """Return the points of a text file, (N, 3) float64 [scan unit]."""
+    layout = find_layout(path)
+    promised = layout.promised
+    try:
+        rows = _read_fast(path, layout)
+    except ValueError:
+        rows, promised = _read_lines(path, layout)
+    if promised is not None and len(rows) < promised:
+        raise FormatError(
+            f"{path} ends early: its count line promises {promised:,} points, got {len(rows):,}; copy it again"
+        )
+    if rows.shape[1] == 4:  # the first column may be a running number
+        running = bool((np.diff(rows[:, 0]) == 1).all())
+        rows = rows[:, 1:] if running else rows[:, :3]
+    return rows
+
+
+def _read_fast(path: Path, layout: Layout) -> np.ndarray:
+    """Return the columns of a regular file; ValueError where it is not."""
+    if layout.separator == ANY:
+        raise ValueError
+    source: Path | StringIO = path
+    if layout.comma:
+        source = StringIO(path.read_text(encoding=layout.encoding).replace(",", "."))
+    return np.loadtxt(
+        source,
+        comments="#",
+        delimiter=layout.separator,
+        skiprows=layout.skip,
+        usecols=layout.columns,
+        encoding=layout.encoding,
+        ndmin=2,
+    )
+
+
+def _read_lines(path: Path, layout: Layout) -> tuple[np.ndarray, int | None]:
+    """Return the columns of any file, and the sum of its count lines."""
+    values, promised = array("d"), layout.promised
+    for number, row in _rows(path, layout):
+        try:
+            point = [_number(row[column], layout) for column in layout.columns]
+        except (ValueError, IndexError):
+            if promised is not None and len(row) == 1 and row[0].isdecimal():  # a PTS file of several scans
+                promised += int(row[0])
+            elif any(is_number(field, layout.comma) for field in row):
+                raise _no_point(path, layout, number, row) from None
+            continue
+        if any(row[column] for column in layout.columns):
+            values.extend(point)
+    return np.array(values).reshape(-1, len(layout.columns)), promised
+
+
+def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    """Yield the number (from 1) and the fields of each line that is not empty, behind the header."""
+    with path.open(encoding=layout.encoding, errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            if number > layout.skip and (row := split_line(line.rstrip("\n"), layout.separator)):
+                yield number, row
+
+
+def _number(field: str, layout: Layout) -> float:
+    """Return the value of a field, NaN where it is empty or says that it is missing."""
+    if (NUMBER_COMMA if layout.comma else NUMBER).fullmatch(field):
+        return float(re.sub("[dD]", "e", field.replace(",", ".")))
+    if not field or field.lower() in MISSING:
+        return math.nan
+    raise ValueError(field)
+
+
+def _no_point(path: Path, layout: Layout, number: int, row: list[str]) -> FormatError:
+    columns = ", ".join(str(column + 1) for column in layout.columns[-3:])
+    said = " ".join(row)[:60]
+    return FormatError(
+        f"{path}: line {number} ({said!r}) has no numbers x, y, z in columns {columns}; mend or delete it"
+    )
