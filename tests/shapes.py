@@ -31,10 +31,22 @@ class Shape:
     fixed: Floats
     orientable: bool
     unit: str
-    euler: int
-    components: int
-    loops: tuple[Floats, ...]  #: dense true rims, (K, 3) each
     known_loops: bool  #: False: loops and Euler number are not known
+
+    @property
+    def euler(self) -> int:
+        """V - E + T of the true surface."""
+        return self.surface.euler
+
+    @property
+    def components(self) -> int:
+        """The number of separate pieces."""
+        return self.surface.components
+
+    @property
+    def loops(self) -> list[Floats]:
+        """Dense true rims, (K, 3) each."""
+        return self.surface.loops
 
     @property
     def area(self) -> float:
@@ -47,10 +59,9 @@ class Shape:
 
 
 @lru_cache(maxsize=8)
-def _truth(name: str) -> tuple[Truth, Surface, tuple[Floats, ...]]:
+def _truth(name: str) -> tuple[Truth, Surface]:
     truth = SHAPES[name]()
-    surface = truth.surface
-    return truth, surface, tuple(surface.loops)
+    return truth, truth.surface
 
 
 def _rotation(rng: np.random.Generator) -> Floats:
@@ -155,7 +166,7 @@ def make(
     scan_lines : float
         Distance of parallel lines along x to which points are pulled, 0 for none [unit of the shape].
     """
-    truth, surface, loops = _truth(name)
+    truth, surface = _truth(name)
     rng = np.random.default_rng([seed, *name.encode()])
     low, size = surface.nodes.min(axis=0), np.ptp(surface.nodes, axis=0)
     weight = truth.weight if density_ratio == 1 else lambda p: density_ratio ** ((p[:, 0] - low[0]) / size[0])
@@ -183,8 +194,5 @@ def make(
         fixed=motion(truth.fixed),
         orientable=truth.orientable,
         unit=truth.unit,
-        euler=surface.euler,
-        components=surface.components,
-        loops=tuple(map(motion, loops)),
         known_loops=truth.known_loops,
     )

@@ -68,7 +68,7 @@ class Surface:
             loops.append(self.nodes[loop])
         return loops
 
-    @property
+    @cached_property
     def euler(self) -> int:
         """V - E + T, of the nodes that have a triangle."""
         return len(np.unique(self.triangles)) - len(self.edges[0]) + len(self.triangles)
