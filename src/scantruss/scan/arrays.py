@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import FormatError
-from .kinds import read_head, wrong_kind
+from .kinds import read_head, unreadable, wrong_kind
 
 
 def read_npy(path: Path) -> np.ndarray:
@@ -17,9 +18,10 @@ def read_npy(path: Path) -> np.ndarray:
     if not head.startswith(b"\x93NUMPY"):
         raise wrong_kind(path, head, "an NPY file")
     try:
-        array = np.load(path, allow_pickle=False)
-    except (ValueError, EOFError, SyntaxError) as error:
-        raise FormatError(f"{path} cannot be read as NPY ({str(error).splitlines()[0][:120]})") from None
+        with path.open("rb") as file:
+            array = np.load(file, allow_pickle=False)
+    except Exception as error:  # a damaged header ends in many ways
+        raise unreadable(path, "NPY", error) from None
     points = _coordinates(array)
     if points is None:
         raise FormatError(f"{path} must hold numbers of shape (N, 3) or wider, got {array.dtype} {array.shape}")
@@ -33,23 +35,27 @@ def read_npz(path: Path) -> np.ndarray:
         raise wrong_kind(path, head, "an NPZ file")
     held = []
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             for name in arrays.files:
-                try:
-                    array = arrays[name]
-                except ValueError as error:
-                    if "allow_pickle" not in str(error):
-                        raise
-                    continue
-                points = _coordinates(array) if isinstance(array, np.ndarray) else None
+                array = _member(arrays, name)
+                points = _coordinates(array) if array is not None else None
                 if points is not None:
                     return points
-                held.append(f"{name} {getattr(array, 'shape', '')}")
-    except (ValueError, EOFError, SyntaxError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise FormatError(
-            f"{path} cannot be read as NPZ ({(str(error).splitlines() or ['damaged'])[0][:120]})"
-        ) from None
+                held.append(f"{name} {'' if array is None else array.shape}".strip())
+    except Exception as error:  # a damaged archive ends in many ways
+        raise unreadable(path, "NPZ", error) from None
     raise FormatError(f"{path} must hold an array of shape (N, 3) or wider, got {', '.join(held)[:200] or 'none'}")
+
+
+def _member(arrays: Mapping[str, Any], name: str) -> np.ndarray | None:
+    """Return an array of an archive; None where it holds Python objects or is no array."""
+    try:
+        array = arrays[name]
+    except ValueError as error:
+        if "allow_pickle" in str(error):
+            return None
+        raise
+    return array if isinstance(array, np.ndarray) else None
 
 
 def _coordinates(array: np.ndarray) -> np.ndarray | None:

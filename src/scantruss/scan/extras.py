@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
-from .kinds import kind_of, read_head, wrong_kind
+from .kinds import kind_of, read_head, unreadable, wrong_kind
 
 
 def read_e57(path: Path) -> np.ndarray:
@@ -20,8 +20,8 @@ def read_e57(path: Path) -> np.ndarray:
     package = _package("e57", path)
     try:
         return np.asarray(package.read_points(str(path)).points, dtype=np.float64)
-    except Exception as error:
-        raise _unreadable(path, "E57", error) from None
+    except BaseException as error:
+        raise unreadable(path, "E57", error) from None
 
 
 def read_pcd(path: Path) -> np.ndarray:
@@ -34,8 +34,8 @@ def read_pcd(path: Path) -> np.ndarray:
         cloud = package.PointCloud.from_path(path)
         points = np.asarray(cloud.numpy(("x", "y", "z")), dtype=np.float64)
         promised = int(cloud.metadata.points)
-    except Exception as error:
-        raise _unreadable(path, "PCD", error) from None
+    except BaseException as error:
+        raise unreadable(path, "PCD", error) from None
     if len(points) < promised:
         raise FormatError(
             f"{path} ends early: its header promises {promised:,} points, got {len(points):,}; copy it again"
@@ -50,10 +50,3 @@ def _package(name: str, path: Path) -> Any:
         raise FormatError(
             f'{path}: reading {path.suffix} needs the package {name}; python -m pip install "scantruss[scan]"'
         ) from None
-
-
-def _unreadable(path: Path, kind: str, error: Exception) -> FormatError:
-    if isinstance(error, MemoryError):
-        raise error
-    said = (str(error).splitlines() or [type(error).__name__])[0][:120]
-    return FormatError(f"{path} cannot be read as {kind} ({said}); copy it again")

@@ -85,3 +85,13 @@ def wrong_kind(path: Path, head: bytes, wanted: str) -> FormatError:
     """Return the error for a file that is not what its suffix says."""
     kind = kind_of(head) or ("plain text" if is_text(head) else "other binary data")
     return FormatError(f"{path} is not {wanted} but {kind}; give it the suffix of what it is, or export the scan again")
+
+
+def unreadable(path: Path, kind: str, error: BaseException) -> FormatError:
+    """Return the error for a file on which a library failed; errors that are not the file's are raised as they are."""
+    if isinstance(error, MemoryError | OSError) or not (
+        isinstance(error, Exception) or type(error).__name__ == "PanicException"  # Rust's, not an Exception
+    ):
+        raise error
+    said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
+    return FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again")

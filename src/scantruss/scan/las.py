@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FormatError
-from .kinds import read_head, wrong_kind
+from .kinds import read_head, unreadable, wrong_kind
 
 CHUNK = 1_000_000  # points
 
@@ -25,15 +25,9 @@ def read_las(path: Path) -> np.ndarray:
             promised = file.header.point_count
             for record in file.chunk_iterator(CHUNK):
                 chunks.append(np.column_stack([record.x, record.y, record.z]))
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise FormatError(f"{path} cannot be read as LAS or LAZ ({_first_line(error)}); copy it again") from None
+    except BaseException as error:
+        raise unreadable(path, "LAS or LAZ", error) from None
     count = sum(map(len, chunks))
     if count < promised:
         raise FormatError(f"{path} ends early: its header promises {promised:,} points, got {count:,}; copy it again")
     return np.concatenate(chunks) if chunks else np.empty((0, 3))
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0][:120]

@@ -29,8 +29,12 @@ MISSING = frozenset(
 )
 #: separator (None: blanks) and whether a comma may be the decimal sign; the first that fits best is taken
 GRAMMARS: tuple[tuple[str | None, bool], ...] = (
-    (";", False), (";", True), ("\t", False), ("\t", True), (",", False), (None, False), (None, True), (ANY, False),
-)  # fmt: skip
+    *((sign, comma) for sign in (";", "|", "\t") for comma in (False, True)),
+    (",", False),
+    (None, False),
+    (None, True),
+    (ANY, False),
+)
 _REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
 
 

@@ -65,7 +65,7 @@ def read_points(path: str | Path, unit: str = "") -> PointCloud:
     try:
         points = reader(path)
     except OSError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
+        raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
     except MemoryError:
         raise FormatError(f"{path} does not fit into the memory of this computer; thin the scan first") from None
     if not len(points):
