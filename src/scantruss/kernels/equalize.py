@@ -13,7 +13,7 @@ import numpy as np
 from .compile import kernel
 from .grid import INTERIOR, REST, RIM, Net
 from .rim import Rim, slide
-from .surface import Surface, fit_patch, onto_patch, onto_surface, walk
+from .surface import Surface, fit_patch, onto_patch, walk
 from .vectors import norm, row, subtract
 
 ROOT = 4.0 * math.sqrt(3.0)
@@ -22,9 +22,13 @@ STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes mov
 
 @kernel
 def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float, slope: np.ndarray) -> float:
-    """Energy of the members and triangles at node v if it stood at (x, y, z); `slope` (3,) gets its gradient."""
+    """Energy of the members and triangles at node v if it stood at (x, y, z); `slope` (3,) gets its gradient.
+
+    A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
+    """
     nodes = net.nodes
-    gx = gy = gz = energy = 0.0
+    gx = gy = gz = energy = 0.0  # of the members
+    sx = sy = sz = shape = 0.0  # of the triangles
     nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
     d = net.degree[v]
     w = net.ring[v, d - 1]
@@ -43,30 +47,33 @@ def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: fl
             gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
         if i == 0 and net.is_open[v] == 1:
             continue
+        energy += 1.0
         ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx  # twice the area, as a vector
         ex, ey, ez = cx - bx, cy - by, cz - bz
         squares = bb + cc + ex * ex + ey * ey + ez * ez
         doubled = math.sqrt(ux * ux + uy * uy + uz * uz)
         if squares <= 0.0 or doubled <= 1e-12 * squares:
-            energy += 1.0
             continue
-        side = 1.0 if ux * nx + uy * ny + uz * nz >= 0.0 else -1.0
-        g = side * 0.5 * ROOT * doubled / squares
-        energy += 1.0 - g
-        f = side * 0.5 * ROOT / (doubled * squares)  # doubled falls along e x u / |u|
-        s = -2.0 * g / squares  # the squares grow along -2 (b + c)
-        gx += f * (ey * uz - ez * uy) + s * (bx + cx)
-        gy += f * (ez * ux - ex * uz) + s * (by + cy)
-        gz += f * (ex * uy - ey * ux) + s * (bz + cz)
-    slope[0], slope[1], slope[2] = gx, gy, gz
-    return energy
+        f = 0.5 * ROOT / (doubled * squares)
+        if ux * nx + uy * ny + uz * nz < 0.0:
+            f = -f
+        g = f * doubled * doubled
+        shape += g
+        h = 2.0 * g / squares
+        # the doubled area falls along e x u / |u|, the squares grow along -2 (b + c)
+        sx += h * (bx + cx) - f * (ey * uz - ez * uy)
+        sy += h * (by + cy) - f * (ez * ux - ex * uz)
+        sz += h * (bz + cz) - f * (ex * uy - ey * ux)
+    side = 1.0 if shape >= 0.0 else -1.0
+    slope[0], slope[1], slope[2] = gx - side * sx, gy - side * sy, gz - side * sz
+    return energy - side * shape
 
 
 @kernel
-def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, refit: bool, slope: np.ndarray) -> float:
+def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, reach: float, slope: np.ndarray) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
-    `refit` fits the local surface anew where the node has left the middle of its patch; else the patch is taken as it is.
+    The local surface is fitted anew where the node has left the middle of its patch by more than `reach` [scan unit].
     """
     kind = net.kind[v]
     if kind >= REST or net.degree[v] == 0:
@@ -81,17 +88,19 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
     step = STRIDE * length * length / (net.degree[v] * (weight + 1.3))
     most = 0.3 * length
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
+    if size < 1e-5 * length:
+        return 0.0
     if size > most:
         step *= most / size
     arc = net.arc[v]
     for _ in range(2):
-        px, py, pz = x - step * gx, y - step * gy, z - step * gz
+        place = (x - step * gx, y - step * gy, z - step * gz)
         if kind == RIM:
-            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, px, py, pz)
-        elif refit:
-            px, py, pz = onto_surface(surface, patches, v, px, py, pz)
+            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
-            px, py, pz = onto_patch(patches[v], (px, py, pz))
+            if norm(subtract(place, row(patches, v))) > reach:
+                fit_patch(surface, patches[v], int(patches[v, 15]), place)
+            px, py, pz = onto_patch(patches[v], place)
         after = star_energy(net, patches, v, px, py, pz, length, weight, slope)
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
@@ -102,13 +111,13 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
 
 
 @kernel
-def settle_all(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float, weight: float, enough: float, sweeps: int) -> int:
+def settle_all(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float, weight: float, reach: float, enough: float, sweeps: int) -> int:
     """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made."""
     slope = np.empty(3)
     for sweep in range(sweeps):
         gain = 0.0
         for v in range(net.count[1]):
-            gain += settle_node(net, surface, patches, rim, v, length, weight, True, slope)
+            gain += settle_node(net, surface, patches, rim, v, length, weight, reach, slope)
         if gain < enough * net.count[1]:
             return sweep + 1
     return sweeps

@@ -9,11 +9,14 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT, settle_node
-from .grid import INTERIOR, REST, RIM, Net, collapse, flip, may_collapse, may_flip, may_split, split, wings
+from .grid import RIM, Net, collapse, flip, may_collapse, may_flip, may_split, split, wings
 from .rim import Rim, at_arc
 from .surface import Surface
+from .vectors import cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
+TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
+SWEEPS = 3
 MOST = 120  # nodes in one neighbourhood
 
 
@@ -21,6 +24,7 @@ class Scratch(NamedTuple):
     """Room for one trial: what is around, and how it was before."""
 
     mark: np.ndarray  #: (C,) int64 number of the trial that holds the node
+    ideal: np.ndarray  #: (C,) int64 neighbours that suit the node: 6 inside, by its angle on the boundary
     tried: np.ndarray  #: (C,) int64, 1 where nothing has changed around the node since it was tried
     around: np.ndarray  #: (MOST,) int64 nodes that may move
     nodes: np.ndarray  #: (MOST, 4) their places and arcs before
@@ -76,8 +80,11 @@ def put_back(net: Net, scratch: Scratch) -> None:
 
 
 @kernel
-def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> float:
-    """Energy of all members and triangles that have a node in the neighbourhood, each counted once."""
+def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> float:
+    """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
+
+    A member is folded where its two triangles meet at less than 90 degrees.
+    """
     nodes, mark, stamp = net.nodes, scratch.mark, scratch.counter[0]
     energy = 0.0
     for k in range(scratch.counter[1]):
@@ -85,35 +92,40 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
         d = net.degree[v]
         if d == 0:
             continue
-        w = net.ring[v, d - 1]
+        inside = net.is_open[v] == 0
+        i = d - 2 if inside else d - 1
+        w = net.ring[v, i]
         cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
         cc = cx * cx + cy * cy + cz * cz
         counted = mark[w] == stamp and w < v
-        for i in range(d):
+        ux = uy = uz = 0.0
+        for at in range(-1 if inside else 0, d):
             bx, by, bz, bb, skipped = cx, cy, cz, cc, counted
-            w = net.ring[v, i]
+            tx, ty, tz = ux, uy, uz  # the triangle before
+            w = net.ring[v, at if at >= 0 else d - 1]
             counted = mark[w] == stamp and w < v
             cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
             cc = cx * cx + cy * cy + cz * cz
-            if not counted:
+            if at >= 0 and not counted:
                 stretch = math.sqrt(cc) / length - 1.0
                 energy += weight * stretch * stretch
-            if skipped or counted or (i == 0 and net.is_open[v] == 1):
+            if at == 0 and not inside:
                 continue
             ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+            if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
+                energy += 1.0
+            if skipped or counted or at < 0:
+                continue
             ex, ey, ez = cx - bx, cy - by, cz - bz
             squares = bb + cc + ex * ex + ey * ey + ez * ez
-            g = 0.0
+            energy += 1.0
             if squares > 0.0:
-                g = 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
-            if ux * patches[v, 3] + uy * patches[v, 4] + uz * patches[v, 5] < 0.0:
-                g = -g
-            energy += 1.0 - g
+                energy -= 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
     return energy
 
 
 @kernel
-def place_between(net: Net, patches: np.ndarray, rim: Rim, v: int, a: int, b: int) -> None:
+def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
     """Put node v halfway between a and b: along their curve if it is on the rim."""
     if net.kind[v] == RIM:
         total = rim.total[net.curve[v]]
@@ -127,31 +139,62 @@ def place_between(net: Net, patches: np.ndarray, rim: Rim, v: int, a: int, b: in
 
 
 @kernel
-def try_move(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, sweeps: int) -> bool:
-    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen."""
-    if not gather(net, scratch, a, b):
+def disorder(net: Net, ideal: np.ndarray, move: int, a: int, b: int) -> int:
+    """By how much a move at the edge a-b changes the sum of squared differences between neighbours and ideal."""
+    right, left = wings(net, a, b)
+    rim = right < 0 or left < 0
+    da, db = net.degree[a] - ideal[a], net.degree[b] - ideal[b]
+    change = 0
+    if move == FLIP:
+        change = 2 - 2 * da - 2 * db
+    elif move == COLLAPSE:
+        merged = net.degree[a] + net.degree[b] - (3 if rim else 4) - ideal[a]
+        change = merged * merged - da * da - db * db
+    else:
+        change = 1 if rim else 4
+    for v in (right, left):
+        if v >= 0:
+            d = net.degree[v] - ideal[v]
+            change += 1 - 2 * d if move == COLLAPSE else 1 + 2 * d
+    return change
+
+
+@kernel
+def try_move(
+    net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
+) -> bool:
+    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
+
+    `worth` is what one more node may cost. Moves that bring the numbers of neighbours far from the ideal never pay (tried: none of
+    5,000), and are not made.
+    """
+    if disorder(net, scratch.ideal, move, a, b) > TOLERATED[move] or not gather(net, scratch, a, b):
         return False
-    before = local_energy(net, patches, scratch, length, weight)
+    before = local_energy(net, scratch, length, weight)
     added = -1
     if move == FLIP:
         flip(net, a, b)
     elif move == COLLAPSE:
         if net.kind[a] == net.kind[b]:
-            place_between(net, patches, rim, a, a, b)
+            place_between(net, rim, a, a, b)
         collapse(net, a, b)
+        before -= worth
     else:
         added = split(net, a, b)
         patches[added] = patches[a]
-        place_between(net, patches, rim, added, a, b)
+        place_between(net, rim, added, a, b)
+        scratch.ideal[added] = 4 if net.is_open[added] == 1 else 6
         scratch.mark[added] = scratch.counter[0]
         scratch.around[scratch.counter[1]] = added
         scratch.counter[1] += 1
-    for sweep in range(sweeps):
+        before += worth
+    after = before
+    for sweep in range(SWEEPS):
         for i in range(scratch.counter[1]):
-            settle_node(net, surface, patches, rim, scratch.around[i], length, weight, False, scratch.slope)
-        if sweep == 0 and local_energy(net, patches, scratch, length, weight) > before + 0.3:
+            settle_node(net, surface, patches, rim, scratch.around[i], length, weight, length, scratch.slope)
+        after = local_energy(net, scratch, length, weight)
+        if after > before + (0.06 if sweep == 0 else 0.02):
             break
-    after = local_energy(net, patches, scratch, length, weight)
     if after < before - 1e-4:
         for i in range(scratch.counter[1]):
             scratch.tried[scratch.around[i]] = 0
@@ -168,50 +211,59 @@ def try_move(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch:
 
 
 @kernel
-def is_regular(net: Net, v: int, length: float) -> bool:
-    """Whether nothing about node v asks for a move: as many neighbours as its angle wants, members near their length."""
-    d = net.degree[v]
-    if net.is_open[v] == 0 and d != 6:
+def is_regular(net: Net, ideal: np.ndarray, v: int, length: float) -> bool:
+    """Whether nothing about node v asks for a move: neighbours as ideal, members near their length."""
+    if net.degree[v] != ideal[v]:
         return False
-    angle = 0.0
-    for i in range(d):
-        w, u = net.ring[v, i], net.ring[v, (i + 1) % d]
-        ax, ay, az = net.nodes[w, 0] - net.nodes[v, 0], net.nodes[w, 1] - net.nodes[v, 1], net.nodes[w, 2] - net.nodes[v, 2]
-        size = math.sqrt(ax * ax + ay * ay + az * az)
-        if abs(size / length - 1.0) > 0.15:
+    for i in range(net.degree[v]):
+        w = net.ring[v, i]
+        if abs(norm(subtract(row(net.nodes, w), row(net.nodes, v))) / length - 1.0) > 0.15:
             return False
-        if net.is_open[v] == 1 and i + 1 < d:
-            bx, by, bz = net.nodes[u, 0] - net.nodes[v, 0], net.nodes[u, 1] - net.nodes[v, 1], net.nodes[u, 2] - net.nodes[v, 2]
-            other = math.sqrt(bx * bx + by * by + bz * bz)
-            if size * other > 0.0:
-                angle += math.acos(min(max((ax * bx + ay * by + az * bz) / (size * other), -1.0), 1.0))
-    return net.is_open[v] == 0 or abs(angle - (d - 1) * math.pi / 3.0) < 0.55
+    return True
 
 
 @kernel
-def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, sweeps: int) -> int:
+def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, worth: float) -> int:
     """One round over all nodes that ask for a move; returns how many moves were kept."""
     kept = scratch.counter[2]
     for v in range(net.count[1]):
-        if net.degree[v] == 0 or scratch.tried[v] == 1 or is_regular(net, v, length):
+        if net.degree[v] == 0 or scratch.tried[v] == 1 or is_regular(net, scratch.ideal, v, length):
             continue
         scratch.tried[v] = 1
         i = 0
-        while i < net.degree[v]:
-            u = net.ring[v, i]
+        while i < 4 * net.degree[v]:
+            u = net.ring[v, i // 4]
+            choice = i % 4
             i += 1
-            done = False
-            if may_flip(net, v, u):
-                done = try_move(net, surface, patches, rim, scratch, FLIP, v, u, length, weight, sweeps)
-            if not done and may_collapse(net, v, u):
-                done = try_move(net, surface, patches, rim, scratch, COLLAPSE, v, u, length, weight, sweeps)
-            if not done and may_collapse(net, u, v):
-                if net.kind[u] != net.kind[v]:
-                    done = try_move(net, surface, patches, rim, scratch, COLLAPSE, u, v, length, weight, sweeps)
-            if not done and may_split(net, v, u):
-                done = try_move(net, surface, patches, rim, scratch, SPLIT, v, u, length, weight, sweeps)
-            if done:
+            move, a, b = min(choice, COLLAPSE), v, u
+            if choice == 2:
+                a, b = u, v
+            elif choice == 3:
+                move = SPLIT
+            if move == FLIP:
+                allowed = may_flip(net, a, b)
+            elif move == COLLAPSE:
+                allowed = (choice == 1 or net.kind[a] != net.kind[b]) and may_collapse(net, a, b)
+            else:
+                allowed = may_split(net, a, b)
+            if allowed and try_move(net, surface, patches, rim, scratch, move, a, b, length, weight, worth):
                 i = 0
-                if net.degree[v] == 0 or is_regular(net, v, length):
+                if net.degree[v] == 0 or is_regular(net, scratch.ideal, v, length):
                     break
     return scratch.counter[2] - kept
+
+
+@kernel
+def suit_nodes(net: Net, ideal: np.ndarray) -> None:
+    """Fill in how many neighbours suit each node: 6 inside, on the boundary as many as its angle has room for."""
+    for v in range(len(ideal)):
+        ideal[v] = 6
+        if net.degree[v] > 0 and net.is_open[v] == 1:
+            angle = 0.0
+            for i in range(net.degree[v] - 1):
+                p = subtract(row(net.nodes, net.ring[v, i]), row(net.nodes, v))
+                q = subtract(row(net.nodes, net.ring[v, i + 1]), row(net.nodes, v))
+                n, d = norm(cross(p, q)), dot(p, q)
+                if n > 0.0 or d != 0.0:
+                    angle += math.atan2(n, d)
+            ideal[v] = max(2, int(math.floor(3.0 * angle / math.pi + 0.5)) + 1)

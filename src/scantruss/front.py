@@ -1,0 +1,150 @@
+"""The advancing front: drives the kernel, slice by slice (Sec. 3.5, Fig. 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .boundary import Boundary, boundary_nodes
+from .errors import FrontError
+from .grid.grid import Grid
+from .kernels import advance as kernels
+from .kernels import front as lists
+from .kernels.boxes import new_boxes
+from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from .scan.cloud import PointCloud
+from .scan.sites import Sites, prepare_sites
+from .settings import Settings
+
+Progress = Callable[[str, float], None]
+
+STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
+BUDGET = 500  # segments advanced between two calls of `progress`
+
+
+def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, progress: Progress | None = None) -> Grid:
+    """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4)."""
+    sites = boundary.sites
+    front = new_front(sites, settings)
+    front = start_front(front, boundary, settings)
+    numbers = np.array(
+        [
+            settings.length,
+            settings.nearness,
+            settings.length_weight,
+            np.radians(settings.merge_angle),
+            settings.shape_weight,
+            settings.size_weight,
+            settings.search_range * sites.spacing,
+            1.0,
+        ]
+    )
+    for strict in STRICTNESS:
+        numbers[kernels.STRICT] = strict
+        count = int(front.count[lists.SEGMENTS])
+        for s in np.flatnonzero(front.state[:count] == lists.WAITING):
+            lists.enqueue(front, s)
+        front = run(front, sites, numbers, progress)
+    nodes, triangles = int(front.count[lists.NODES]), int(front.count[lists.TRIANGLES])
+    return Grid(
+        front.nodes[:nodes].copy(),
+        front.triangles[:triangles].copy(),
+        np.zeros(nodes, np.bool_),
+        cloud.origin,
+        cloud.unit,
+        settings=settings,
+    )
+
+
+def expected_triangles(sites: Sites, settings: Settings) -> int:
+    """Return about how many triangles the cloud will take."""
+    radius = sites.surface.scale[1]
+    return int(len(sites.surface.mean) * 0.75 * radius**2 / (0.433 * settings.length**2)) + 100
+
+
+def new_front(sites: Sites, settings: Settings) -> lists.Front:
+    """Return an empty front with room for the cloud."""
+    mean, room = sites.surface.mean, 2 * expected_triangles(sites, settings) + 2000
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), settings.length, room, room)
+    return _blank(room, boxes)
+
+
+def _blank(room: int, boxes: lists.SearchBoxes) -> lists.Front:
+    def ids(*shape: int) -> np.ndarray:
+        return np.full(shape, -1, np.int64)
+
+    return lists.Front(
+        np.zeros((room, 3)), np.zeros((room, 3)), ids(room), np.zeros(room, np.bool_), ids(room),
+        ids(4 * room), ids(4 * room), ids(4 * room), ids(4 * room), np.zeros(4 * room, np.int64), ids(4 * room),
+        ids(2 * room, 3), ids(room), ids(6 * room), ids(4 * room), np.zeros(8, np.int64), boxes,
+    )  # fmt: skip
+
+
+def start_front(front: lists.Front, boundary: Boundary, settings: Settings) -> lists.Front:
+    """Put the initial front into the lists: the boundary loops, and a seed triangle on every closed piece."""
+    surface = boundary.sites.surface
+    for loop in boundary.loops:
+        active = loop.external or settings.advance_from == "all"
+        nodes, _ = boundary_nodes(loop, settings.length)
+        add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
+    bounded = {loop.piece for loop in boundary.loops}
+    piece = boundary.sites.piece
+    least = 4.0 * 0.433 * settings.length**2 / (0.75 * surface.scale[1] ** 2)
+    for number, size in enumerate(np.bincount(piece)):
+        if number not in bounded and size >= least:
+            add_seed(front, surface, int(np.flatnonzero(piece == number)[0]), settings.length)
+    return front
+
+
+def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarray, state: int) -> None:
+    """Add a closed loop of boundary nodes and segments."""
+    patch = np.zeros(PATCH)
+    ids = []
+    for place in nodes:
+        site = int(np.argmin(((surface.mean - place) ** 2).sum(axis=1)))
+        fit_patch(surface, patch, site, tuple(place))
+        normal = patch_normal(patch, tuple(place))
+        ids.append(lists.propose_node(front, tuple(place), normal, int(patch[15]), True))
+        lists.add_node(front)
+    segments = [lists.add_segment(front, ids[i], ids[(i + 1) % len(ids)], state) for i in range(len(ids))]
+    for i, s in enumerate(segments):
+        lists.link(front, s, segments[(i + 1) % len(ids)])
+
+
+def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> None:
+    """Add a seed triangle on a closed piece, and the front around it."""
+    patch = np.zeros(PATCH)
+    centre = surface.mean[site]
+    fit_patch(surface, patch, site, tuple(centre))
+    normal = patch[3:6].copy()
+    towards = surface.mean[surface.neighbors[site, 0]] - centre
+    u = towards - normal * (towards @ normal)
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    ids = []
+    for angle in np.radians([0.0, 120.0, 240.0]):
+        place = centre + length / np.sqrt(3.0) * (np.cos(angle) * u + np.sin(angle) * v)
+        own = np.zeros(PATCH)
+        fit_patch(surface, own, site, tuple(place))
+        foot = onto_patch(own, tuple(place))
+        near = walk(surface, int(own[15]), foot)
+        ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
+        lists.add_node(front)
+    lists.add_triangle(front, *ids)
+    segments = [lists.add_segment(front, ids[j], ids[i], lists.ACTIVE) for i, j in ((0, 1), (2, 0), (1, 2))]
+    for i, s in enumerate(segments):
+        lists.link(front, s, segments[(i + 1) % 3])
+
+
+def run(front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None) -> lists.Front:
+    """Advance until no active segment is left; arrays grow as needed."""
+    expected = 2.2 * sites.surface.scale[1] ** 2 * len(sites.surface.mean) / numbers[kernels.LENGTH] ** 2
+    while True:
+        status = kernels.advance(sites.surface, front, numbers, BUDGET)
+        if progress:
+            progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
+        if status == lists.DONE:
+            return front
+        if status == lists.FULL:
+            raise FrontError("the front has outgrown its arrays")

@@ -1,0 +1,142 @@
+"""Choosing the triangle of a segment and driving the front (Sec. 3.4, 3.5, Fig. 4)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .compile import kernel
+from .front import (
+    ACTIVE,
+    DONE,
+    FIRST,
+    FULL,
+    LAST,
+    MORE,
+    NEAR,
+    NODES,
+    SEGMENTS,
+    TRIANGLES,
+    WAITING,
+    Front,
+    add_node,
+    attach,
+    far_from_front,
+    fits,
+    left_angle,
+    near_nodes,
+    propose_node,
+    right_angle,
+)
+from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from .triangles import quality, shape_quality, turned
+from .vectors import Vector, along, dot, norm, row, subtract, unit
+
+LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT = 0, 1, 2, 3, 4, 5, 6, 7  # places in `numbers`
+
+
+@kernel
+def reach(length: float, segment: float, w1: float) -> float:
+    """Eq. 10: the distance r of the ideal point from a segment, from the desired length and the segment's own."""
+    return 0.5 * math.sqrt(3.0) * (w1 * length + (1.0 - w1) * segment)
+
+
+@kernel
+def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
+    """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    ab = subtract(pb, pa)
+    at_a = min(alpha / max(1.0, math.floor(alpha * 3.0 / math.pi + 0.5)), 1.3)
+    at_b = min(beta / max(1.0, math.floor(beta * 3.0 / math.pi + 0.5)), 1.3)
+    if alpha > 3.6:
+        at_a = math.pi / 3.0
+    if beta > 3.6:
+        at_b = math.pi / 3.0
+    from_a = along(pa, side, turned(ab, row(front.normals, a), at_a))
+    from_b = along(pb, side, turned((-ab[0], -ab[1], -ab[2]), row(front.normals, b), -at_b))
+    return 0.5 * (from_a[0] + from_b[0]), 0.5 * (from_a[1] + from_b[1]), 0.5 * (from_a[2] + from_b[2])
+
+
+@kernel
+def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
+    """Propose a node where a place falls onto the surface; False where the scan has no points there."""
+    site = front.site[front.tail[s]]
+    if fit_patch(surface, patch, site, place) < 3:
+        return False
+    foot = onto_patch(patch, place)
+    near = walk(surface, int(patch[15]), foot)
+    gap = norm(subtract(row(surface.mean, near), foot))
+    normal = patch_normal(patch, foot)
+    propose_node(front, foot, normal, near, False)
+    return gap < 0.9 * surface.scale[0]
+
+
+@kernel
+def choose_by_quality(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray) -> bool:
+    """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
+    length, strict = numbers[LENGTH], numbers[STRICT]
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    before, after = front.previous[s], front.next[s]
+    c, d = front.tail[before], front.head[after]
+    near = near_nodes(surface, front, s, (2.4 + 0.8 * (1.0 - strict)) * length, length, found)
+    alpha, beta = left_angle(front, s), right_angle(front, s)
+    segment = norm(subtract(pb, pa))
+    side = numbers[W1] * length + (1.0 - numbers[W1]) * segment
+    place = ideal_point(front, s, alpha, beta, side)
+    widest = 2.2 + 0.7 * (1.0 - strict)
+    around = (0.75 + 0.9 * (1.0 - strict)) * length
+    score = np.full(near + 1, -1.0)
+    for i in range(near):
+        q = found[i]
+        pq = row(front.nodes, q)
+        value = quality(pa, pb, pq, side, numbers[SHAPE], numbers[SIZE])
+        if q == c or q == d:
+            if (q == c and alpha < widest) or (q == d and beta < widest):
+                score[i] = value
+        elif norm(subtract(pq, place)) < around:
+            score[i] = 0.9 * value
+    if propose_on_surface(surface, front, s, place, patch):
+        pp = row(front.nodes, front.count[NODES])
+        if far_from_front(front, s, pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1):
+            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
+    for _ in range(near + 1):
+        best = -1
+        for i in range(near + 1):
+            if score[i] > 0.0 and (best < 0 or score[i] > score[best]):
+                best = i
+        if best < 0 or score[best] < 0.5 * strict:
+            return False
+        p = found[best] if best < near else front.count[NODES]
+        good, passage = fits(front, s, p, found, near, length, strict)
+        if good:
+            if best == near:
+                add_node(front)
+            attach(front, s, p, passage)
+            return True
+        score[best] = -1.0
+    return False
+
+
+@kernel
+def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
+    """Advance queued segments until the queue is empty (DONE), the budget is spent (MORE) or an array is full (FULL)."""
+    found = np.empty(NEAR, np.int64)
+    patch = np.zeros(PATCH)
+    for _ in range(budget):
+        if front.count[FIRST] == front.count[LAST]:
+            return DONE
+        if (
+            front.count[NODES] + 2 > len(front.nodes)
+            or front.count[SEGMENTS] + 4 > len(front.tail)
+            or front.count[TRIANGLES] + 3 > len(front.triangles)
+            or front.count[LAST] - front.count[FIRST] + 4 > len(front.queue)
+        ):
+            return FULL
+        s = front.queue[front.count[FIRST] % len(front.queue)]
+        front.count[FIRST] += 1
+        if front.state[s] == ACTIVE and not choose_by_quality(surface, front, s, numbers, found, patch):
+            front.state[s] = WAITING
+    return MORE
