@@ -52,8 +52,8 @@ class Camera:
 def choose_camera(nodes: np.ndarray, triangles: np.ndarray) -> Camera:
     """Return a camera that looks from above and aside, from the side to which the triangles face.
 
-    Open shells face one way on the whole: that way is up, and the more they do, the more the eye looks down on them. What is nearly
-    closed stands upright along its longest side, or lies flat if it is flat.
+    Open shells face one way on the whole: that way is up, and the more they do, the more the eye looks down on them.
+    What is nearly closed stands upright along its longest side, or lies flat if it is flat.
 
     Parameters
     ----------
@@ -104,7 +104,8 @@ def _front(nodes: np.ndarray, ground: np.ndarray, openness: float) -> np.ndarray
         width, depth = np.ptp(nodes @ second), np.ptp(nodes @ first)
         if depth > 1.1 * width:
             first, second = second, -first
-    return math.cos(turn) * first - math.sin(turn) * second
+    front: np.ndarray = math.cos(turn) * first - math.sin(turn) * second
+    return front
 
 
 def map_depth(corners: np.ndarray, near: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """CSV: the members in the named file, the nodes in a second one beside it.
 
-`grid.csv` holds one line per member, `grid_nodes.csv` one line per node. Coordinates are in the scan's own frame; the header names
-the unit of every column that has one.
+`grid.csv` holds one line per member, `grid_nodes.csv` one line per node. Coordinates are in the scan's own frame; the
+header names the unit of every column that has one.
 """
 
 from __future__ import annotations
@@ -42,15 +42,14 @@ def _members(grid: Grid) -> bytes:
     nodes = own_frame(grid)
     start, end = grid.edges[:, 0], grid.edges[:, 1]
     columns = _with_unit("start_x start_y start_z end_x end_y end_z length", grid.unit)
-    rows = zip(
-        range(len(start)), start.tolist(), end.tolist(), *nodes[start].T.tolist(), *nodes[end].T.tolist(), grid.lengths.tolist(),
-        (grid.edge_triangles[:, 1] < 0).astype(int).tolist(), strict=True,
-    )  # fmt: skip
+    places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
+    boundary = (grid.edge_triangles[:, 1] < 0).astype(int)
+    rows = zip(range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), strict=True)
     return _table(["id", "start", "end", *columns, "boundary"], rows)
 
 
 def _nodes(grid: Grid) -> bytes:
-    """Return the table of nodes: place, members that meet there, whether on a boundary or fixed, distance from the scan."""
+    """Return the table of nodes: place, members meeting there, whether on a boundary, fixed, distance from the scan."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
     boundary[grid.edges[grid.edge_triangles[:, 1] < 0].ravel()] = 1

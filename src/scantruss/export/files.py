@@ -1,11 +1,13 @@
 """Writing files so that nothing half-written is ever left behind.
 
-A file is written beside its place under another name and renamed when it is whole, so that a full disk or a killed run leaves what was
-there before.
+A file is written beside its place under another name and renamed when it is whole, so that a full disk or a killed run
+leaves what was there before.
 """
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Collection, Mapping
@@ -33,6 +35,14 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     if path.suffix.lower() not in suffixes:
         raise FormatError(f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}')
     folder = path.parent
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno not in (
+            errno.ENOENT,
+            errno.ENOTDIR,
+        ):  # a name that is too long, a ring of links, a folder barred
+            raise FormatError(f"cannot write {path}: {error.strerror or error}; choose another name") from None
     if not folder.exists():
         raise FormatError(f"cannot write {path}: the folder {folder} does not exist; make it first or choose another")
     if not folder.is_dir():
@@ -75,18 +85,12 @@ def write_files(contents: Mapping[Path, bytes]) -> list[Path]:
                 stream.write(content)
         for temporary, place in waiting.items():
             path = place
-            os.replace(temporary, place)
+            temporary.replace(place)
     except OSError as error:
-        raise FormatError(f"cannot write {path.name}: {error.strerror or error}; make room or choose another folder") from None
+        words = error.strerror or error
+        raise FormatError(f"cannot write {path.name}: {words}; make room or choose another folder") from None
     finally:
         for temporary in waiting:
-            _remove(temporary)
+            with contextlib.suppress(OSError):  # the first error is the one to tell
+                temporary.unlink(missing_ok=True)
     return list(contents)
-
-
-def _remove(temporary: Path) -> None:
-    """Remove a temporary file that may be gone already."""
-    try:
-        temporary.unlink(missing_ok=True)
-    except OSError:
-        pass  # nothing more can be done, and the first error is the one to tell

@@ -17,7 +17,7 @@ from .ply_file import encode_ply
 
 Encoder = Callable[[Grid, Path, PointCloud | None], dict[Path, bytes]]
 
-#: suffix -> what the files of that format hold; all of them are pure functions of the grid (and the cloud, where it is drawn)
+#: suffix -> what the files of that format hold: pure functions of the grid, and of the cloud where it is drawn
 FORMATS: dict[str, Encoder] = {
     ".csv": lambda grid, path, cloud: encode_csv(grid, path),
     ".json": lambda grid, path, cloud: {path: encode_json(grid)},

@@ -1,8 +1,8 @@
 """Our own format: JSON that holds a grid without loss.
 
-What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) is read back to the
-last bit. What follows from it (members, boundary loops, quality, topology) is written for other programs and not read back. No dates and
-no names are written: the same grid gives the same bytes.
+What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) is
+read back to the last bit. What follows from it (members, boundary loops, quality, topology) is written for other
+programs and not read back. No dates and no names are written: the same grid gives the same bytes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FORMAT_VERSION = 1
 
 def encode_json(grid: Grid) -> bytes:
     """Return the text of the JSON file, one line per node, member and triangle."""
-    deviation = None if grid.deviation is None else [None if math.isnan(d) else d for d in np.asarray(grid.deviation, float).tolist()]
+    deviation = None if grid.deviation is None else np.asarray(grid.deviation, float).tolist()
     values: dict[str, Any] = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -34,21 +34,31 @@ def encode_json(grid: Grid) -> bytes:
         "unit": grid.unit,
         "origin": np.asarray(grid.origin, np.float64).tolist(),
         "settings": None if grid.settings is None else grid.settings.to_dict(),
-        "quality": grid.quality.to_dict(),
-        "before": None if grid.before is None else grid.before.to_dict(),
+        "quality": _known(grid.quality.to_dict()),
+        "before": None if grid.before is None else _known(grid.before.to_dict()),
         "topology": grid.topology.to_dict(),
         "fixed": np.flatnonzero(grid.fixed).tolist(),
         "boundary_loops": [loop.tolist() for loop in grid.boundary_loops],
         "nodes": np.asarray(grid.nodes, np.float64).tolist(),
         "members": grid.edges.tolist(),
         "triangles": grid.triangles.tolist(),
-        "deviation": deviation,
+        "deviation": deviation and [_number(d) for d in deviation],
     }
     parts = [f"{json.dumps(key)}: {_lines(value) if key in ROWS else _text(value)}" for key, value in values.items()]
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
 
 ROWS = ("nodes", "members", "triangles", "boundary_loops")
+
+
+def _number(value: Any) -> Any:
+    """Return null for what is not a number in JSON."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _known(figures: dict[str, Any]) -> dict[str, Any]:
+    """Return figures with null for those that are not known."""
+    return {name: _number(value) for name, value in figures.items()}
 
 
 def _text(value: Any) -> str:
@@ -79,12 +89,14 @@ def read_grid(path: str | Path) -> Grid:
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
     except (ValueError, RecursionError):
-        raise FormatError(f"{path} is not a grid of ScanTruss; a .json file written by scantruss grid is needed") from None
+        raise FormatError(f"{path} is not JSON; a grid saved as .json by scantruss grid is needed") from None
     if not isinstance(values, dict) or values.get("format") != FORMAT:
-        raise FormatError(f'{path} is not a grid of ScanTruss (no "format": "{FORMAT}"); a .json written by scantruss grid is needed')
+        raise FormatError(f'{path} has no "format": "{FORMAT}"; a grid saved as .json by scantruss grid is needed')
     version = values.get("format_version")
     if not isinstance(version, int) or not 1 <= version <= FORMAT_VERSION:
-        raise FormatError(f"{path} has version {version!r} of the format, this program reads up to {FORMAT_VERSION}; install a newer ScanTruss")
+        raise FormatError(
+            f"{path} has format_version {version!r}, known is up to {FORMAT_VERSION}; read it with a newer ScanTruss"
+        )
     try:
         return _grid_from(values)
     except (InputError, KeyError, TypeError, ValueError) as error:

@@ -1,66 +1,26 @@
 """Pictures: the grid over its scan, and three panels (scan, grid, printed model).
 
-The painter's way: everything is projected, sorted by depth and painted back to front by matplotlib's Agg, without pyplot and without any
-state that outlives the call. The same grid gives the same bytes.
+The painter's way: everything is projected, sorted by depth and painted back to front by matplotlib's Agg, without
+pyplot and without any state that outlives the call. The same grid gives the same bytes.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
-from .camera import Camera, choose_camera, map_depth
+from .camera import choose_camera
 from .files import check_place, write_files
+from .strokes import INK, PAPER, Strokes, dot_strokes, grid_strokes, look, shadow_strokes, solid_strokes
 
 SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS = (2400, 800)  #: of three panels [pixel]
-MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
-PAPER = np.array([0.984, 0.980, 0.969])
-GROUND = np.array([0.925, 0.918, 0.898])
-INK = np.array([0.098, 0.180, 0.290])  # members
-RIM = np.array([0.047, 0.098, 0.176])  # members on a boundary
-OUTSIDE = (np.array([0.345, 0.525, 0.620]), np.array([0.835, 0.925, 0.930]))  # triangles in the shade, in the light
-INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
-CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
-PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
-MARK = np.array([0.851, 0.290, 0.180])  # fixed nodes
-
-
-@dataclass(frozen=True, eq=False)
-class Strokes:
-    """Things to paint: filled triangles, lines and dots alike."""
-
-    key: np.ndarray  #: (N,) what is smaller is painted first
-    shape: np.ndarray  #: (N, 3, 2) corners [pixel]; a line repeats one, a dot is a very short line
-    fill: np.ndarray  #: (N, 4) colour
-    line: np.ndarray  #: (N, 4) colour
-    width: np.ndarray  #: (N,) of the line [pixel]
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """A surface as seen by a camera."""
-
-    camera: Camera
-    corners: np.ndarray  #: (T, 3, 2) [pixel]
-    key: np.ndarray  #: (T,) nearness of the middle of each triangle [scan unit]
-    light: np.ndarray  #: (T,) how much light each gets, 0 to 1
-    outside: np.ndarray  #: (T,) bool, whether its outside is seen
-    depth: tuple[float, float]  #: nearness of the farthest and the nearest node [scan unit]
-    nearest: np.ndarray  #: (rows, columns) nearness of what is in front at each pixel
-    front: np.ndarray  #: (rows, columns) the triangle in front, -1 where none is
-
-    def fade(self, near: np.ndarray) -> np.ndarray:
-        """Return how far back things are, (N,) 0 in front to 1."""
-        low, high = self.depth
-        return np.clip((high - near) / max(high - low, 1e-300), 0, 1)
 
 
 def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool = True) -> bytes:
@@ -78,8 +38,9 @@ def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool
     wide, tall = SIZE
     strokes = []
     if len(grid.triangles):
-        camera = choose_camera(grid.nodes, grid.triangles).framed(grid.nodes[np.unique(grid.triangles)], (90, 110, wide - 90, tall - 80))
-        strokes = _grid_strokes(grid, cloud, look(grid.nodes, grid.triangles, camera, SIZE))
+        used = grid.nodes[np.unique(grid.triangles)]
+        camera = choose_camera(grid.nodes, grid.triangles).framed(used, (90, 110, wide - 90, tall - 80))
+        strokes = grid_strokes(grid, cloud, look(grid.nodes, grid.triangles, camera, SIZE))
     return _paint(SIZE, strokes, [(wide / 2, 40, caption_of(grid), 15)] if caption else [])
 
 
@@ -115,176 +76,30 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
     path = check_place(path, (".png",))
     wide, tall = PANELS
     camera = choose_camera(grid.nodes, grid.triangles)
-    strokes: list[Strokes] = []
-    texts = []
-    for k, title in enumerate((f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")):
-        box = (wide / 3 * k + 40, 90, wide / 3 * (k + 1) - 40, tall - 40)
-        if k < 2:
-            view = look(grid.nodes, grid.triangles, camera.framed(grid.nodes[np.unique(grid.triangles)], box), PANELS)
-            strokes += [_dot_strokes(cloud, grid, view, over=False)] if k == 0 else _grid_strokes(grid, None, view)
-        else:
-            own = camera.around(vertices).framed(vertices, box)
-            strokes += [_shadow_strokes(vertices, triangles, own), _solid_strokes(look(vertices, triangles, own, PANELS, mapped=False))]
-        texts.append((wide / 3 * (k + 0.5), 40, title, 17))
+    boxes = [(wide / 3 * k + 40, 90, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
+    used = grid.nodes[np.unique(grid.triangles)]
+    scan, net = (look(grid.nodes, grid.triangles, camera.framed(used, box), PANELS) for box in boxes[:2])
+    own = camera.around(vertices).framed(vertices, boxes[2])
+    strokes = [
+        dot_strokes(cloud, grid, scan, over=False),
+        *grid_strokes(grid, None, net),
+        shadow_strokes(vertices, triangles, own),
+        solid_strokes(look(vertices, triangles, own, PANELS, mapped=False)),
+    ]
+    titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
+    texts = [(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
     return write_files({path: _paint(PANELS, strokes, texts)})[0]
 
 
-def look(nodes: np.ndarray, triangles: np.ndarray, camera: Camera, size: tuple[int, int], *, mapped: bool = True) -> View:
-    """Return how a surface looks from a camera; the map of what is in front only if asked for."""
-    flat, near = camera.project(nodes)
-    corners, depth = flat[triangles], near[triangles]
-    normal = _soft_normals(nodes, triangles)
-    a, b, c = nodes[triangles.T]
-    eye = camera.middle + camera.distance * camera.back
-    outside = ((eye - a) * np.cross(b - a, c - a)).sum(axis=1) > 0
-    normal = np.where(outside[:, None], normal, -normal)
-    key_light = _unit(-0.55 * camera.right + 0.75 * camera.up + 0.65 * camera.back)
-    fill_light = _unit(0.8 * camera.right + 0.1 * camera.up + 0.6 * camera.back)
-    light = 0.16 + 0.70 * np.clip(normal @ key_light, 0, 1) + 0.22 * np.clip(normal @ fill_light, 0, 1)
-    used = near[np.unique(triangles)]
-    half = map_depth(corners / 2, depth, (size[1] // 2, size[0] // 2)) if mapped else (np.empty((0, 0)), np.empty((0, 0), np.int64))
-    return View(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, (float(used.min()), float(used.max())), *half)
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    """Return the vector with length 1."""
-    return vector / np.linalg.norm(vector)
-
-
-def _soft_normals(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return (T, 3) unit normals, halfway between flat triangles and a smooth surface."""
-    a, b, c = nodes[triangles.T]
-    normal = np.cross(b - a, c - a)
-    at_node = np.stack([np.bincount(triangles.ravel(), np.repeat(normal[:, k], 3), len(nodes)) for k in range(3)], axis=1)
-    smooth = at_node[triangles].sum(axis=1)
-    return _rows_to_unit(_rows_to_unit(normal) + _rows_to_unit(smooth))
-
-
-def _rows_to_unit(rows: np.ndarray) -> np.ndarray:
-    """Return each row with length 1; zero rows stay zero."""
-    length = np.linalg.norm(rows, axis=1, keepdims=True)
-    return np.divide(rows, length, out=np.zeros_like(rows), where=length > 0)
-
-
-def _mix(colours: tuple[np.ndarray, np.ndarray], share: np.ndarray, alpha: float = 1.0) -> np.ndarray:
-    """Return (N, 4) colours between the first (share 0) and the second (share 1)."""
-    share = share[:, None]
-    return np.concatenate([(1 - share) * colours[0] + share * colours[1], np.full_like(share, alpha)], axis=1)
-
-
-def _hazy(colour: np.ndarray, fade: np.ndarray, most: float) -> np.ndarray:
-    """Return (N, 4) colours that go towards the paper by up to `most` far back."""
-    colour = np.broadcast_to(np.concatenate([colour, [1.0]]) if colour.ndim == 1 else colour, (len(fade), 4)).copy()
-    share = (most * fade)[:, None]
-    colour[:, :3] = (1 - share) * colour[:, :3] + share * PAPER
-    return colour
-
-
-def _surface_strokes(view: View, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]) -> Strokes:
-    """Return the shaded triangles of a view."""
-    colour = np.where(view.outside[:, None], _mix(outside, view.light), _mix(inside, view.light))
-    colour = _hazy(colour, view.fade(view.key), 0.30)
-    return Strokes(view.key, view.corners, colour, colour, np.full(len(colour), 0.6))
-
-
-def _shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
-    """Return the shadow that a surface throws on the ground below it."""
-    height = nodes @ camera.ground
-    used = height[np.unique(triangles)]
-    floor = float(used.min()) - 0.02 * float(np.ptp(used))
-    across = float(np.ptp(nodes @ camera.right))
-    slope = min(1.0, 0.6 * across / max(float(np.ptp(used)), 1e-300))  # tall things throw no longer shadows than flat ones
-    sun = _unit(camera.ground + slope * (-0.30 * camera.right + 0.12 * np.cross(camera.ground, camera.right)))
-    fallen = nodes - ((height - floor) / (sun @ camera.ground))[:, None] * sun
-    shape = camera.project(fallen)[0][triangles]
-    colour = np.broadcast_to(np.concatenate([GROUND, [1.0]]), (len(shape), 4))
-    return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))
-
-
-def _grid_strokes(grid: Grid, cloud: PointCloud | None, view: View) -> list[Strokes]:
-    """Return shadow, triangles, members, fixed nodes and, if given, the scan."""
-    strokes = [_shadow_strokes(grid.nodes, grid.triangles, view.camera), _surface_strokes(view, OUTSIDE, INSIDE), _member_strokes(grid, view)]
-    if cloud is not None:
-        strokes.append(_dot_strokes(cloud, grid, view, over=True))
-    if grid.fixed.any():
-        strokes += _mark_strokes(grid, view)
-    return strokes
-
-
-def _member_strokes(grid: Grid, view: View) -> Strokes:
-    """Return the members as lines just in front of their triangles, those on a boundary bolder."""
-    flat, near = view.camera.project(grid.nodes)
-    ends = grid.edges
-    pair = grid.edge_triangles
-    boundary = pair[:, 1] < 0
-    key = np.maximum(view.key[pair[:, 0]], view.key[np.where(boundary, pair[:, 0], pair[:, 1])])
-    length = np.linalg.norm(flat[ends[:, 0]] - flat[ends[:, 1]], axis=1)
-    width = float(np.clip(0.055 * np.quantile(length, 0.75), 0.4, 2.4))
-    colour = np.where(boundary[:, None], _hazy(RIM, view.fade(near[ends].mean(axis=1)), 0.45), _hazy(INK, view.fade(near[ends].mean(axis=1)), 0.60))
-    return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, np.where(boundary, 1.9 * width, width))
-
-
-def _thin(cloud: PointCloud, grid: Grid, most: int) -> np.ndarray:
-    """Return at most so many points of the scan in the frame of the grid; always the same ones."""
-    points = cloud.points
-    if len(points) > most:
-        points = points[np.sort(np.random.default_rng(0).permutation(len(points))[:most])]
-    return points + (np.asarray(cloud.origin, float) - grid.origin)
-
-
-def _dot_strokes(cloud: PointCloud, grid: Grid, view: View, *, over: bool) -> Strokes:
-    """Return the points of the scan that are seen, as dots: over the triangles, or alone and shaded."""
-    points = _thin(cloud, grid, MOST_POINTS[over])
-    flat, near = view.camera.project(points)
-    rows, columns = view.front.shape
-    pixel = np.rint(flat / 2).astype(int)
-    inside = (pixel >= 0).all(axis=1) & (pixel[:, 0] < columns) & (pixel[:, 1] < rows)
-    points, flat, near, pixel = points[inside], flat[inside], near[inside], pixel[inside]
-    triangle, nearest = view.front[pixel[:, 1], pixel[:, 0]], view.nearest[pixel[:, 1], pixel[:, 0]]
-    slack = 0.5 * float(np.mean(grid.lengths))
-    seen = (triangle < 0) | (near > nearest - slack)
-    flat, near, triangle, nearest = flat[seen], near[seen], triangle[seen], nearest[seen]
-    on = (triangle >= 0) & (near < nearest + slack)
-    key = np.where(on, np.maximum(view.key[triangle], near), near) + slack
-    light = np.where(triangle >= 0, view.light[triangle], 0.5)
-    colour = _hazy(_mix((INK, OUTSIDE[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
-    return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
-
-
-def _dots(flat: np.ndarray) -> np.ndarray:
-    """Return (N, 3, 2) lines so short that their round ends make a dot; nothing is painted where a line has no length."""
-    return flat[:, None] + np.array([[-0.05, 0.0], [0.05, 0.0], [0.05, 0.0]])
-
-
-def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
-    """Return the marks of the fixed nodes: full where they are seen, faint behind the grid."""
-    flat, near = view.camera.project(grid.nodes[grid.fixed])
-    rows, columns = view.front.shape
-    pixel = np.clip(np.rint(flat / 2).astype(int), 0, (columns - 1, rows - 1))
-    seen = near > view.nearest[pixel[:, 1], pixel[:, 0]] - 0.5 * float(np.mean(grid.lengths))
-    shape = _dots(flat)
-    strokes = []
-    for colour, width in ((PAPER, 15.0), (MARK, 11.0)):
-        shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-        shown[:, 3] = np.where(seen, 1.0, 0.25)
-        strokes.append(Strokes(np.full(len(flat), np.inf), shape, np.zeros_like(shown), shown, np.full(len(flat), width)))
-    return strokes
-
-
-def _solid_strokes(view: View) -> Strokes:
-    """Return the outside of a solid, shaded."""
-    surface = _surface_strokes(view, PRINT, PRINT)
-    keep = view.outside
-    return Strokes(surface.key[keep], surface.shape[keep], surface.fill[keep], surface.line[keep], surface.width[keep])
-
-
-def _paint(size: tuple[int, int], strokes: Sequence[Strokes], texts: Iterable[tuple[float, float, str, float]]) -> bytes:
+def _paint(
+    size: tuple[int, int], strokes: Sequence[Strokes], texts: Iterable[tuple[float, float, str, float]]
+) -> bytes:
     """Return the picture as PNG: strokes back to front, then texts (x, y, words, size) [pixel]."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER))
-    FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0, 0, 1, 1), xlim=(0, size[0]), ylim=(0, size[1]), autoscale_on=False)
     axes.set_axis_off()
     if strokes:
@@ -292,7 +107,7 @@ def _paint(size: tuple[int, int], strokes: Sequence[Strokes], texts: Iterable[tu
     for x, y, words, points in texts:
         axes.text(x, y, words, fontsize=points * 0.72, color=tuple(INK), ha="center", va="center", family="DejaVu Sans")
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=100, facecolor=tuple(PAPER), metadata={"Software": None})
+    canvas.print_png(stream, metadata={"Software": None})  # unlike savefig it asks no settings of the user
     return stream.getvalue()
 
 
@@ -304,6 +119,13 @@ def _collection(strokes: Sequence[Strokes]) -> Any:
     joined = [np.concatenate([getattr(s, name) for s in strokes])[order] for name in ("shape", "fill", "line", "width")]
     shape, fill, line, width = joined
     return PolyCollection(
-        shape, closed=False, facecolors=fill, edgecolors=line, linewidths=width * 0.72, capstyle="round", joinstyle="round", antialiaseds=True,
+        cast(Any, shape),
+        closed=False,
+        facecolors=fill,
+        edgecolors=line,
+        linewidths=width * 0.72,  # points of a picture with 100 pixels an inch
+        capstyle="round",
+        joinstyle="round",
+        antialiaseds=True,
         snap=False,
-    )  # fmt: skip
+    )

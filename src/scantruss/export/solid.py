@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from .files import check_place, write_files
+from .solid_files import encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
 BLOCK = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
@@ -35,12 +36,10 @@ class Solid:
         """What a user should know of it, in words; empty where the solid has every opening of the grid."""
         lines = []
         if self.components < self.expected_components:
-            lines.append(f"pieces of the grid touch in the solid: {self.expected_components} pieces, {self.components} bodies")
-        if self.genus != self.expected_genus:
-            lines.append(
-                f"{abs(self.expected_genus - self.genus)} of {self.expected_genus} openings are "
-                f"{'closed' if self.genus < self.expected_genus else 'added'} where members touch; thinner members keep them"
-            )
+            lines.append(f"pieces of the grid touch: {self.expected_components} pieces became {self.components} bodies")
+        if (lost := self.expected_genus - self.genus) != 0:
+            what = f"{abs(lost)} of {self.expected_genus} openings are {'closed' if lost > 0 else 'added'}"
+            lines.append(f"{what} where parts touch; thinner members and nodes keep the openings of the grid")
         return lines
 
 
@@ -76,14 +75,14 @@ def print_model(
     """
     path = check_place(path, SUFFIXES)
     solid = build_solid(grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides)
-    from .solid_files import encode_3mf, encode_stl
-
     encode = encode_3mf if path.suffix.lower() == ".3mf" else encode_stl
     write_files({path: encode(solid)})
     return solid
 
 
-def build_solid(grid: Grid, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12) -> Solid:
+def build_solid(
+    grid: Grid, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12
+) -> Solid:
     """Return members (cylinders) and nodes (geodesic balls) of a grid, united.
 
     Parameters
@@ -130,7 +129,7 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
     if not (isinstance(sides, int | np.integer) and 3 <= sides <= 256):
         raise InputError(f"sides must be a whole number between 3 and 256, got {sides}")
     if len(grid.edges) == 0:
-        raise InputError("the grid has no members, so there is nothing to print; give a grid with at least one triangle")
+        raise InputError("the grid has no members, so there is nothing to print; give one with a triangle at least")
     unit = f" {grid.unit}" if grid.unit else ""
     if node_diameter < member_diameter:
         raise InputError(
@@ -143,8 +142,8 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
         if value >= length:
             a, b = grid.edges[shortest].tolist()
             raise InputError(
-                f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {length:.4g}{unit} long at scale {scale:g} "
-                f"(nodes {a} and {b}); give a smaller diameter or a larger scale"
+                f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {length:.4g}{unit} long "
+                f"at scale {scale:g} (nodes {a} and {b}); give a smaller diameter or a larger scale"
             )
 
 
@@ -173,7 +172,7 @@ def _frames(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _curve_order(places: np.ndarray) -> np.ndarray:
-    """Return the order of places along a curve that keeps neighbours together (bits of three coordinates interleaved)."""
+    """Return the order of places along a curve that keeps neighbours together (Morton's)."""
     low = places.min(axis=0)
     size = float((places.max(axis=0) - low).max()) or 1.0
     cell = np.minimum((places - low) / size * 1024, 1023).astype(np.int64)
@@ -229,6 +228,4 @@ def _checked(solid: Solid) -> Solid:
             f"no watertight solid came of the grid (volume {solid.volume:.4g}, {solid.components} bodies); "
             f"check the grid and try slightly different diameters"
         )
-    from dataclasses import replace
-
     return replace(solid, genus=solid.components - euler // 2)

@@ -1,8 +1,9 @@
 """Files for 3D printers: 3MF, which carries the unit, and binary STL.
 
-Readers of these files keep coordinates as float32, and those of STL know which vertices are one only by equal coordinates. Vertices of a
-union lie so near to each other at places that rounding would weld them and tear the surface open. All vertices are therefore put on a
-lattice that float32 holds exactly, and those that fall together are moved apart by a step or two of it.
+Readers of these files keep coordinates as float32, and those of STL know which vertices are one only by equal
+coordinates. Vertices of a union lie so near to each other at places that rounding would weld them and tear the surface
+open. All vertices are therefore put on a lattice that float32 holds exactly, and those that fall together are moved
+apart by a step or two of it.
 """
 
 from __future__ import annotations
@@ -10,14 +11,18 @@ from __future__ import annotations
 import io
 import math
 import zipfile
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import __version__
 from ..errors import FormatError
-from .solid import Solid
 
-UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}  #: 3MF's words; else millimeter
+if TYPE_CHECKING:
+    from .solid import Solid
+
+#: 3MF's words for our units; millimeter where it is not known
+UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
 ROUNDS = 32  #: of moving apart
 
 CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
@@ -105,13 +110,15 @@ def _vertex_normals(solid: Solid) -> np.ndarray:
         for axis in range(3):
             total[:, axis] += np.bincount(corner, normal[:, axis], len(total))
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    normals: np.ndarray = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+    return normals
 
 
 def encode_3mf(solid: Solid) -> bytes:
     """Return a 3MF package; the unit is that of the grid, millimetre where it is not known. No dates, no random ids."""
     vertices, _ = put_on_lattice(solid)
-    model = MODEL.format(
+    parts = {"[Content_Types].xml": CONTENT_TYPES, "_rels/.rels": RELATIONS}
+    parts["3D/3dmodel.model"] = MODEL.format(
         unit=UNITS.get(solid.unit, "millimeter"),
         version=__version__,
         vertices="\n".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in vertices.tolist()),
@@ -119,7 +126,7 @@ def encode_3mf(solid: Solid) -> bytes:
     )
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as package:
-        for name, text in (("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", RELATIONS), ("3D/3dmodel.model", model)):
+        for name, text in parts.items():
             entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
@@ -138,7 +145,7 @@ def encode_stl(solid: Solid) -> bytes:
     """
     vertices, together = put_on_lattice(solid)
     if together:
-        raise FormatError(f"STL cannot hold this solid watertight ({together} vertices coincide in float32); write a .3mf instead")
+        raise FormatError(f"STL cannot hold this solid: {together} vertices coincide in float32; write a .3mf instead")
     corners = vertices[solid.triangles]
     wide = corners.astype(np.float64)
     normal = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
@@ -147,4 +154,4 @@ def encode_stl(solid: Solid) -> bytes:
     table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     table["corners"] = corners
     header = f"ScanTruss {__version__}, unit: {solid.unit or 'not known'}".encode("ascii").ljust(80)
-    return header + np.uint32(len(corners)).astype("<u4").tobytes() + table.tobytes()
+    return header + len(corners).to_bytes(4, "little") + table.tobytes()

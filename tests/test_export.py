@@ -1,0 +1,306 @@
+"""Files of grids: what is written is read back by independent readers, whole or not at all."""
+
+import csv
+import io
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from small_grids import cloud_over, dome, fan, icosahedron, make_grid, rich, two_pieces
+
+import scantruss as st
+from scantruss.export.files import write_files
+from scantruss.export.formats import FORMATS, check_output
+
+GRIDS = [fan, icosahedron, two_pieces, rich, dome]
+UTM = np.array([500000.1, 4500000.2, 100.3])
+
+
+def same(a, b):
+    """Whether two arrays are the same to the last bit, NaN and the sign of 0 included."""
+    return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def naive_obj(text):
+    """Read an OBJ file the obvious way."""
+    words = [line.split() for line in text.splitlines()]
+    nodes = [[float(w) for w in row[1:]] for row in words if row and row[0] == "v"]
+    return np.array(nodes), np.array([[int(w) - 1 for w in row[1:]] for row in words if row and row[0] == "f"])
+
+
+@pytest.mark.parametrize("make", GRIDS)
+def test_obj_holds_nodes_in_the_scans_own_frame_to_the_last_bit(make, tmp_path):
+    grid = make(origin=UTM)
+    assert st.write(grid, tmp_path / "a.obj") == [tmp_path / "a.obj"]
+    nodes, triangles = naive_obj((tmp_path / "a.obj").read_text())
+    assert same(nodes, grid.nodes + UTM)
+    assert np.array_equal(triangles, grid.triangles)
+    assert "unit: mm" in (tmp_path / "a.obj").read_text()
+
+
+@pytest.mark.parametrize("make", GRIDS)
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_trimesh_reads_what_is_written(make, suffix, tmp_path):
+    import trimesh
+
+    grid = make()
+    st.write(grid, tmp_path / f"a{suffix}")
+    mesh = trimesh.load(tmp_path / f"a{suffix}", process=False, maintain_order=True)
+    used = np.unique(grid.triangles)  # trimesh drops a node without a triangle from an OBJ
+    expected = (grid.nodes + grid.origin)[used]
+    found = mesh.vertices[np.unique(mesh.faces)]
+    assert np.array_equal(found, expected)
+    assert np.array_equal(np.searchsorted(np.unique(mesh.faces), mesh.faces), np.searchsorted(used, grid.triangles))
+
+
+def test_ply_says_double_and_unit(tmp_path):
+    st.write(rich(), tmp_path / "a.ply")
+    header = (tmp_path / "a.ply").read_bytes().split(b"end_header\n")[0].decode()
+    assert "property double x" in header and "comment unit: mm" in header and "element vertex 7" in header
+
+
+@pytest.mark.parametrize("make", GRIDS)
+def test_json_is_read_back_without_loss(make, tmp_path):
+    grid = make()
+    st.write(grid, tmp_path / "a.json")
+    back = st.read_grid(tmp_path / "a.json")
+    for name in ("nodes", "triangles", "fixed", "origin"):
+        assert same(getattr(back, name), getattr(grid, name)), name
+    assert (back.deviation is None) == (grid.deviation is None)
+    assert grid.deviation is None or same(back.deviation, grid.deviation)
+    assert (back.unit, back.settings, back.before) == (grid.unit, grid.settings, grid.before)
+    st.write(back, tmp_path / "b.json")
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+
+
+numbers = some.floats(allow_nan=False, allow_infinity=False, width=64, min_value=-1e100, max_value=1e100)
+
+
+@some.composite
+def any_grids(draw):
+    count = draw(some.integers(3, 9))
+    places = draw(some.lists(numbers, min_size=3 * count, max_size=3 * count))
+    corners = some.permutations(range(count)).map(lambda ids: ids[:3])
+    triangles = draw(some.lists(corners, min_size=0, max_size=6))
+    fixed = draw(some.sets(some.integers(0, count - 1)))
+    origin = np.array(draw(some.lists(numbers, min_size=3, max_size=3)))
+    unit = draw(some.sampled_from(["", "mm", "cm", "m", "inch", "foot"]))
+    return make_grid(places, triangles, fixed=fixed, origin=origin, unit=unit)
+
+
+@given(any_grids())
+def test_json_keeps_any_numbers(tmp_path_factory, grid):
+    path = tmp_path_factory.mktemp("any") / "a.json"
+    # quality and topology are not the matter here, and of numbers without sense they may overflow
+    grid.__dict__["quality"], grid.__dict__["topology"] = fan().quality, fan().topology
+    st.write(grid, path)
+    back = st.read_grid(path)
+    assert same(back.nodes, grid.nodes) and same(back.origin, grid.origin) and same(back.triangles, grid.triangles)
+    assert same(back.fixed, grid.fixed) and back.unit == grid.unit
+
+
+def test_json_tells_other_programs_what_follows(tmp_path):
+    grid = rich()
+    st.write(grid, tmp_path / "a.json")
+    values = json.loads((tmp_path / "a.json").read_text())
+    assert values["format"] == "scantruss-grid" and values["version"] == st.__version__
+    assert values["members"] == grid.edges.tolist() and values["fixed"] == [0, 3]
+    assert [sorted(loop) for loop in values["boundary_loops"]] == [[1, 2, 3, 4, 5, 6]]
+    assert values["topology"] == grid.topology.to_dict()
+    figures = grid.quality.to_dict()  # one deviation is not known here, so their mean is not either
+    assert values["quality"] == {name: None if figure != figure else figure for name, figure in figures.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{}", 'no "format"'),
+        ("[1, 2]", 'no "format"'),
+        ("not json", "not JSON"),
+        ("\udcff", "not JSON"),
+        ("[" * 100_000, "not JSON"),
+        ('{"format": "scantruss-grid", "format_version": 99}', "newer"),
+        ('{"format": "scantruss-grid", "format_version": 1}', "unit is missing"),
+    ],
+)
+def test_other_json_is_refused_in_words(text, words, tmp_path):
+    (tmp_path / "a.json").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(st.FormatError, match=words) as error:
+        st.read_grid(tmp_path / "a.json")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("nodes", [[0, 0]], "3 columns"),
+        ("nodes", [[0, 0, 0], [1, 2]], "damaged"),
+        ("nodes", [["0", "0", "0"]], "numbers"),
+        ("nodes", [[float("nan"), 0, 0]], "not JSON"),
+        ("triangles", [[0, 1, 7]], "ids of nodes, 0 to 6"),
+        ("triangles", [[0, 1, -1]], "ids of nodes"),
+        ("triangles", [[0, 1, 2.5]], "ids of nodes"),
+        ("triangles", 5, "damaged"),
+        ("fixed", [9], "ids of nodes"),
+        ("origin", [1, 2], "3 columns"),
+        ("origin", [1, 2, 10**400], "numbers"),
+        ("unit", "furlong", "unknown unit"),
+        ("unit", ["mm"], "damaged"),
+        ("deviation", [1.0], "1 deviations for 7 nodes"),
+        ("settings", {"length": -1}, "length must be a positive number"),
+        ("settings", {"colour": 1}, "unknown setting"),
+        ("before", {"colour": 1}, "damaged"),
+    ],
+)
+def test_a_damaged_grid_is_refused_in_words(key, value, words, tmp_path):
+    st.write(rich(), tmp_path / "a.json")
+    values = json.loads((tmp_path / "a.json").read_text()) | {key: value}
+    (tmp_path / "a.json").write_text(json.dumps(values))
+    with pytest.raises(st.FormatError, match=words) as error:
+        st.read_grid(tmp_path / "a.json")
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_grid_is_refused_in_words(tmp_path):
+    with pytest.raises(st.FormatError, match="No such file"):
+        st.read_grid(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize("make", GRIDS)
+def test_csv_holds_members_and_beside_them_nodes(make, tmp_path):
+    grid = make()
+    assert st.write(grid, tmp_path / "a.csv") == [tmp_path / "a.csv", tmp_path / "a_nodes.csv"]
+    members, nodes = (list(csv.DictReader(io.StringIO((tmp_path / n).read_text()))) for n in ("a.csv", "a_nodes.csv"))
+    places = np.array([[float(row[f"{c} [mm]"]) for c in "xyz"] for row in nodes])
+    assert same(places, grid.nodes + grid.origin)
+    assert [[int(row["start"]), int(row["end"])] for row in members] == grid.edges.tolist()
+    for row in members:
+        a, b = int(row["start"]), int(row["end"])
+        ends = [[float(row[f"{end}_{c} [mm]"]) for c in "xyz"] for end in ("start", "end")]
+        assert ends == [places[a].tolist(), places[b].tolist()]
+        assert float(row["length [mm]"]) == pytest.approx(np.linalg.norm(grid.nodes[a] - grid.nodes[b]), rel=1e-15)
+        shared = sum({a, b} <= set(triangle) for triangle in grid.triangles.tolist())
+        assert int(row["boundary"]) == (shared == 1)
+    for k, row in enumerate(nodes):
+        assert int(row["id"]) == k and int(row["valence"]) == (grid.edges == k).sum()
+        assert int(row["fixed"]) == grid.fixed[k]
+        assert int(row["boundary"]) == any(k in loop for loop in grid.boundary_loops)
+
+
+def test_without_a_unit_none_is_said(tmp_path):
+    st.write(fan(unit=""), tmp_path / "a.csv")
+    assert (tmp_path / "a.csv").read_text().splitlines()[0].startswith("id,start,end,start_x,")
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+def test_same_grid_same_bytes(suffix, tmp_path):
+    grid = rich()
+    first = st.write(grid, tmp_path / f"a{suffix}", cloud=cloud_over(grid))
+    second = st.write(grid.replace(seconds={"grid": 1.0}), tmp_path / f"b{suffix.upper()}", cloud=cloud_over(grid))
+    assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+@pytest.mark.parametrize("suffix", sorted(FORMATS))
+def test_a_grid_without_triangles_is_written(suffix, tmp_path):
+    for path in st.write(make_grid([(0, 0, 0)], []), tmp_path / f"a{suffix}"):
+        assert path.stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a.iffc", 'no format for ".iffc"; use one of .csv .json .obj .ply .png'),
+        ("a", 'no format for "a"; use one of .csv'),
+        ("a.stl", 'no format for ".stl" of a grid'),
+        ("a.3mf", "scantruss print"),
+        ("none/a.obj", "none does not exist"),
+        ("file/a.obj", "is a file, not a folder"),
+        ("folder.obj", "it is a folder"),
+        ("b.csv", "b_nodes.csv: it is a folder"),
+        ("x" * 300 + ".obj", "File name too long"),
+    ],
+)
+def test_places_where_nothing_can_be_written_are_refused(name, words, tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "folder.obj").mkdir()
+    (tmp_path / "b_nodes.csv").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(st.FormatError) as error:
+        st.write(fan(), tmp_path / name)
+    assert words in str(error.value) and "\n" not in str(error.value)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_a_protected_folder_is_refused_before_the_work(tmp_path):
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(st.FormatError, match="no permission"):
+            check_output(tmp_path / "a.obj")
+    finally:
+        tmp_path.chmod(0o700)
+
+
+@pytest.mark.parametrize("full_at", [1, 2])
+def test_a_full_disk_leaves_what_was_there(full_at, tmp_path, monkeypatch):
+    paths = [tmp_path / "a.csv", tmp_path / "a_nodes.csv"]
+    for path in paths:
+        path.write_bytes(b"old")
+    opened = Path.open
+    count = 0
+
+    def open_on_a_full_disk(self, mode="r", *rest, **more):
+        nonlocal count
+        stream = opened(self, mode, *rest, **more)
+        count += "x" in mode
+        return Full(stream) if count == full_at and "x" in mode else stream
+
+    monkeypatch.setattr(Path, "open", open_on_a_full_disk)
+    with pytest.raises(st.FormatError, match="No space left on device"):
+        st.write(fan(), tmp_path / "a.csv")
+    assert sorted(tmp_path.iterdir()) == paths
+    assert [path.read_bytes() for path in paths] == [b"old", b"old"]
+
+
+class Full:
+    """A file on a disk with no more room than four bytes."""
+
+    def __init__(self, stream):
+        self.stream = stream
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.stream.close()
+
+    def write(self, content):
+        self.stream.write(content[:4])
+        raise OSError(28, "No space left on device")
+
+
+def test_a_stopped_run_leaves_nothing(tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_files({tmp_path / "a.obj": b"new"})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "true.obj").touch()
+    (tmp_path / "a.obj").symlink_to(tmp_path / "true.obj")
+    write_files({tmp_path / "a.obj": b"new"})
+    assert (tmp_path / "a.obj").is_symlink() and (tmp_path / "true.obj").read_bytes() == b"new"
+
+
+def test_files_get_the_usual_permissions(tmp_path):
+    (tmp_path / "plain").touch()
+    write_files({tmp_path / "a.obj": b"new"})
+    assert (tmp_path / "a.obj").stat().st_mode == (tmp_path / "plain").stat().st_mode
