@@ -21,6 +21,7 @@ VARIANTS: dict[str, dict[str, object]] = {
     "dense25": {"density_ratio": 25.0},
     "noisy": {"noise": 0.35},
     "outliers": {"outliers": 0.1},
+    "chance": {"even": False},
     "lines": {"scan_lines": 1.1},
 }
 

@@ -41,7 +41,8 @@ class Measured:
             f"{'right' if self.right else 'WRONG'} {self.topology:18s}"
             f" G {self.shape_mean:.3f} {self.shape_std:.3f} {self.shape_min:.2f}"
             f" cv {self.cv:.3f} L {self.length:.3f} angle {self.angle_min:3.0f}-{self.angle_max:3.0f}"
-            f" six {self.valence6:.2f} rim {self.rim:.2f} corner {self.corner:.3f} dist {self.distance:.2f} V {self.nodes}"
+            f" six {self.valence6:.2f} rim {self.rim:.2f} corner {self.corner:.3f}"
+            f" dist {self.distance:.2f} V {self.nodes}"
         )
 
 

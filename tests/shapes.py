@@ -71,14 +71,14 @@ def _rotation(rng: np.random.Generator) -> Floats:
     return np.asarray(turn * [1, 1, np.sign(np.linalg.det(turn))])
 
 
-def _sample(truth: Truth, count: int, rng: np.random.Generator, weight: Lift | None) -> Floats:
+def _sample(truth: Truth, count: int, rng: np.random.Generator, weight: Lift | None, even: bool = True) -> Floats:
     """Return `count` exact positions on the kept part of the pieces, each piece by its area."""
     area = np.array([piece.areas.sum() for piece in truth.pieces])
     found = np.zeros((0, 3))
     while len(found) < count:
         wanted = int((count - len(found)) * 1.2) + 20
         new = [
-            piece.sample(n, rng, weight)
+            piece.sample(n, rng, weight, even)
             for piece, n in zip(truth.pieces, rng.multinomial(wanted, area / area.sum()), strict=True)
         ]
         positions = rng.permutation(np.concatenate(new))
@@ -138,6 +138,7 @@ def make(
     pose: bool = False,
     scale: float = 1.0,
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    even: bool = True,
     density_ratio: float = 1.0,
     outliers: float = 0.0,
     duplicates: float = 0.0,
@@ -159,6 +160,8 @@ def make(
         Turn and shift at random.
     scale, offset
         Positions become scale * position + offset, after the pose; the truth goes with them.
+    even : bool
+        Points lie somewhat more evenly than by chance; False: by chance.
     density_ratio : float
         Points lie this much denser at one end than at the other.
     outliers, duplicates : float
@@ -171,7 +174,7 @@ def make(
     low, size = surface.nodes.min(axis=0), np.ptp(surface.nodes, axis=0)
     weight = truth.weight if density_ratio == 1 else lambda p: density_ratio ** ((p[:, 0] - low[0]) / size[0])
     wanted = int((count or truth.count) * (8 if scan_lines else 1))
-    points = _vertices(truth, surface, wanted, rng) if truth.spread else _sample(truth, wanted, rng, weight)
+    points = _vertices(truth, surface, wanted, rng) if truth.spread else _sample(truth, wanted, rng, weight, even)
     if scan_lines:
         on_line = np.abs((points[:, 1] - low[1]) % scan_lines - scan_lines / 2) < scan_lines / 16
         points = points[on_line]

@@ -96,13 +96,16 @@ class Surface:
         found = distance_to_triangles(positions[:, None], corners[:, :, 0], corners[:, :, 1], corners[:, :, 2])
         return np.asarray(found.min(axis=1))
 
-    def sample(self, count: int, rng: np.random.Generator, weight: Lift | None = None) -> Floats:
-        """Return `count` random positions on the surface (exact, not on the chords), (count, 3).
+    def sample(self, count: int, rng: np.random.Generator, weight: Lift | None = None, even: bool = True) -> Floats:
+        """Return `count` positions on the surface, exact and not on the chords, (count, 3).
 
-        `weight` gives the relative density at positions (K, 3).
+        `weight` gives the relative density at positions (K, 3); even: somewhat more even than chance.
         """
         chance = self.areas if weight is None else self.areas * weight(self.nodes[self.triangles].mean(axis=1))
-        triangle = rng.choice(len(chance), count, p=chance / chance.sum())
+        total = np.cumsum(chance)
+        place = rng.random(count)
+        place = (np.arange(count) + place) / count if even else place
+        triangle = np.searchsorted(total[:-1], place * total[-1], side="right")
         first, second = rng.random((2, count))
         over = first + second > 1
         first[over], second[over] = 1 - first[over], 1 - second[over]
