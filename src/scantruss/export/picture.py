@@ -17,7 +17,7 @@ from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
 from .camera import choose_camera
 from .files import check_place, write_files
-from .strokes import INK, PAPER, Strokes, dot_strokes, grid_strokes, look, shadow_strokes, solid_strokes
+from .strokes import INK, PAPER, Strokes, dot_strokes, framed, grid_strokes, look, shadow_strokes, solid_strokes
 
 SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS = (2400, 800)  #: of three panels [pixel]
@@ -38,8 +38,8 @@ def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool
     wide, tall = SIZE
     strokes = []
     if len(grid.triangles):
-        used = grid.nodes[np.unique(grid.triangles)]
-        camera = choose_camera(grid.nodes, grid.triangles).framed(used, (90, 110, wide - 90, tall - 80))
+        camera = choose_camera(grid.nodes, grid.triangles)
+        camera = framed(grid.nodes, grid.triangles, camera, (90, 90, wide - 90, tall - 80))
         strokes = grid_strokes(grid, cloud, look(grid.nodes, grid.triangles, camera, SIZE))
     return _paint(SIZE, strokes, [(wide / 2, 40, caption_of(grid), 15)] if caption else [])
 
@@ -76,10 +76,10 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
     path = check_place(path, (".png",))
     wide, tall = PANELS
     camera = choose_camera(grid.nodes, grid.triangles)
-    boxes = [(wide / 3 * k + 40, 90, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
-    used = grid.nodes[np.unique(grid.triangles)]
-    scan, net = (look(grid.nodes, grid.triangles, camera.framed(used, box), PANELS) for box in boxes[:2])
-    own = camera.around(vertices).framed(vertices, boxes[2])
+    boxes = [(wide / 3 * k + 40, 80, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
+    eyes = [framed(grid.nodes, grid.triangles, camera, box) for box in boxes[:2]]
+    scan, net = (look(grid.nodes, grid.triangles, eye, PANELS) for eye in eyes)
+    own = framed(vertices, triangles, camera.around(vertices), boxes[2])
     strokes = [
         dot_strokes(cloud, grid, scan, over=False),
         *grid_strokes(grid, None, net),

@@ -120,18 +120,29 @@ def _surface_strokes(
     return Strokes(view.key, view.corners, colour, colour, np.full(len(colour), 0.6))
 
 
-def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
-    """Return the shadow that a surface throws on the ground below it."""
+def fallen_shadow(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (V, 3) where the shadow of each node falls on the ground a little below the lowest."""
     height = nodes @ camera.ground
     used = height[np.unique(triangles)]
     floor = float(used.min()) - 0.02 * float(np.ptp(used))
     across = float(np.ptp(nodes @ camera.right))
     slope = min(1.0, 0.6 * across / max(float(np.ptp(used)), 1e-300))  # tall things throw shadows as short as flat ones
     sun = _unit(camera.ground + slope * (-0.30 * camera.right + 0.12 * np.cross(camera.ground, camera.right)))
-    fallen = nodes - ((height - floor) / (sun @ camera.ground))[:, None] * sun
-    shape = camera.project(fallen)[0][triangles]
+    fallen: np.ndarray = nodes - ((height - floor) / (sun @ camera.ground))[:, None] * sun
+    return fallen
+
+
+def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
+    """Return the shadow that a surface throws on the ground below it."""
+    shape = camera.project(fallen_shadow(nodes, triangles, camera))[0][triangles]
     colour = np.broadcast_to(np.concatenate([GROUND, [1.0]]), (len(shape), 4))
     return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))
+
+
+def framed(nodes: np.ndarray, triangles: np.ndarray, camera: Camera, box: tuple[float, float, float, float]) -> Camera:
+    """Return the camera with a surface and its shadow filling a box (left, bottom, right, top) [pixel]."""
+    used = np.unique(triangles)
+    return camera.framed(np.concatenate([nodes[used], fallen_shadow(nodes, triangles, camera)[used]]), box)
 
 
 def grid_strokes(grid: Grid, cloud: PointCloud | None, view: View) -> list[Strokes]:
