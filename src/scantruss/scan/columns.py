@@ -11,17 +11,17 @@ _COUNTED = tuple(re.compile(f"(?:{_BESIDE}|xyz)(?:{number})") for number in "012
 _MAP = (
     re.compile("e|east|eastings?|rechtswert|ost|ostwert"),
     re.compile("n|north|northings?|hochwert|nord|nordwert"),
-    re.compile("z|h|heights?|elev|elevations?|alt|altitude|level|hoehe|höhe"),
+    re.compile("z|h|heights?|elev|elevations?|alt|altitude|level|hoehe|hhe"),
 )
 _FAMILIES = (_DIRECT, _COUNTED, _MAP, (*_DIRECT[:2], _MAP[2]))
 _NUMBER_OF_POINT = re.compile("id|ids|nr|no|num|number|index|idx|point|pointid|pt|name|label|fid|punkt|punktnummer|")
 
 
 def clean_name(name: str) -> str:
-    """Return a column name without quotes, brackets, unit and punctuation, in lower case."""
+    """Return a column name without quotes, brackets, unit and all that is not a letter or digit of ASCII, in lower case."""
     name = re.sub(r"\(.*?\)|\[.*?\]|<.*?>", "", name.strip().strip("\"'").lower())
     name = re.sub(r"[\s_.:/-]+(mm|cm|m|ft|feet|foot|in|inch|inches|met(er|re)s?)\s*$", "", name)
-    return re.sub(r"[^0-9a-zäöü]", "", name)
+    return re.sub(r"[^0-9a-z]", "", name)
 
 
 def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:

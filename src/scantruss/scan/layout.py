@@ -18,6 +18,7 @@ from .kinds import is_text, kind_of, read_head, wrong_kind
 PART = 1 << 16  # bytes looked at, at the start and in the middle
 LINES = 1000  # lines looked at in each part
 ANY = "any"  # blanks, commas and semicolons in one line
+COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 MISSING = frozenset(
@@ -52,9 +53,8 @@ class Layout:
 
 def split_line(line: str, separator: str | None) -> list[str]:
     """Return the fields of a line without its comment; [] where nothing is left."""
-    for mark in ("#", "//"):
-        if mark in line:
-            line = line.partition(mark)[0]
+    if "#" in line or "//" in line:
+        line = COMMENT.split(line, maxsplit=1)[0]
     return split_fields(line.strip(" \r\n") if separator == "\t" else line.strip(), separator)
 
 

@@ -38,7 +38,7 @@ def read_off(path: Path) -> np.ndarray:
     if kind_of(head) != "an OFF file":
         raise wrong_kind(path, head, "an OFF file")
     text = re.sub(r"#[^\n]*", "", path.read_text(encoding="latin-1"))
-    header = re.match(r"\s*((?:ST)?C?N?)(4?)(n?)OFF\b[ \t]*(BINARY)?\s*(\d+)\s+(\d+)(?:\s+\d+)?[^\n]*\n", text)
+    header = re.match(r"\s*((?:ST)?C?N?)(4?)(n?)OFF\b[ \t]*(BINARY)?\s*(\d+)[ \t]+(\d+)(?:[ \t]+\d+)?\s*\n", text)
     if not header:
         raise FormatError(f"{path}: the OFF header has no number of vertices and faces in plain text")
     if header[2] or header[3]:

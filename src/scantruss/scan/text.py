@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 import re
 from array import array
 from collections.abc import Iterator
@@ -35,7 +36,7 @@ def read_text(path: Path) -> np.ndarray:
 
 def _read_fast(path: Path, layout: Layout) -> np.ndarray:
     """Return the columns of a regular file; ValueError where it is not."""
-    if layout.separator == ANY:
+    if layout.separator == ANY or _holds(path, b".#"):
         raise ValueError
     source: Path | StringIO = path
     if layout.comma:
@@ -49,6 +50,11 @@ def _read_fast(path: Path, layout: Layout) -> np.ndarray:
         encoding=layout.encoding,
         ndmin=2,
     )
+
+
+def _holds(path: Path, sign: bytes) -> bool:
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        return data.find(sign) >= 0
 
 
 def _read_lines(path: Path, layout: Layout) -> tuple[np.ndarray, int | None]:
