@@ -114,7 +114,9 @@ def test_ascii_ply_need_not_keep_to_lines(tmp_path: Path) -> None:
     axes = "".join(f"property double {axis}\n" for axis in "xyz")
     head = f"ply\nformat ascii 1.0\nelement vertex 60\n{axes}end_header\n"
     words = " ".join(map(repr, roof().ravel().tolist()))
-    for number, body in enumerate([words, words.replace(" ", "\n"), "\n\n" + words.replace(" ", "\n  ")]):
+    lines = "\n".join(" ".join(map(repr, row)) for row in roof().tolist())
+    halfway = lines[:900] + lines[900:].replace("\n", " ")
+    for number, body in enumerate([words, words.replace(" ", "\n"), "\n\n" + words.replace(" ", "\n  "), halfway]):
         path = tmp_path / f"{number}.ply"
         path.write_text(head + body)
         assert np.array_equal(coordinates(path), roof())

@@ -50,10 +50,10 @@ def _load_rows(lines: Iterator[str], vertex: Element) -> np.ndarray | None:
         return None
     rows = itertools.chain([first], itertools.islice(lines, vertex.count - 1))
     try:
-        points = np.loadtxt(rows, usecols=_columns(vertex), comments=None, ndmin=2)
+        table = np.loadtxt(rows, comments=None, ndmin=2)  # all columns, so that a row of another width shows
     except ValueError:
         return None
-    return points if len(points) == vertex.count else None
+    return table[:, _columns(vertex)] if len(table) == vertex.count else None
 
 
 def _columns(vertex: Element) -> list[int]:
