@@ -121,7 +121,7 @@ class Surface:
 
 
 def distance_to_triangles(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return the distance of p to the triangles a b c, elementwise; all (..., 3)."""
+    """Return the distance of p to the triangles a b c, or segments where b is c, elementwise; all (..., 3)."""
 
     def to_segment(start: Floats, end: Floats) -> Floats:
         along = end - start
@@ -132,7 +132,7 @@ def distance_to_triangles(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
     size = np.maximum((normal * normal).sum(-1), 1e-300)
     second = (np.cross(p - a, c - a) * normal).sum(-1) / size
     third = (np.cross(b - a, p - a) * normal).sum(-1) / size
-    inside = (second >= 0) & (third >= 0) & (second + third <= 1)
+    inside = (second >= 0) & (third >= 0) & (second + third <= 1) & (normal != 0).any(-1)
     above = np.abs(((p - a) * normal).sum(-1)) / np.sqrt(size)
     return np.asarray(
         np.where(inside, above, np.minimum(np.minimum(to_segment(a, b), to_segment(b, c)), to_segment(c, a)))

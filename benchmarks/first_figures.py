@@ -1,0 +1,83 @@
+"""Speed as ratios in one run: the warm run, the first run ever, and the command's help."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from shapes import make
+
+import scantruss as st
+
+from .ratios import Ratio, in_turn
+
+POINTS = 100_000
+LENGTH = 3.2  #: about 1,000 nodes on the scallop [mm]
+NEIGHBOURS = 16
+
+
+def command(*arguments: str, cache: Path | None = None) -> None:
+    """Run the scantruss command of this Python, quietly; `cache` is where its machine code is kept."""
+    environment = dict(os.environ, **({"NUMBA_CACHE_DIR": str(cache)} if cache else {}))
+    run = [sys.executable, "-m", "scantruss", *arguments]
+    subprocess.run(run, check=True, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def warm_run(rounds: int) -> Ratio:
+    """Return the whole run on points in memory against a search of 16 neighbours of each point."""
+    from scipy.spatial import cKDTree
+
+    points = make("scallop", POINTS).points
+    settings = st.Settings(length=LENGTH)
+    grid = st.grid_from_points(points, settings)  # compiles, or loads what was compiled
+    return in_turn(
+        f"grid of {POINTS:,} points, {len(grid.nodes):,} nodes, warm / scipy cKDTree, {NEIGHBOURS} neighbours of each",
+        lambda: st.grid_from_points(points, settings),
+        lambda: cKDTree(points).query(points, k=NEIGHBOURS, workers=2),
+        rounds=rounds,
+        aim=1.0,
+    )
+
+
+def first_run(rounds: int) -> Ratio:
+    """Return the command's first run ever, which compiles, against the same command warm."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scan = folder / "scan.npy"
+        np.save(scan, make("scallop", POINTS).points)
+        grid = ("grid", str(scan), str(folder / "grid.obj"), "--length", str(LENGTH))
+        command(*grid, cache=folder / "warm")
+        fresh = iter(range(rounds))
+        return in_turn(
+            "the first run ever of `scantruss grid` (compiles) / the same command warm",
+            lambda: command(*grid, cache=folder / f"cold{next(fresh)}"),
+            lambda: command(*grid, cache=folder / "warm"),
+            rounds=rounds,
+            aim=12.0,
+        )
+
+
+def help_text(rounds: int) -> Ratio:
+    """Return `scantruss --help` against the import of what the work needs."""
+    imports = [sys.executable, "-c", "import numpy, scipy.spatial, numba"]
+    return in_turn(
+        "`scantruss --help` / `python -c 'import numpy, scipy.spatial, numba'`",
+        lambda: command("--help"),
+        lambda: subprocess.run(imports, check=True),
+        rounds=rounds,
+        aim=0.25,
+    )
+
+
+def first_figures(rounds: int = 7) -> list[Ratio]:
+    """Return the three ratios."""
+    return [warm_run(2 * rounds + 1), first_run(max(rounds // 2, 3)), help_text(rounds)]
+
+
+if __name__ == "__main__":
+    for ratio in first_figures():
+        print(ratio.row())
