@@ -32,12 +32,11 @@ def main() -> None:
     print(FILE.read_text(encoding="utf-8"))
 
 
-NOTE = (
-    "The same clouds and the same code of the front; the other way first fits a bicubic spline with scipy (knots as\n"
-    "dense as helps; only one fit is timed) and looks at that surface instead. Ratio: seconds by way of the surface for\n"
-    "one on the cloud. Distance: mean distance of the nodes from the true surface, in standard deviations of the noise. The\n"
-    "paper's ratios are of its own fitting code; a library of today fits far faster."
-)
+NOTE = """\
+The same clouds and the same code of the front; the other way first fits a bicubic spline with scipy (knots as dense
+as helps; only one fit is timed) and looks at that surface instead. Ratio: seconds by way of the surface for one on
+the cloud. Distance: mean distance of the nodes from the true surface, in standard deviations of the noise. The paper's
+ratios are of its own fitting code; a library of today fits far faster."""
 
 if __name__ == "__main__":
     main()

@@ -16,11 +16,10 @@ PAPER = {  # mean G, std G, std L / mean L
     "limpet": (0.981, 0.028, 0.095),
     "cloth": (0.974, 0.038, 0.119),
 }
-NOTE = (
-    "Mean and standard deviation of G, std L / mean L, mean length in desired lengths, share of inner nodes with six\n"
-    "members, largest distance of the true rim from the grid's rim in members, mean distance of the nodes from the true\n"
-    "surface in standard deviations of the noise. The paper's shells are not public: the clouds are made alike."
-)
+NOTE = """\
+Mean and standard deviation of G, std L / mean L, mean length in desired lengths, share of inner nodes with six members,
+largest distance of the true rim from the grid's rim in members, mean distance of the nodes from the true surface in
+standard deviations of the noise. The paper's shells are not public: the clouds are made alike."""
 
 
 @dataclass(frozen=True)
