@@ -40,6 +40,16 @@ class Grid:
         return ends, np.stack([low[first], high[first]], axis=1), inverse.ravel()
 
     @property
+    def half_edge_edges(self) -> np.ndarray:
+        """(3 T,) the edge of each half-edge; half-edge k of triangle t (from its node k on) stands at k T + t."""
+        return self._half_edges[2]
+
+    @cached_property
+    def edge_uses(self) -> np.ndarray:
+        """(E,) the number of triangles at each member."""
+        return np.bincount(self.half_edge_edges, minlength=len(self.edges))
+
+    @property
     def edges(self) -> np.ndarray:
         """(E, 2) the members, smaller node first, sorted."""
         return self._half_edges[1]
@@ -50,7 +60,7 @@ class Grid:
         _, edges, inverse = self._half_edges
         triangle = np.tile(np.arange(len(self.triangles)), 3)
         order = np.argsort(inverse, kind="stable")
-        count = np.bincount(inverse, minlength=len(edges))
+        count = self.edge_uses
         start = np.cumsum(count) - count
         table = np.full((len(edges), 2), -1, np.int64)
         table[:, 0] = triangle[order[start]]
@@ -62,7 +72,7 @@ class Grid:
     def boundary_loops(self) -> list[np.ndarray]:
         """Ordered node ids of each boundary loop, in the direction of its triangles."""
         ends, edges, inverse = self._half_edges
-        single = np.bincount(inverse, minlength=len(edges))[inverse] == 1
+        single = self.edge_uses[inverse] == 1
         following: dict[int, list[int]] = {}
         for a, b in ends[single].tolist():
             following.setdefault(a, []).append(b)

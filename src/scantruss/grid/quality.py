@@ -56,11 +56,141 @@ class Topology:
         return asdict(self)
 
 
+def shape_qualities(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return G of each triangle, 4 sqrt(3) area / (sum of squared edges): 1 equilateral, 0 degenerate.
+
+    Parameters
+    ----------
+    nodes : (V, 3) float64 [scan unit]
+    triangles : (T, 3) int64
+
+    Returns
+    -------
+    (T,) float64
+    """
+    a, b, c = (nodes[triangles[:, k]] for k in range(3))
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    squares = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).sum(axis=1)
+    return 2 * np.sqrt(3) * doubled / np.where(squares > 0, squares, 1.0)
+
+
+def corner_angles(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the angle of each triangle at each of its nodes, (T, 3) [degree]."""
+    angles = np.empty((len(triangles), 3))
+    for k in range(3):
+        corner, first, second = (nodes[triangles[:, (k + step) % 3]] for step in range(3))
+        u, w = first - corner, second - corner
+        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, w), axis=1), (u * w).sum(axis=1))
+    return np.degrees(angles)
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else 0.0
+
+
 def measure_quality(grid: Grid) -> GridQuality:
     """Return the figures of Table 2 and more; NaN-free, zeros for an empty grid."""
-    raise NotImplementedError
+    edges, lengths = grid.edges, grid.lengths
+    some = len(grid.triangles) > 0
+    shape = shape_qualities(grid.nodes, grid.triangles) if some else np.zeros(1)
+    angles = corner_angles(grid.nodes, grid.triangles) if some else np.zeros(1)
+    lengths = lengths if some else np.zeros(1)
+    valence = np.bincount(edges.ravel(), minlength=len(grid.nodes))
+    interior = valence > 0
+    interior[edges[grid.edge_uses != 2].ravel()] = False
+    mean = float(lengths.mean())
+    deviation = grid.deviation
+    measured = deviation is not None and len(deviation) > 0
+    return GridQuality(
+        shape_mean=float(shape.mean()),
+        shape_std=float(shape.std()),
+        shape_min=float(shape.min()),
+        length_mean=mean,
+        length_std=float(lengths.std()),
+        length_cv=float(lengths.std()) / mean if mean > 0 else 0.0,
+        angle_min=float(angles.min()),
+        angle_max=float(angles.max()),
+        valence6=_mean(valence[interior] == 6),
+        node_deviation_mean=float(np.mean(deviation)) if measured else None,
+        node_deviation_max=float(np.max(deviation)) if measured else None,
+        unit=grid.unit,
+    )
+
+
+def _labels(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return for each of `count` things the smallest thing that the links first-second join it with."""
+    label = np.arange(count)
+    while True:
+        low = np.minimum(label[first], label[second])
+        lowest = label.copy()
+        np.minimum.at(lowest, label[first], low)
+        np.minimum.at(lowest, label[second], low)
+        lowest = lowest[lowest]
+        if np.array_equal(lowest, label):
+            return label
+        label = lowest
+
+
+def _links(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of half-edges that lie on one edge, each half-edge with the next of its edge."""
+    order = np.argsort(grid.half_edge_edges, kind="stable")
+    sorted_edges = grid.half_edge_edges[order]
+    same = np.flatnonzero(sorted_edges[1:] == sorted_edges[:-1])
+    return order[same], order[same + 1]
+
+
+def _is_orientable(grid: Grid) -> bool:
+    """Whether the triangles can be turned so that neighbours run along their edge in opposite directions.
+
+    Each triangle is put on two sheets, as it stands and turned over; links join what agrees. The grid is one-sided if
+    a triangle is joined with itself turned over.
+    """
+    count = len(grid.triangles)
+    one, other = _links(grid)
+    starts = grid.triangles.T.ravel()
+    turned = starts[one] == starts[other]
+    a, b = one % count, other % count
+    label = _labels(2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned]))
+    return not np.any(label[:count] == label[count:])
+
+
+def _count_pinched_nodes(grid: Grid) -> int:
+    """Return the number of nodes whose triangles are more than one fan, joined over edges at the node."""
+    count = len(grid.triangles)
+    corners = grid.triangles.T.ravel()  # corner k of triangle t stands at k * count + t, as does the half-edge k
+    one, other = _links(grid)
+    lower, upper = grid.edges[grid.half_edge_edges[one]].T
+    first, second = [], []
+    for node in (lower, upper):
+        for half, found in ((one, first), (other, second)):
+            starts = corners[half] == node
+            found.append(np.where(starts, half, (half + count) % (3 * count)))
+    label = _labels(3 * count, np.concatenate(first), np.concatenate(second))
+    fans = np.bincount(corners[np.unique(label)], minlength=len(grid.nodes))
+    return int((fans > 1).sum())
 
 
 def measure_topology(grid: Grid) -> Topology:
-    """Return components, loops, Euler number; whether manifold and orientable (both by the triangles alone)."""
-    raise NotImplementedError
+    """Return components, loops, Euler number; whether manifold and orientable (both by the triangles alone).
+
+    Nodes without a triangle do not count. Manifold: no edge has more than two triangles, the triangles at each node
+    are one fan, and no triangle is there twice or has a node twice.
+    """
+    triangles, edges, uses = grid.triangles, grid.edges, grid.edge_uses
+    if len(triangles) == 0:
+        return Topology(components=0, boundary_loops=0, euler=0, manifold=True, orientable=True)
+    node = _labels(len(grid.nodes), edges[:, 0], edges[:, 1])
+    used = np.unique(triangles)
+    rim = edges[uses == 1]
+    rim_label = _labels(len(grid.nodes), rim[:, 0], rim[:, 1])
+    passages = np.bincount(rim.ravel(), minlength=len(grid.nodes)) // 2
+    loops = len(np.unique(rim_label[rim[:, 0]])) + int(np.maximum(passages - 1, 0).sum())
+    a, b, c = np.sort(triangles, axis=1).T
+    whole = not np.any((a == b) | (b == c)) and len(np.unique(np.stack([a, b, c], axis=1), axis=0)) == len(triangles)
+    return Topology(
+        components=len(np.unique(node[used])),
+        boundary_loops=loops,
+        euler=len(used) - len(edges) + len(triangles),
+        manifold=bool(whole and uses.max() <= 2 and _count_pinched_nodes(grid) == 0),
+        orientable=_is_orientable(grid),
+    )

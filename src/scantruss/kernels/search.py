@@ -223,9 +223,15 @@ def is_regular(net: Net, ideal: np.ndarray, v: int, length: float) -> bool:
 
 
 @kernel
-def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, worth: float) -> int:
-    """One round over all nodes that ask for a move; returns how many moves were kept."""
-    kept = scratch.counter[2]
+def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, strain: float, price: float, share: float) -> int:
+    """One round over all nodes that ask for a move; returns how many moves were kept.
+
+    Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`
+    is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added. The `share` of energy that any node has
+    does not count, or nodes would be taken away for being nodes.
+    """
+    kept, free = scratch.counter[2], net.count[0]
+    count = max(len(net.degree) - free, 1)
     for v in range(net.count[1]):
         if net.degree[v] == 0 or scratch.tried[v] == 1 or is_regular(net, scratch.ideal, v, length):
             continue
@@ -246,6 +252,8 @@ def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: S
                 allowed = (choice == 1 or net.kind[a] != net.kind[b]) and may_collapse(net, a, b)
             else:
                 allowed = may_split(net, a, b)
+            half = 0.5 if move == SPLIT else -0.5
+            worth = share + price * (strain - 0.5 * (free - net.count[0] + half) / count)
             if allowed and try_move(net, surface, patches, rim, scratch, move, a, b, length, weight, worth):
                 i = 0
                 if net.degree[v] == 0 or is_regular(net, scratch.ideal, v, length):
