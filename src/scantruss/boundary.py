@@ -109,6 +109,8 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     found: list[tuple[np.ndarray, int]] = []
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
     for loop, piece in boundary_loops(surface, sites.piece, radius, 0.8 * settings.smallest_hole * length):
+        if piece not in sites.pieces:
+            continue
         points = boundary_points(surface, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
         if len(points) < 3:
             continue

@@ -11,6 +11,8 @@ from .errors import FrontError
 from .grid.grid import Grid
 from .kernels import advance as kernels
 from .kernels import front as lists
+from .kernels import gaps
+from .kernels import boxes as boxing
 from .kernels.boxes import new_boxes
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .scan.cloud import PointCloud
@@ -20,6 +22,7 @@ from .settings import Settings
 Progress = Callable[[str, float], None]
 
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
+GAP = 60  # gaps with more segments stay open
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 
@@ -46,26 +49,44 @@ def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, 
         for s in np.flatnonzero(front.state[:count] == lists.WAITING):
             lists.enqueue(front, s)
         front = run(front, sites, numbers, progress)
-    nodes, triangles = int(front.count[lists.NODES]), int(front.count[lists.TRIANGLES])
+    left = close_gaps(front, settings)
+    triangles = front.triangles[: front.count[lists.TRIANGLES]]
+    used, numbered = np.unique(triangles, return_inverse=True)
     return Grid(
-        front.nodes[:nodes].copy(),
-        front.triangles[:triangles].copy(),
-        np.zeros(nodes, np.bool_),
+        front.nodes[used],
+        numbered.reshape(-1, 3).astype(np.int64),
+        np.zeros(len(used), np.bool_),
         cloud.origin,
         cloud.unit,
         settings=settings,
     )
 
 
-def expected_triangles(sites: Sites, settings: Settings) -> int:
-    """Return about how many triangles the cloud will take."""
-    radius = sites.surface.scale[1]
-    return int(len(sites.surface.mean) * 0.75 * radius**2 / (0.433 * settings.length**2)) + 100
+def close_gaps(front: lists.Front, settings: Settings) -> list[np.ndarray]:
+    """Fill what the front has left open; returns the nodes of each loop that stays open, a boundary from now on.
+
+    Loops of the boundary that the front has not reached belong to a gap like every other segment.
+    """
+    loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
+    left = []
+    for s in range(int(front.count[lists.SEGMENTS])):
+        while front.state[s] != lists.GONE:
+            count = gaps.gap_loop(front, s, loop)
+            segments = loop[:count].copy()
+            unreached = (front.state[segments] == lists.INACTIVE).all()
+            if unreached or count > GAP or not gaps.close_gap(front, segments, count, settings.length):
+                left.append(front.tail[segments].copy())
+                before, after = front.previous[segments[0]], front.next[segments[-1]]
+                for t in segments:
+                    lists.remove_segment(front, t)
+                if before != segments[-1]:
+                    lists.link(front, before, after)
+    return left
 
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = sites.surface.mean, 2 * expected_triangles(sites, settings) + 2000
+    mean, room = sites.surface.mean, int(2.0 * sites.area / (0.433 * settings.length**2)) + 2000
     boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), settings.length, room, room)
     return _blank(room, boxes)
 
@@ -81,6 +102,24 @@ def _blank(room: int, boxes: lists.SearchBoxes) -> lists.Front:
     )  # fmt: skip
 
 
+def grown(front: lists.Front) -> lists.Front:
+    """Return the same front with room for twice as much."""
+    old = front.boxes
+    room = 2 * len(front.nodes)
+    boxes = new_boxes(old.lower, old.lower + old.size * (old.counts - 1), float(old.size.max()), room, room)
+    larger = _blank(room, boxes)
+    for name in lists.Front._fields[:-3]:
+        kept = getattr(front, name)
+        getattr(larger, name)[: len(kept)] = kept
+    waiting = front.queue[np.arange(front.count[lists.FIRST], front.count[lists.LAST]) % len(front.queue)]
+    larger.queue[: len(waiting)] = waiting
+    larger.count[:] = front.count
+    larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
+    for n in range(int(front.count[lists.NODES])):
+        boxing.put(boxes, n, *larger.nodes[n])
+    return larger
+
+
 def start_front(front: lists.Front, boundary: Boundary, settings: Settings) -> lists.Front:
     """Put the initial front into the lists: the boundary loops, and a seed triangle on every closed piece."""
     surface = boundary.sites.surface
@@ -90,9 +129,8 @@ def start_front(front: lists.Front, boundary: Boundary, settings: Settings) -> l
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
     bounded = {loop.piece for loop in boundary.loops}
     piece = boundary.sites.piece
-    least = 4.0 * 0.433 * settings.length**2 / (0.75 * surface.scale[1] ** 2)
-    for number, size in enumerate(np.bincount(piece)):
-        if number not in bounded and size >= least:
+    for number in boundary.sites.pieces:
+        if number not in bounded:
             add_seed(front, surface, int(np.flatnonzero(piece == number)[0]), settings.length)
     return front
 
@@ -139,12 +177,15 @@ def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 
 def run(front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None) -> lists.Front:
     """Advance until no active segment is left; arrays grow as needed."""
-    expected = 2.2 * sites.surface.scale[1] ** 2 * len(sites.surface.mean) / numbers[kernels.LENGTH] ** 2
+    expected = sites.area / (0.433 * numbers[kernels.LENGTH] ** 2)
     while True:
         status = kernels.advance(sites.surface, front, numbers, BUDGET)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:
             return front
+        if front.count[lists.TRIANGLES] > 4 * expected + 1000:
+            where = tuple(float(c) for c in front.nodes[front.count[lists.NODES] - 1])
+            raise FrontError("the front runs over itself: the scan is too rough or too sparse for this length", where=where)
         if status == lists.FULL:
-            raise FrontError("the front has outgrown its arrays")
+            front = grown(front)

@@ -30,7 +30,7 @@ from .vectors import Vector, across, along, cross, dot, norm, row, subtract, uni
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
-NEAR = 64  # most front nodes looked at in one step
+NEAR = 400  # most front nodes looked at in one step
 
 
 class Front(NamedTuple):
@@ -211,7 +211,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
     if facing < -0.5 and flat > 0.7:
         return False
     place = along(row(front.nodes, a), 0.5, d)
-    return linked(surface, front.site[a], front.site[q], place, 0.6 * far + 1.5 * surface.scale[1])
+    return linked(surface, front.site[a], front.site[q], place, 0.6 * far + 1.5 * surface.scale[4])
 
 
 @kernel

@@ -26,7 +26,7 @@ class Surface(NamedTuple):
     mean: np.ndarray  #: (S, 3) mean of the points of each site
     normals: np.ndarray  #: (S, 3) oriented unit normals
     neighbors: np.ndarray  #: (S, K) nearest sites on the same sheet, -1 at the end
-    scale: np.ndarray  #: (4,) member length, thinning radius, radius of a patch, most points of a site that a patch uses
+    scale: np.ndarray  #: (5,) member length, thinning radius, radius of a patch, most points of a site in a patch, step from site to site
     stamp: np.ndarray  #: (S,) int64 scratch of `flood`
     queue: np.ndarray  #: (S,) int64 scratch of `flood`
     counter: np.ndarray  #: (1,) int64 number of the last flood
@@ -119,7 +119,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
     patch[15] = site
     taken = 0
     while True:
-        count = flood(surface, site, place, radius + surface.scale[1])
+        count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
         if count < 1:
             count = 1
         buffer = np.empty((most * count, 5))

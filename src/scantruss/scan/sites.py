@@ -26,6 +26,8 @@ class Sites:
     boxes: SearchBoxes  #: the sites by box
     piece: np.ndarray  #: (S,) int64 number of the connected piece of each site, the largest piece is 0
     spacing: float  #: typical distance between neighbouring points [scan unit]
+    area: float  #: rough area of the scanned surface [scan unit^2]
+    pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
 
 
 _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float], Sites]] = weakref.WeakKeyDictionary()
@@ -87,10 +89,12 @@ def _prepare(points: np.ndarray, length: float, box_size: float) -> Sites:
     smoothed = np.empty_like(normals)
     kernels.smooth_normals(normals, neighbors, 0.7, smoothed)
     _face_outside(mean, smoothed, piece)
-    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), 24.0])
+    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), 24.0, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
-    return Sites(surface, boxes, _number(piece), spacing)
+    piece = _number(piece)
+    area = _site_areas(surface)
+    return Sites(surface, boxes, piece, spacing, float(area.sum()), _large_pieces(piece, area, length))
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -136,6 +140,24 @@ def _number(piece: np.ndarray) -> np.ndarray:
     rank = np.empty(len(counts), np.int64)
     rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
     return rank[inverse.ravel()]
+
+
+def _site_areas(surface: Surface) -> np.ndarray:
+    """Rough area around each site (S,): that of a disc through its neighbours over their number [scan unit^2]."""
+    linked = surface.neighbors >= 0
+    count = linked.sum(axis=1)
+    last = surface.neighbors[np.arange(len(count)), np.maximum(count - 1, 0)]
+    reach = ((surface.mean[last] - surface.mean) ** 2).sum(axis=1)
+    return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
+
+
+def _large_pieces(piece: np.ndarray, area: np.ndarray, length: float) -> tuple[int, ...]:
+    """Pieces that are not debris: room for some twenty triangles, and a hundredth of the largest."""
+    count = np.bincount(piece)
+    total = np.bincount(piece, area)
+    large = (total >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
+    large[0] = True
+    return tuple(int(i) for i in np.flatnonzero(large))
 
 
 def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
