@@ -76,12 +76,12 @@ def grid_from_cloud(
     read_seconds : float
         What reading took [s], for the table of times.
     """
+    started = perf_counter()
+    check_length(cloud, settings)
     from .boundary import find_boundary
     from .front import advance_front
     from .grid.optimize import optimize_grid
 
-    started = perf_counter()
-    check_length(cloud, settings)
     checked = perf_counter()
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
