@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import grid as kernels
-from ..kernels.equalize import seat_nodes
+from ..kernels.equalize import measure_deviation, seat_nodes
 from ..kernels.grid import INTERIOR, LOCKED, REST, RIM, Net
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
@@ -21,6 +21,66 @@ def no_rim() -> Rim:
     return Rim(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
 
 
+def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
+    """Take a grid apart into rings of neighbours.
+
+    A node whose triangles are several fans becomes several nodes of the net; these and the nodes of seams (edges that do
+    not have two triangles of one orientation, yet are no boundary) are LOCKED. Boundary nodes and fixed nodes are at REST.
+
+    Returns
+    -------
+    Net
+    (C,) int64 : node of the grid that each node of the net stands for, -1 where there is none yet
+    """
+    count = len(grid.nodes)
+    corner_node, partner = _half_edges(grid.triangles, count)
+    valence = int(np.bincount(grid.edges.ravel(), minlength=1).max()) if len(grid.edges) else 0
+    most = count + int((partner < 0).sum())  # every fan more than one at a node is open
+    capacity = most + len(grid.triangles) // 4 + 64
+    net = Net(
+        nodes=np.zeros((capacity, 3)),
+        ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
+        degree=np.zeros(capacity, np.int64),
+        is_open=np.zeros(capacity, np.int64),
+        kind=np.full(capacity, INTERIOR, np.int64),
+        curve=np.full(capacity, -1, np.int64),
+        arc=np.zeros(capacity),
+        free=np.zeros(capacity, np.int64),
+        count=np.zeros(2, np.int64),
+    )
+    source = np.full(capacity, -1, np.int64)
+    used = kernels.fill_rings(corner_node, partner, net.ring, net.degree, net.is_open, source, count)
+    net.nodes[:used] = grid.nodes[source[:used]]
+    spare = np.arange(capacity - 1, used - 1, -1)
+    net.free[: len(spare)] = spare
+    net.count[:] = len(spare), used
+    net.kind[:used][net.is_open[:used] == 1] = REST
+    net.kind[:count][grid.fixed] = REST
+    several = np.bincount(source[:used], minlength=count) > 1
+    ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
+    twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
+    net.kind[:used][several[source[:used]] | twice] = LOCKED
+    return net, source
+
+
+def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | None = None) -> Grid:
+    """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped.
+
+    `deviation` (C,) is the distance of each node of the net from the scan [scan unit].
+    """
+    used = int(net.count[1])
+    room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
+    triangles = room[: kernels.list_triangles(net, room)]
+    merged = np.where(source[:used] >= 0, source[:used], np.arange(used))
+    kept, inverse = np.unique(merged[triangles], return_inverse=True)
+    return grid.replace(
+        nodes=np.ascontiguousarray(net.nodes[kept]),
+        triangles=inverse.reshape(-1, 3).astype(np.int64),
+        fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
+        deviation=None if deviation is None else deviation[kept],
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Relief:
     """What the improvement works on: the net, the scan below it, its boundary curves."""
@@ -29,6 +89,7 @@ class Relief:
     source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 new
     surface: Surface
     patches: np.ndarray  #: (C, PATCH) local surface of each node
+    fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
     length: float  #: desired member length [scan unit]
 
@@ -36,79 +97,42 @@ class Relief:
     def from_grid(cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float) -> Relief:
         """Take a grid apart; every node finds its place on the scan and on the boundary curves.
 
+        Boundary nodes slide along the nearest curve; corners and nodes far from every curve stay at rest.
+
         Parameters
         ----------
         grid : Grid
         surface : Surface
         rim : Rim
-        corners : (K, 3) float64 corners of the boundary; boundary nodes at them stay at rest [scan unit]
+        corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
         """
-        corner_node, partner = _half_edges(grid.triangles, len(grid.nodes))
-        valence = int(np.bincount(grid.edges.ravel(), minlength=1).max()) if len(grid.edges) else 0
-        capacity = len(grid.nodes) + len(corner_node) // 3 // 2 + 64
-        net = Net(
-            nodes=np.zeros((capacity, 3)),
-            ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
-            degree=np.zeros(capacity, np.int64),
-            is_open=np.zeros(capacity, np.int64),
-            kind=np.full(capacity, INTERIOR, np.int64),
-            curve=np.full(capacity, -1, np.int64),
-            arc=np.zeros(capacity),
-            free=np.zeros(capacity, np.int64),
-            count=np.zeros(2, np.int64),
-        )
-        source = np.full(capacity, -1, np.int64)
-        used = kernels.fill_rings(corner_node, partner, net.ring, net.degree, net.is_open, source, len(grid.nodes))
-        net.nodes[:used] = grid.nodes[source[:used]]
-        spare = np.arange(capacity - 1, used - 1, -1)
-        net.free[: len(spare)] = spare
-        net.count[:] = len(spare), used
-        relief = cls(net, source, surface, np.zeros((capacity, PATCH)), rim, length)
-        relief._hold_boundary(corners)
-        relief._hold_defects(len(grid.nodes))
-        net.kind[: len(grid.nodes)][grid.fixed & (net.kind[: len(grid.nodes)] != LOCKED)] = REST
-        seat_nodes(net, surface, relief.patches, length)
-        return relief
+        net, source = open_net(grid)
+        rim = Rim(*(np.ascontiguousarray(array) for array in rim))
+        used = int(net.count[1])
+        fixed = np.zeros(len(net.degree), np.bool_)
+        fixed[: len(grid.fixed)] = grid.fixed
+        for v in np.flatnonzero((net.is_open[:used] == 1) & (net.kind[:used] == REST)).tolist():
+            curve, arc, distance = nearest_on_rim(rim, *net.nodes[v].tolist())
+            if curve < 0 or distance > 0.5 * length:
+                continue
+            net.curve[v], net.arc[v] = curve, arc
+            at_corner = len(corners) and np.min(((corners - net.nodes[v]) ** 2).sum(axis=1)) <= (1e-6 * length) ** 2
+            if not at_corner and not fixed[v]:
+                net.kind[v] = RIM
+        patches = np.zeros((len(net.degree), PATCH))
+        seat_nodes(net, surface, patches, length)
+        return cls(net, source, surface, patches, fixed, rim, length)
 
-    def _hold_boundary(self, corners: np.ndarray) -> None:
-        """Boundary nodes slide along the nearest curve; corners and nodes far from every curve are at rest."""
-        net = self.net
-        for v in np.flatnonzero(net.is_open).tolist():
-            curve, arc, distance = nearest_on_rim(self.rim, *net.nodes[v])
-            near = curve >= 0 and distance <= 0.5 * self.length
-            net.kind[v] = RIM if near else REST
-            net.curve[v], net.arc[v] = (curve, arc) if near else (-1, 0.0)
-            if len(corners) and np.min(((corners - net.nodes[v]) ** 2).sum(axis=1)) <= (1e-6 * self.length) ** 2:
-                net.kind[v] = REST
-
-    def _hold_defects(self, count: int) -> None:
-        """Nodes with several fans and nodes on a seam stay as they are."""
-        net, used = self.net, int(self.net.count[1])
-        several = np.bincount(self.source[:used], minlength=count) > 1
-        net.kind[:used][several[self.source[:used]]] = LOCKED
-        ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
-        twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
-        net.kind[:used][twice] = LOCKED
+    def deviation(self) -> np.ndarray:
+        """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
+        values = np.zeros(len(self.net.degree))
+        measure_deviation(self.net, self.surface, self.patches, 0.05 * self.length, values)
+        return values
 
     def to_grid(self, grid: Grid) -> Grid:
-        """Put the net together again, with all else as in `grid`; nodes without a triangle are dropped."""
-        net, used = self.net, int(self.net.count[1])
-        room = np.empty((2 * int(net.degree[:used].sum()) + 1, 3), np.int64)
-        triangles = room[: kernels.list_triangles(net, room)]
-        merged = np.arange(used)
-        copies = np.flatnonzero(self.source[:used] >= 0)
-        merged[copies] = self.source[copies]
-        triangles = merged[triangles]
-        kept, inverse = np.unique(triangles, return_inverse=True)
-        fixed = np.zeros(used, bool)
-        fixed[: len(grid.fixed)] = grid.fixed
-        return grid.replace(
-            nodes=np.ascontiguousarray(net.nodes[kept]),
-            triangles=np.ascontiguousarray(inverse.reshape(-1, 3).astype(np.int64)),
-            fixed=fixed[kept],
-            deviation=None,
-        )
+        """Put the net together again, with all else as in `grid`; deviation measured."""
+        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), self.deviation())
 
 
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

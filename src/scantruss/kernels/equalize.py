@@ -163,3 +163,14 @@ def seat_nodes(net: Net, surface: Surface, patches: np.ndarray, length: float) -
                     patches[u, 15] = site
                     queue[count] = u
                     count += 1
+
+
+@kernel
+def measure_deviation(net: Net, surface: Surface, patches: np.ndarray, near: float, deviation: np.ndarray) -> None:
+    """Distance of each node from the scanned surface, fitted around it anew unless its patch is centred within `near`."""
+    for v in range(net.count[1]):
+        if net.degree[v] > 0:
+            place = row(net.nodes, v)
+            if norm(subtract(place, row(patches, v))) > near:
+                fit_patch(surface, patches[v], int(patches[v, 15]), place)
+            deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))

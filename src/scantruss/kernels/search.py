@@ -17,7 +17,6 @@ from .vectors import cross, dot, norm, row, subtract
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
 TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
 SWEEPS = 3
-MOST = 120  # nodes in one neighbourhood
 
 
 class Scratch(NamedTuple):
@@ -26,16 +25,16 @@ class Scratch(NamedTuple):
     mark: np.ndarray  #: (C,) int64 number of the trial that holds the node
     ideal: np.ndarray  #: (C,) int64 neighbours that suit the node: 6 inside, by its angle on the boundary
     tried: np.ndarray  #: (C,) int64, 1 where nothing has changed around the node since it was tried
-    around: np.ndarray  #: (MOST,) int64 nodes that may move
-    nodes: np.ndarray  #: (MOST, 4) their places and arcs before
-    ring: np.ndarray  #: (MOST, W) their rings before
-    degree: np.ndarray  #: (MOST,) int64
+    around: np.ndarray  #: (C,) int64 nodes that may move
+    nodes: np.ndarray  #: (C, 4) their places and arcs before
+    ring: np.ndarray  #: (C, W) their rings before
+    degree: np.ndarray  #: (C,) int64
     counter: np.ndarray  #: (3,) int64 trials made; nodes around; trials that paid
     slope: np.ndarray  #: (3,) scratch of `settle_node`
 
 
 @kernel
-def gather(net: Net, scratch: Scratch, a: int, b: int) -> bool:
+def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
     """List the nodes around the edge a-b: its quadrangle and all their neighbours, as they are now."""
     scratch.counter[0] += 1
     stamp = scratch.counter[0]
@@ -51,8 +50,6 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> bool:
         for j in range(net.degree[v]):
             u = net.ring[v, j]
             if scratch.mark[u] != stamp:
-                if count >= MOST - 1:
-                    return False
                 scratch.mark[u] = stamp
                 scratch.around[count] = u
                 count += 1
@@ -64,7 +61,6 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> bool:
         for j in range(net.degree[v]):
             scratch.ring[i, j] = net.ring[v, j]
     scratch.counter[1] = count
-    return True
 
 
 @kernel
@@ -168,8 +164,9 @@ def try_move(
     `worth` is what one more node may cost. Moves that bring the numbers of neighbours far from the ideal never pay (tried: none of
     5,000), and are not made.
     """
-    if disorder(net, scratch.ideal, move, a, b) > TOLERATED[move] or not gather(net, scratch, a, b):
+    if disorder(net, scratch.ideal, move, a, b) > TOLERATED[move]:
         return False
+    gather(net, scratch, a, b)
     before = local_energy(net, scratch, length, weight)
     added = -1
     if move == FLIP:
@@ -275,3 +272,23 @@ def suit_nodes(net: Net, ideal: np.ndarray) -> None:
                 if n > 0.0 or d != 0.0:
                     angle += math.atan2(n, d)
             ideal[v] = max(2, int(math.floor(3.0 * angle / math.pi + 0.5)) + 1)
+
+
+@kernel
+def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
+    """Energy of the whole grid, mean length of its members, and its nodes."""
+    scratch.counter[0] += 1
+    count = members = 0
+    total = 0.0
+    for v in range(net.count[1]):
+        if net.degree[v] > 0:
+            scratch.mark[v] = scratch.counter[0]
+            scratch.around[count] = v
+            count += 1
+            for i in range(net.degree[v]):
+                u = net.ring[v, i]
+                if v < u:
+                    members += 1
+                    total += norm(subtract(row(net.nodes, u), row(net.nodes, v)))
+    scratch.counter[1] = count
+    return local_energy(net, scratch, length, weight), total / max(members, 1), count

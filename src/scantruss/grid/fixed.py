@@ -1,0 +1,184 @@
+"""Fixed nodes: nodes at appointed positions (Sec. 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.equalize import nearest_site
+from ..kernels.grid import REST, RIM, Net, may_split, split
+from ..kernels.rim import nearest_on_rim
+from ..kernels.search import Scratch, total_energy
+from ..kernels.surface import Surface
+from ..scan.cloud import PointCloud
+from .equalize import WEIGHT, new_scratch, search_once, settle
+from .relief import Relief
+
+AT_RIM = 0.3  # a position this near to the boundary becomes a boundary node, in lengths
+SAME = 1e-6  # a node this near already stands there, in lengths
+CHOICES = 3  # nodes, and edges, that are tried
+
+
+def check_positions(
+    fixed: Sequence[Sequence[float]] | np.ndarray, cloud: PointCloud, surface: Surface, length: float
+) -> np.ndarray:
+    """Return fixed positions relative to the cloud's origin, (K, 3) [scan unit].
+
+    Raises
+    ------
+    InputError
+        Not three finite numbers each; farther than length / 2 from the scan; closer than length / 2 to another.
+    """
+    try:
+        places = np.asarray(fixed, float).reshape(-1, 3) if len(fixed) else np.zeros((0, 3))
+    except (TypeError, ValueError):
+        raise InputError(f"fixed positions must have shape (K, 3), got {fixed!r}") from None
+    if not np.isfinite(places).all():
+        raise InputError("fixed positions must be finite numbers; leave out those that are not")
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    relative = places - cloud.origin
+    for k, place in enumerate(relative):
+        distance = _distance_from_scan(surface, place)
+        if distance > 0.5 * length:
+            raise InputError(
+                f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
+                f" it must lie within half a member, {0.5 * length:.4g}{unit}"
+            )
+        gaps = np.linalg.norm(relative[:k] - place, axis=1)
+        if k and gaps.min() < 0.5 * length * (1 - 1e-9):
+            other = places[int(gaps.argmin())]
+            raise InputError(
+                f"fixed positions {_text(other)} and {_text(places[k])} are {gaps.min():.4g}{unit} apart;"
+                f" they need half a member, {0.5 * length:.4g}{unit}"
+            )
+    return relative
+
+
+def _text(place: np.ndarray) -> str:
+    return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
+
+
+def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
+    """Distance of a place from the nearest point of the scan."""
+    squares = ((surface.mean - place) ** 2).sum(axis=1)
+    reach = np.sqrt(squares.min()) + 2.0 * surface.scale[1]
+    best = np.inf
+    for site in np.flatnonzero(squares <= reach * reach):
+        points = surface.points[surface.start[site] : surface.start[site + 1]]
+        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
+    return float(np.sqrt(best))
+
+
+def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
+    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it."""
+    net = relief.net
+    free = (net.degree > 0) & (net.kind < REST)
+    curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
+    if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & (net.kind == RIM)):
+        free &= net.kind == RIM
+    nodes = np.flatnonzero(free)
+    order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")
+    return nodes[order]
+
+
+def _node_at(relief: Relief, place: np.ndarray) -> int:
+    """Node that stands at a place already, -1 where there is none."""
+    net = relief.net
+    squares = np.where(net.degree > 0, ((net.nodes - place) ** 2).sum(axis=1), np.inf)
+    v = int(squares.argmin())
+    return v if squares[v] <= (SAME * relief.length) ** 2 else -1
+
+
+def _put_node(relief: Relief, v: int, place: np.ndarray) -> None:
+    """Move a node to an appointed position, where it rests from now on."""
+    net = relief.net
+    if net.kind[v] == RIM:
+        net.curve[v], net.arc[v], _ = nearest_on_rim(relief.rim, *place.tolist())
+    net.nodes[v] = place
+    net.kind[v] = REST
+    relief.fixed[v] = True
+
+
+def fix_nearest_nodes(relief: Relief, positions: np.ndarray) -> None:
+    """Move the node nearest to each position there, as the paper does (Sec. 4.2); all else is left to the smoothing."""
+    for place in positions:
+        v = _node_at(relief, place)
+        nodes = _candidates(relief, place)
+        if v < 0 and len(nodes):
+            v = int(nodes[0])
+        if v >= 0:
+            _put_node(relief, v, place)
+
+
+def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
+    """Make a node at each position, by whatever disturbs the grid least.
+
+    Moving one of the nearest nodes and splitting one of the nearest edges are tried in turn; after each the grid around is
+    settled and searched, and the way with the least energy is kept.
+    """
+    if not len(positions):
+        return
+    scratch = new_scratch(relief)
+    scratch.tried[:] = 1
+    for place in positions:
+        if (v := _node_at(relief, place)) >= 0:
+            _put_node(relief, v, place)
+            continue
+        start, best, least = _copy(relief), None, np.inf
+        for way in _ways(relief, place):
+            _restore(relief, start)
+            _take(relief, scratch, way, place)
+            energy = total_energy(relief.net, scratch, relief.length, WEIGHT)[0]
+            if energy < least:
+                best, least = _copy(relief), energy
+        if best is None:
+            raise InputError(f"the grid has no node that could be moved to {_text(place)}; use a smaller length")
+        _restore(relief, best)
+
+
+def _ways(relief: Relief, place: np.ndarray) -> list[tuple[int, int]]:
+    """Ways to a node at a place: (node, -1) to be moved, (a, b) an edge to be split."""
+    net = relief.net
+    nodes = _candidates(relief, place)[:CHOICES].tolist()
+    edges = []
+    for a in nodes:
+        for b in net.ring[a, : net.degree[a]].tolist():
+            if may_split(net, a, b) and (b, a) not in edges:
+                edges.append((a, b))
+    on_rim = [net.kind[v] == RIM for v in nodes[:1]]
+    if on_rim == [True]:
+        edges = [(a, b) for a, b in edges if net.curve[a] >= 0 and net.curve[a] == net.curve[b]]
+    middle = [((0.5 * (net.nodes[a] + net.nodes[b]) - place) ** 2).sum() for a, b in edges]
+    order = np.argsort(middle, kind="stable")[:CHOICES]
+    return [(v, -1) for v in nodes] + [edges[i] for i in order]
+
+
+def _take(relief: Relief, scratch: Scratch, way: tuple[int, int], place: np.ndarray) -> None:
+    """Make a node at a place in one way, and improve the grid around it."""
+    net = relief.net
+    v, b = way
+    if b >= 0:
+        a, v = v, split(net, v, b)
+        relief.patches[v] = relief.patches[a]
+        relief.patches[v, 15] = nearest_site(relief.surface, *place.tolist())
+        scratch.ideal[v] = 4 if net.is_open[v] else 6
+    _put_node(relief, v, place)
+    around = {v}
+    for _ in range(2):
+        around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
+    scratch.tried[sorted(around)] = 0
+    for _ in range(3):
+        settle(relief, WEIGHT, 0.5, 1e-3, 6)
+        if search_once(relief, scratch) == 0:
+            break
+
+
+def _copy(relief: Relief) -> tuple[np.ndarray, ...]:
+    return tuple(array.copy() for array in (*relief.net, relief.patches, relief.fixed))
+
+
+def _restore(relief: Relief, kept: tuple[np.ndarray, ...]) -> None:
+    for array, value in zip((*relief.net, relief.patches, relief.fixed), kept, strict=True):
+        array[:] = value

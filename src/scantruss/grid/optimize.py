@@ -1,0 +1,88 @@
+"""Grid optimization and adjustment (Sec. 4): what happens to a grid after the front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.flips import flip_by_angle
+from .equalize import equalize, finish
+from .fixed import check_positions, fix_nearest_nodes, fix_nodes
+from .flips import FOLD, ROUNDS
+from .grid import Grid
+from .relief import Relief
+from .smoothing import smooth
+
+if TYPE_CHECKING:
+    from ..boundary import Boundary
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
+Progress = Callable[[str, float], None]
+
+
+def optimize_grid(
+    grid: Grid,
+    cloud: PointCloud,
+    settings: Settings,
+    fixed: Sequence[Sequence[float]] | np.ndarray | None = None,
+    *,
+    boundary: Boundary | None = None,
+    progress: Progress | None = None,
+) -> Grid:
+    """Return a grid with better triangles and more even members, on the scan, with nodes at the fixed positions.
+
+    Parameters
+    ----------
+    grid : Grid
+        What the front has left.
+    cloud : PointCloud
+        The scan it lies on, of the same origin.
+    settings : Settings
+        `method`: "paper" is Sec. 4 to the letter, "default" equalizes and searches.
+    fixed : (K, 3), optional
+        Positions that must become nodes, in the scan's own frame [scan unit]; `settings.fixed` if left out.
+    boundary : Boundary, optional
+        Boundary of the cloud; found anew if left out.
+    progress : callable, optional
+        Called with ("optimize", share); may raise to stop.
+
+    Returns
+    -------
+    Grid
+        With `before`, the quality of `grid`, and `deviation`. The topology is that of `grid`.
+
+    Raises
+    ------
+    InputError
+        A fixed position is farther than half a member from the scan or closer than that to another.
+    """
+    from ..boundary import find_boundary
+    from ..scan.sites import surface_of
+
+    surface = surface_of(cloud, settings)
+    positions = check_positions(settings.fixed if fixed is None else fixed, cloud, surface, settings.length)
+    if len(grid.triangles) == 0:
+        return grid.replace(settings=settings, before=grid.quality)
+    if boundary is None:
+        boundary = find_boundary(cloud, settings)
+    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
+    before = relief.to_grid(grid).quality
+    report = (lambda share: progress("optimize", share)) if progress else None
+    if report:
+        report(0.1)
+    if settings.method == "paper":
+        flip_by_angle(relief.net, FOLD, ROUNDS)
+        if len(positions):
+            fix_nearest_nodes(relief, positions)
+            flip_by_angle(relief.net, FOLD, ROUNDS)
+        smooth(relief, settings)
+    else:
+        equalize(relief, report)
+        fix_nodes(relief, positions)
+        finish(relief)
+    if report:
+        report(1.0)
+    return relief.to_grid(grid).replace(settings=settings, before=before)

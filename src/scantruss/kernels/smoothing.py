@@ -1,0 +1,78 @@
+"""One pass of Taubin's smoothing, and the figures that its stops look at (Sec. 4.1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .compile import kernel
+from .equalize import ROOT
+from .grid import INTERIOR, RIM, Net
+from .rim import Rim, slide
+from .surface import Surface, onto_surface
+from .vectors import cross, dot, norm, row, subtract
+
+
+@kernel
+def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
+    """Move every free node by `factor` of the way to the middle of its neighbours; on the rim, of its two neighbours there.
+
+    All nodes move at once: `before` (C, 3) gets the places from which they start.
+    """
+    used = net.count[1]
+    before[:used] = net.nodes[:used]
+    for v in range(used):
+        d = net.degree[v]
+        if d == 0 or net.kind[v] > RIM:
+            continue
+        step = 1 if net.kind[v] == INTERIOR else d - 1
+        x = y = z = 0.0
+        for i in range(0, d, step):
+            u = net.ring[v, i]
+            x, y, z = x + before[u, 0], y + before[u, 1], z + before[u, 2]
+        count = d if step == 1 else 2
+        net.nodes[v, 0] += factor * (x / count - before[v, 0])
+        net.nodes[v, 1] += factor * (y / count - before[v, 1])
+        net.nodes[v, 2] += factor * (z / count - before[v, 2])
+
+
+@kernel
+def return_to_scan(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float) -> None:
+    """Bring every free node back: onto the scanned surface, or onto its boundary curve."""
+    for v in range(net.count[1]):
+        x, y, z = row(net.nodes, v)
+        if net.degree[v] > 0 and net.kind[v] == INTERIOR:
+            x, y, z = onto_surface(surface, patches, v, x, y, z)
+        elif net.degree[v] > 0 and net.kind[v] == RIM:
+            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], 0.5 * length, x, y, z)
+        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
+
+
+@kernel
+def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
+    """Mean shape quality of the triangles, standard deviation of the member lengths, mean way of the nodes from their start (C, 3)."""
+    shape = total = squares = moved = 0.0
+    triangles = members = count = 0
+    for v in range(net.count[1]):
+        d = net.degree[v]
+        if d == 0:
+            continue
+        count += 1
+        here = row(net.nodes, v)
+        moved += norm(subtract(here, row(start, v)))
+        for i in range(d):
+            u, w = net.ring[v, i], net.ring[v, (i + 1) % d]
+            a, b = subtract(row(net.nodes, u), here), subtract(row(net.nodes, w), here)
+            if v < u:
+                members += 1
+                total += norm(a)
+                squares += dot(a, a)
+            if v < u and v < w and i < d - net.is_open[v]:
+                triangles += 1
+                c = subtract(b, a)
+                edges = dot(a, a) + dot(b, b) + dot(c, c)
+                if edges > 0.0:
+                    shape += 0.5 * ROOT * norm(cross(a, b)) / edges
+    mean = total / max(members, 1)
+    return shape / max(triangles, 1), math.sqrt(max(squares / max(members, 1) - mean * mean, 0.0)), moved / max(count, 1)
