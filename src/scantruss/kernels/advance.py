@@ -91,6 +91,8 @@ def choose_by_quality(surface: Surface, front: Front, s: int, numbers: np.ndarra
     score = np.full(near + 1, -1.0)
     for i in range(near):
         q = found[i]
+        if front.out[q] < 0:
+            continue
         pq = row(front.nodes, q)
         value = quality(pa, pb, pq, side, numbers[SHAPE], numbers[SIZE])
         if q == c or q == d:
@@ -100,7 +102,7 @@ def choose_by_quality(surface: Surface, front: Front, s: int, numbers: np.ndarra
             score[i] = 0.9 * value
     if propose_on_surface(surface, front, s, place, patch):
         pp = row(front.nodes, front.count[NODES])
-        if far_from_front(front, s, pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1):
+        if far_from_front(front, s, pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1, length):
             score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
     for _ in range(near + 1):
         best = -1

@@ -216,14 +216,17 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
 
 @kernel
 def near_nodes(surface: Surface, front: Front, s: int, reach: float, length: float, found: np.ndarray) -> int:
-    """Nodes of the front within reach of the middle of a segment, on its sheet; returns their number."""
+    """Nodes within reach of the middle of a segment, on its sheet; returns their number.
+
+    Finished nodes are among them: a front that has gone astray must not run over them.
+    """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     count = search(front.boxes, front.nodes, 0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]), reach, found)
     kept = 0
     for i in range(count):
         q = found[i]
-        if q != a and q != b and front.out[q] >= 0 and (same_sheet(surface, front, a, q, length) or same_sheet(surface, front, b, q, length)):
+        if q != a and q != b and (same_sheet(surface, front, a, q, length) or same_sheet(surface, front, b, q, length)):
             found[kept] = q
             kept += 1
     return kept
@@ -337,7 +340,7 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
         if q != p and i < near:
             if inside_triangle(q2, a2, b2, p2):
                 return False
-            if room > 0.0 and q != front.tail[front.previous[s]] and q != front.head[front.next[s]]:
+            if room > 0.0 and front.out[q] >= 0 and q != front.tail[front.previous[s]] and q != front.head[front.next[s]]:
                 if distance_to_segment(pq, pa, pp) < room or distance_to_segment(pq, pb, pp) < room:
                     return False
         t = front.out[q]
@@ -354,7 +357,7 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
 
 
 @kernel
-def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: int, least: float) -> bool:
+def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float) -> bool:
     """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
@@ -363,6 +366,6 @@ def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: in
             if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
                 return False
             t = front.out_next[t]
-        if i < near and norm(subtract(pp, row(front.nodes, q))) < least:
+        if i < near and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, 0.45 * length)):
             return False
     return True
