@@ -41,10 +41,12 @@ def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, 
             settings.size_weight,
             settings.search_range * sites.spacing,
             1.0,
+            float(settings.method == "paper"),
+            float(settings.case3 == "quadrangle"),
         ]
     )
     for strict in STRICTNESS:
-        numbers[kernels.STRICT] = strict
+        numbers[lists.STRICT] = strict
         count = int(front.count[lists.SEGMENTS])
         for s in np.flatnonzero(front.state[:count] == lists.WAITING):
             lists.enqueue(front, s)
@@ -177,7 +179,7 @@ def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 
 def run(front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None) -> lists.Front:
     """Advance until no active segment is left; arrays grow as needed."""
-    expected = sites.area / (0.433 * numbers[kernels.LENGTH] ** 2)
+    expected = sites.area / (0.433 * numbers[lists.LENGTH] ** 2)
     while True:
         status = kernels.advance(sites.surface, front, numbers, BUDGET)
         if progress:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from .cases import choose_by_case
 from .compile import kernel
 from .front import (
     ACTIVE,
@@ -13,11 +14,18 @@ from .front import (
     FIRST,
     FULL,
     LAST,
+    LENGTH,
     MORE,
     NEAR,
+    NEARNESS,
     NODES,
+    PAPER,
     SEGMENTS,
+    SHAPE,
+    SIZE,
+    STRICT,
     TRIANGLES,
+    W1,
     WAITING,
     Front,
     add_node,
@@ -30,17 +38,8 @@ from .front import (
     right_angle,
 )
 from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
-from .triangles import quality, shape_quality, turned
-from .vectors import Vector, along, dot, norm, row, subtract, unit
-
-LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT = 0, 1, 2, 3, 4, 5, 6, 7  # places in `numbers`
-
-
-@kernel
-def reach(length: float, segment: float, w1: float) -> float:
-    """Eq. 10: the distance r of the ideal point from a segment, from the desired length and the segment's own."""
-    return 0.5 * math.sqrt(3.0) * (w1 * length + (1.0 - w1) * segment)
-
+from .triangles import quality, turned
+from .vectors import Vector, along, norm, row, subtract
 
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
@@ -139,6 +138,12 @@ def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) ->
             return FULL
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1
-        if front.state[s] == ACTIVE and not choose_by_quality(surface, front, s, numbers, found, patch):
+        if front.state[s] != ACTIVE:
+            continue
+        if numbers[PAPER] > 0.0 and numbers[STRICT] == 1.0:
+            advanced = choose_by_case(surface, front, s, numbers, found, patch)
+        else:
+            advanced = choose_by_quality(surface, front, s, numbers, found, patch)
+        if not advanced:
             front.state[s] = WAITING
     return MORE

@@ -13,23 +13,14 @@ import numpy as np
 
 from .boxes import SearchBoxes, put, search
 from .compile import kernel
-from .surface import PATCH, Surface, fit_patch, linked, onto_patch, patch_normal
-from .triangles import (
-    angle_from,
-    distance_to_segment,
-    inside_triangle,
-    on_unmeshed_side,
-    onto_tangent_plane,
-    quality,
-    segments_cross,
-    shape_quality,
-    turned,
-)
+from .surface import Surface, linked
+from .triangles import angle_from, distance_to_segment, inside_triangle, on_unmeshed_side, onto_tangent_plane, segments_cross
 from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
+LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, PAPER, QUADRANGLE = range(10)  # places in `numbers`
 NEAR = 400  # most front nodes looked at in one step
 
 
