@@ -11,7 +11,7 @@ import numpy as np
 from .kernels import boundary as kernels
 from .kernels.surface import Surface
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, prepare_sites
+from .scan.sites import Sites, broad_normals, check_two_sided, prepare_sites
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -102,6 +102,7 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
         External loops first, each piece's longest loop being external; empty for a closed surface.
     """
     sites = prepare_sites(cloud, settings)
+    check_two_sided(sites)
     if progress:
         progress("boundary", 0.4)
     length = settings.length
@@ -201,23 +202,15 @@ def resample(points: np.ndarray, step: float) -> np.ndarray:
 def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
     """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
 
-    Two places nearer than `width`, with more than 2.5 widths but less than half the curve between them, are joined directly.
+    Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
+    joined directly.
     """
     while True:
-        count = len(curve)
-        low, high = int(2.5 * width / step), count // 2
-        if high <= low:
+        at, gap = kernels.widest_spike(curve, width, int(2.5 * width / step), min(len(curve) // 2, int(30.0 * width / step)))
+        if gap == 0:
             return curve
-        best = (0, 0)
-        for gap in range(high, low, -1):
-            near = np.linalg.norm(curve - np.roll(curve, -gap, axis=0), axis=1) < width
-            if near.any():
-                best = (int(np.argmax(near)), gap)
-                break
-        if best[1] == 0:
-            return curve
-        curve = np.roll(curve, -best[0], axis=0)
-        curve = resample(np.concatenate([curve[:1], curve[best[1] :]]), step)
+        curve = np.roll(curve, -at, axis=0)
+        curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
 
 
 def smooth_loop(curve: np.ndarray, piece: int, settings: Settings) -> Loop | None:

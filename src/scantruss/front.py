@@ -141,8 +141,11 @@ def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarr
     """Add a closed loop of boundary nodes and segments."""
     patch = np.zeros(PATCH)
     ids = []
+    site = int(np.argmin(((surface.mean - nodes[0]) ** 2).sum(axis=1)))
     for place in nodes:
-        site = int(np.argmin(((surface.mean - place) ** 2).sum(axis=1)))
+        site = walk(surface, site, tuple(place))
+        if np.linalg.norm(surface.mean[site] - place) > 2.0 * surface.scale[4]:
+            site = int(np.argmin(((surface.mean - place) ** 2).sum(axis=1)))
         fit_patch(surface, patch, site, tuple(place))
         normal = patch_normal(patch, tuple(place))
         ids.append(lists.propose_node(front, tuple(place), normal, int(patch[15]), True))

@@ -107,10 +107,8 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     InputError
         The length is larger than the scan, or smaller than about three point spacings.
     """
-    from .scan.cloud import measure_spacing
-
     extent = extent_of(cloud)
-    spacing = measure_spacing(cloud.points)
+    spacing = cloud.spacing
     unit = f" {cloud.unit}" if cloud.unit else ""
     if settings.length > extent:
         raise InputError(
@@ -131,9 +129,7 @@ def extent_of(cloud: PointCloud) -> float:
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
-    from .scan.cloud import measure_spacing
-
-    low = max(SPACINGS * measure_spacing(cloud.points), GAPS * measure_gap(cloud.points))
+    low = max(SPACINGS * cloud.spacing, GAPS * measure_gap(cloud.points))
     return round_length(low, "up"), round_length(extent_of(cloud) / LARGEST, "down")
 
 

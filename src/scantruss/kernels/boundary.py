@@ -217,3 +217,22 @@ def touch_points(surface: Surface, places: np.ndarray, ahead: np.ndarray, sites:
                         h = dot(subtract(row(surface.mean, s), place), normal)
                         foot = along(along(along(place, x, out), y, side), h, normal)
                         touched[m, 0], touched[m, 1], touched[m, 2] = foot
+
+
+@kernel
+def widest_spike(curve: np.ndarray, width: float, low: int, high: int) -> tuple[int, int]:
+    """Two places of a closed curve nearer than `width` with the most steps between them, more than `low`, at most `high`.
+
+    Returns
+    -------
+    at, gap : the first place and the steps to the second; gap 0 where there are none
+    """
+    count = len(curve)
+    at, gap = 0, 0
+    for i in range(count):
+        for k in range(high, max(low, gap), -1):
+            d = subtract(row(curve, (i + k) % count), row(curve, i))
+            if dot(d, d) < width * width:
+                at, gap = i, k
+                break
+    return at, gap

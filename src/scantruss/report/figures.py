@@ -107,7 +107,6 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
 def cloud_lines(cloud: PointCloud) -> list[str]:
     """Return points, extent, spacing, unit and a sensible range for the member length, in words."""
     from ..pipeline import length_range, suggest_length
-    from ..scan.cloud import measure_spacing
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
@@ -117,7 +116,7 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
         f"points   {len(cloud.points)}"
         + (f" ({cloud.dropped} more left out: NaN or infinite)" if cloud.dropped else ""),
         f"extent   {extent}{unit}, from {' '.join(lowest)}",
-        f"spacing  {measure_spacing(cloud.points):.4g}{unit}",
+        f"spacing  {cloud.spacing:.4g}{unit}",
         f"unit     {cloud.unit or 'not known; --unit mm|cm|m|inch|foot says it'}",
     ]
     if low > high:

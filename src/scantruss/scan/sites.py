@@ -12,7 +12,7 @@ from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import Surface
 from ..settings import Settings
-from .cloud import PointCloud, measure_spacing
+from .cloud import PointCloud
 
 NEIGHBORS = 12  # links of a site
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
@@ -46,7 +46,7 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     kept = _KEPT.setdefault(cloud, {})
     if key not in kept:
         kept.clear()
-        kept[key] = _prepare(cloud.points, *key)
+        kept[key] = _prepare(cloud.points, cloud.spacing, *key)
     return kept[key]
 
 
@@ -65,8 +65,7 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, length: float, box_size: float) -> Sites:
-    spacing = measure_spacing(points)
+def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
     owner, chosen, boxes = _thin(points, radius)
     grouped, start, mean = _group(points, owner, len(chosen))
@@ -123,14 +122,14 @@ def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, Se
     lower, upper = points.min(axis=0), points.max(axis=0)
     capacity, begin, count = 1 << 14, 0, 0
     chosen = np.full(capacity, -1, np.int64)
-    boxes = new_boxes(lower, upper, radius, capacity, capacity)
+    boxes = new_boxes(lower, upper, 2.0 * radius, capacity, capacity)
     while True:
         begin, count = kernels.thin_points(points, radius, boxes, owner, chosen, begin, count)
         if begin == len(points):
             return owner, chosen[:count].copy(), boxes
         capacity *= 4
         chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
-        boxes = new_boxes(lower, upper, radius, capacity, capacity)
+        boxes = new_boxes(lower, upper, 2.0 * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
 
 
@@ -179,10 +178,17 @@ def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> N
 
 
 def check_two_sided(sites: Sites) -> None:
-    """Refuse a one-sided surface (Moebius strip): no choice of normals fits all links."""
+    """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
+
+    Counted are links in which smooth neighbours lie side by side and yet face opposite sides; rough scans have a few by chance.
+    """
     surface = sites.surface
     site, k = np.nonzero(surface.neighbors >= 0)
     other = surface.neighbors[site, k]
-    agree = (surface.normals[site] * surface.normals[other]).sum(axis=1)
-    if (agree < -0.7).mean() > 0.0:
-        raise InputError("one-sided")
+    against = (surface.normals[site] * surface.normals[other]).sum(axis=1) < -0.9
+    site, other = site[against], other[against]
+    step = surface.mean[other] - surface.mean[site]
+    far = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
+    rise = np.maximum(np.abs((step * surface.normals[site]).sum(axis=1)), np.abs((step * surface.normals[other]).sum(axis=1)))
+    if (rise < 0.3 * far).sum() >= 48:
+        raise InputError("the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces")
