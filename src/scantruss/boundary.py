@@ -223,28 +223,33 @@ def smooth_loop(curve: np.ndarray, piece: int, settings: Settings) -> Loop | Non
     return Loop(smoothed, corner_at, False, length, piece)
 
 
-def _quadratic_arm(curve: np.ndarray, sign: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coefficients (M, 3 coordinates) of 1, s, s^2 fitted to the arm before (-1) or after (+1) each place; s in steps."""
+def _arm(curve: np.ndarray, sign: int, degree: int) -> np.ndarray:
+    """Coefficients (degree + 1, M, 3) of 1, s, s^2 fitted to the arm before (-1) or after (+1) each place; s in steps."""
     offsets = sign * np.arange(round(ARM[0] / STEP), round(ARM[1] / STEP) + 1)
-    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
-    inverse = np.linalg.pinv(terms)
+    inverse = np.linalg.pinv(np.vander(offsets.astype(float), degree + 1, increasing=True))
     arms = np.stack([np.roll(curve, -o, axis=0) for o in offsets], axis=0)
-    a, b, c = np.einsum("ko,omc->kmc", inverse, arms)
-    return a, b, c
+    return np.einsum("ko,omc->kmc", inverse, arms)
+
+
+def _turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Angle (M,) between the directions of two arms at their place [degree]."""
+    cosine = (before[1] * after[1]).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(before[1], axis=1) * np.linalg.norm(after[1], axis=1), 1e-300)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
     """Return where a closed curve has corners (C,) and their exact places (C, 3).
 
-    The direction before and after each place comes from quadratics fitted to its two arms; a corner is where they differ most,
-    by more than `corner_angle`. Its place is where the two quadratics meet.
+    The direction before and after each place comes from curves fitted to its two arms; a corner is where they differ most, by more
+    than `corner_angle`. Quadratics tell a corner from a bend, lines are not misled by a ragged rim: both must turn. The place of
+    the corner is where the two quadratics meet.
     """
     if len(curve) < 2 * round(ARM[1] / STEP) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
-    before, after = _quadratic_arm(curve, -1), _quadratic_arm(curve, 1)
-    cosine = (before[1] * after[1]).sum(axis=1)
-    cosine /= np.maximum(np.linalg.norm(before[1], axis=1) * np.linalg.norm(after[1], axis=1), 1e-300)
-    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    before, after = _arm(curve, -1, 2), _arm(curve, 1, 2)
+    bent, straight = _turn(before, after), _turn(_arm(curve, -1, 1), _arm(curve, 1, 1))
+    turn = np.minimum(1.25 * bent, straight)
     half = round(0.5 / STEP)
     highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
     at, places = [], []

@@ -191,7 +191,7 @@ def touch_points(surface: Surface, places: np.ndarray, ahead: np.ndarray, sites:
     ----------
     places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
     sites : (M,) site near each place
-    touched : (M, 3) filled with the point that the disc touches first, in the plane of the site
+    touched : (M, 3) filled with the point that the disc touches first
     """
     noise = 0.35 * surface.scale[0]
     for m in range(len(places)):
@@ -214,9 +214,7 @@ def touch_points(surface: Surface, places: np.ndarray, ahead: np.ndarray, sites:
                     t = x + math.sqrt(radius * radius - y * y)
                     if t > best:
                         best = t
-                        h = dot(subtract(row(surface.mean, s), place), normal)
-                        foot = along(along(along(place, x, out), y, side), h, normal)
-                        touched[m, 0], touched[m, 1], touched[m, 2] = foot
+                        touched[m, 0], touched[m, 1], touched[m, 2] = row(surface.points, p)
 
 
 @kernel
