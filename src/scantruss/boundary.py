@@ -19,7 +19,9 @@ Progress = Callable[[str, float], None]
 STEP = 0.05  # distance of the points of a boundary curve, in member lengths
 SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member lengths
 ARM = (0.1, 0.8)  # part of the curve at each side of a place that tells its direction there, in member lengths
+OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
+TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
 
@@ -115,6 +117,8 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
         points = boundary_points(surface, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
         if len(points) < 3:
             continue
+        if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
+            continue
         curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
         if len(curve) >= 8:
             found.append((curve, piece))
@@ -134,7 +138,8 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
     Loops shorter than `least` are left out.
     """
     free = np.empty(len(surface.mean))
-    kernels.free_directions(surface, radius, np.radians(75.0), free)
+    radii = disc_radii(surface, radius)
+    kernels.free_directions(surface, radii, np.radians(75.0), free)
     seen = np.full(len(surface.mean), -1, np.int64)
     visit = np.full(len(surface.mean), -1, np.int64)
     banned = np.zeros(len(surface.mean), np.bool_)
@@ -143,15 +148,16 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
     for site in np.flatnonzero(free < 9.0):
         if seen[site] >= 0:
             continue
-        centre = kernels.site_disc(surface, site, free[site], radius)
+        centre = kernels.site_disc(surface, site, free[site], radii[site])
         for _ in range(TRIES):
-            first, last = kernels.roll_disc(surface, site, centre, radius, path, seen, visit, banned)
+            first, last = kernels.roll_disc(surface, site, centre, radii, path, seen, visit, banned)
             loop = path[first:last]
             turns = surface.mean[loop]
-            if last == first or _around(turns) > least:
+            around = _around(turns)
+            if last == first or around > TRAP * radius:
                 break
             if np.linalg.norm(turns - surface.mean[site], axis=1).min() < 2.0 * radius:
-                last = first  # a small gap: it is closed over
+                last = last if around > least else first  # a small gap is closed over
                 break
             banned[loop[loop != site]] = True  # the disc is caught in a rough place: let it not feel those sites
         if last - first < 3:
@@ -162,6 +168,17 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
         if fresh.mean() > 0.5:
             loops.append((loop, int(piece[loop[0]])))
     return loops
+
+
+def disc_radii(surface: Surface, radius: float) -> np.ndarray:
+    """Radius of the disc at each site (S,): larger where the scan is sparse, so that it does not fall between the points."""
+    sixth = surface.neighbors[:, 5]
+    gap = np.linalg.norm(surface.mean[sixth] - surface.mean, axis=1)
+    radii = np.where(sixth >= 0, np.maximum(radius, 0.75 * gap), radius)
+    wide = np.flatnonzero(radii > radius)
+    around = surface.neighbors[wide]
+    np.maximum.at(radii, around[around >= 0], np.repeat(radii[wide], (around >= 0).sum(axis=1)))
+    return radii
 
 
 def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: float) -> np.ndarray:

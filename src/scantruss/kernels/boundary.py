@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
+from .boxes import SearchBoxes, search
 from .compile import kernel
-from .surface import Surface, flood
+from .surface import Surface, flood, walk
 from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
 DIRECTIONS = 64
@@ -33,7 +34,7 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 
 @kernel
-def free_directions(surface: Surface, radius: float, widest: float, free: np.ndarray) -> None:
+def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray) -> None:
     """For each site, a direction in which a disc that touches it would be empty, or 9 where there is none.
 
     Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
@@ -66,6 +67,7 @@ def free_directions(surface: Surface, radius: float, widest: float, free: np.nda
         if gap <= widest:
             continue
         blocked[:] = False
+        radius = radii[s]
         found = flood(surface, s, place, 2.0 * radius)
         for i in range(1, found):
             if dot(row(surface.normals, surface.queue[i]), normal) < FACING:
@@ -111,11 +113,12 @@ def _nearest_clear(cover: np.ndarray) -> int:
 
 
 @kernel
-def roll_disc(surface: Surface, site: int, centre: Vector, radius: float, path: np.ndarray, seen: np.ndarray, visit: np.ndarray, banned: np.ndarray) -> tuple[int, int]:
+def roll_disc(surface: Surface, site: int, centre: Vector, radii: np.ndarray, path: np.ndarray, seen: np.ndarray, visit: np.ndarray, banned: np.ndarray) -> tuple[int, int]:
     """Roll an empty disc along the boundary from a site that it touches, the surface to its left.
 
     Parameters
     ----------
+    radii : (S,) radius of the disc at each site
     path : (M,) int64, filled with the touched sites
     seen : (S,) int64, for each site the site that followed it on an earlier loop, -1: none
     visit : (S,) int64 scratch, index in `path` of the last visit
@@ -131,7 +134,7 @@ def roll_disc(surface: Surface, site: int, centre: Vector, radius: float, path: 
     step = 2.0 * math.pi / BINS
     cover = np.empty(BINS + 1, np.int64)
     while count < len(path):
-        normal, place = row(surface.normals, site), row(surface.mean, site)
+        normal, place, radius = row(surface.normals, site), row(surface.mean, site), radii[site]
         u = across(normal)
         v = cross(normal, u)
         d = subtract(centre, place)
@@ -234,3 +237,22 @@ def widest_spike(curve: np.ndarray, width: float, low: int, high: int) -> tuple[
                 at, gap = i, k
                 break
     return at, gap
+
+
+@kernel
+def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, site: int, radius: float) -> float:
+    """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
+
+    places : (M, 3) boundary points in order, the surface to their left. site : one near the first place.
+    """
+    found = np.empty(8, np.int64)
+    free, count = 0, len(places)
+    for m in range(count):
+        place = row(places, m)
+        site = walk(surface, site, place)
+        ahead = subtract(row(places, (m + 3) % count), row(places, (m - 3) % count))
+        out = unit(cross(ahead, row(surface.normals, site)))
+        centre = along(place, radius, out)
+        if search(boxes, surface.mean, centre[0], centre[1], centre[2], 0.6 * radius, found) == 0:
+            free += 1
+    return free / max(count, 1)

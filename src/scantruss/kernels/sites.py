@@ -92,7 +92,10 @@ def group_points(points: np.ndarray, owner: np.ndarray, start: np.ndarray, group
 
 @kernel
 def nearest_sites(positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray) -> None:
-    """The K nearest sites of each site, nearest first, -1 where there are fewer within `far`; the search starts with `near`."""
+    """The K nearest sites of each site, nearest first, -1 where there are fewer within `far`; the search starts with `near`.
+
+    Where there are not even six, the scan is sparse: the search goes on to twice as far.
+    """
     k = neighbors.shape[1]
     found = np.empty(4096, np.int64)
     distance = np.empty(k)
@@ -100,8 +103,8 @@ def nearest_sites(positions: np.ndarray, boxes: SearchBoxes, near: float, far: f
         x, y, z = row(positions, s)
         reach = near
         count = search(boxes, positions, x, y, z, reach, found)
-        while count < k + 1 and reach < far:
-            reach = min(1.5 * reach, far)
+        while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):
+            reach = min(1.5 * reach, far if reach < far else 2.0 * far)
             count = search(boxes, positions, x, y, z, reach, found)
         held = 0
         for c in range(count):
@@ -120,6 +123,31 @@ def nearest_sites(positions: np.ndarray, boxes: SearchBoxes, near: float, far: f
             distance[at] = dd
             neighbors[s, at] = other
             held = min(held + 1, k)
+
+
+@kernel
+def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
+    """Let dense sites see the sparse ones that have them among their six nearest: the farthest neighbours make room.
+
+    Otherwise a sparse part of the scan, linked one way only, would look like a gap from the dense part beside it.
+    """
+    k_most = neighbors.shape[1]
+    taken = np.zeros(len(positions), np.int64)
+    for t in range(len(positions)):
+        for k in range(6):
+            s = neighbors[t, k]
+            if s < 0 or neighbors[s, k_most - 1] < 0 or taken[s] >= 3:
+                continue
+            d = subtract(row(positions, t), row(positions, s))
+            e = subtract(row(positions, neighbors[s, 5]), row(positions, s))
+            if dot(d, d) < 2.25 * dot(e, e):
+                continue
+            known = False
+            for i in range(k_most):
+                known = known or neighbors[s, i] == t
+            if not known:
+                neighbors[s, k_most - 1 - taken[s]] = t
+                taken[s] += 1
 
 
 @kernel

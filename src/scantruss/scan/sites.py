@@ -111,6 +111,7 @@ def _link(
     neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     kernels.nearest_sites(place, boxes, max(2.1 * radius, 1.5 * spacing), far, neighbors)
+    kernels.link_back(place, neighbors)
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     kernels.site_normals(mean, neighbors, normals, thickness)
     return neighbors, normals, thickness
