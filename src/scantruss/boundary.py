@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from .kernels import boundary as kernels
+from .kernels.rim import Rim
 from .kernels.surface import Surface
 from .scan.cloud import PointCloud
 from .scan.sites import Sites, broad_normals, check_two_sided, prepare_sites
@@ -23,15 +23,6 @@ OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
-
-
-class Rim(NamedTuple):
-    """The smoothed boundary curves, for the kernels: nodes of the boundary slide along them."""
-
-    points: np.ndarray  #: (M, 3) points of all curves, each curve closed
-    arc: np.ndarray  #: (M,) arc length from the start of the curve
-    start: np.ndarray  #: (L + 1,) points of curve c are start[c]:start[c + 1]
-    total: np.ndarray  #: (L,) length of each curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +113,7 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
         curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
         if len(curve) >= 8:
             found.append((curve, piece))
-    loops = []
-    for curve, piece in found:
-        loop = smooth_loop(curve, piece, settings)
-        if loop is not None:
-            loops.append(loop)
+    loops = [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings)) is not None]
     if progress:
         progress("boundary", 1.0)
     return Boundary(_external_first(loops), sites)
@@ -145,7 +132,7 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
     banned = np.zeros(len(surface.mean), np.bool_)
     path = np.empty(2_000 + 4 * int((free < 9.0).sum()), np.int64)
     loops = []
-    for site in np.flatnonzero(free < 9.0):
+    for site in np.flatnonzero(free < 9.0).tolist():
         if seen[site] >= 0:
             continue
         centre = kernels.site_disc(surface, site, free[site], radii[site])
@@ -223,7 +210,9 @@ def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
     joined directly.
     """
     while True:
-        at, gap = kernels.widest_spike(curve, width, int(2.5 * width / step), min(len(curve) // 2, int(30.0 * width / step)))
+        at, gap = kernels.widest_spike(
+            curve, width, int(2.5 * width / step), min(len(curve) // 2, int(30.0 * width / step))
+        )
         if gap == 0:
             return curve
         curve = np.roll(curve, -at, axis=0)
@@ -269,8 +258,9 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     turn = np.minimum(1.25 * bent, straight)
     half = round(0.5 / STEP)
     highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
-    at, places = [], []
-    for i in np.flatnonzero((turn >= highest) & (turn > settings.corner_angle)):
+    at: list[int] = []
+    places: list[np.ndarray] = []
+    for i in np.flatnonzero((turn >= highest) & (turn > settings.corner_angle)).tolist():
         place = _meeting([c[i] for c in before], [c[i] for c in after])
         if np.linalg.norm(place - curve[i]) < 0.5 * settings.length and (not at or i - at[-1] > half):
             at.append(i)

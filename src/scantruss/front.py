@@ -10,13 +10,13 @@ from .boundary import Boundary, boundary_nodes
 from .errors import FrontError
 from .grid.grid import Grid
 from .kernels import advance as kernels
+from .kernels import boxes as boxing
 from .kernels import front as lists
 from .kernels import gaps
-from .kernels import boxes as boxing
 from .kernels.boxes import new_boxes
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, prepare_sites
+from .scan.sites import Sites
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -26,7 +26,9 @@ GAP = 60  # gaps with more segments stay open
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 
-def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, progress: Progress | None = None) -> Grid:
+def advance_front(
+    cloud: PointCloud, boundary: Boundary, settings: Settings, *, progress: Progress | None = None
+) -> Grid:
     """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4)."""
     sites = boundary.sites
     front = new_front(sites, settings)
@@ -48,10 +50,10 @@ def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, 
     for strict in STRICTNESS:
         numbers[lists.STRICT] = strict
         count = int(front.count[lists.SEGMENTS])
-        for s in np.flatnonzero(front.state[:count] == lists.WAITING):
+        for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
             lists.enqueue(front, s)
         front = run(front, sites, numbers, progress)
-    left = close_gaps(front, settings)
+    close_gaps(front, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     used, numbered = np.unique(triangles, return_inverse=True)
     return Grid(
@@ -64,26 +66,23 @@ def advance_front(cloud: PointCloud, boundary: Boundary, settings: Settings, *, 
     )
 
 
-def close_gaps(front: lists.Front, settings: Settings) -> list[np.ndarray]:
-    """Fill what the front has left open; returns the nodes of each loop that stays open, a boundary from now on.
+def close_gaps(front: lists.Front, settings: Settings) -> None:
+    """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
-    Loops of the boundary that the front has not reached belong to a gap like every other segment.
+    Loops of the boundary of which the front has reached no segment are left out.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
-    left = []
     for s in range(int(front.count[lists.SEGMENTS])):
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()
             unreached = (front.state[segments] == lists.INACTIVE).all()
             if unreached or count > GAP or not gaps.close_gap(front, segments, count, settings.length):
-                left.append(front.tail[segments].copy())
                 before, after = front.previous[segments[0]], front.next[segments[-1]]
                 for t in segments:
                     lists.remove_segment(front, t)
                 if before != segments[-1]:
                     lists.link(front, before, after)
-    return left
 
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
@@ -93,7 +92,7 @@ def new_front(sites: Sites, settings: Settings) -> lists.Front:
     return _blank(room, boxes)
 
 
-def _blank(room: int, boxes: lists.SearchBoxes) -> lists.Front:
+def _blank(room: int, boxes: boxing.SearchBoxes) -> lists.Front:
     def ids(*shape: int) -> np.ndarray:
         return np.full(shape, -1, np.int64)
 
@@ -190,7 +189,9 @@ def run(front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progres
         if status == lists.DONE:
             return front
         if front.count[lists.TRIANGLES] > 4 * expected + 1000:
-            where = tuple(float(c) for c in front.nodes[front.count[lists.NODES] - 1])
-            raise FrontError("the front runs over itself: the scan is too rough or too sparse for this length", where=where)
+            x, y, z = front.nodes[front.count[lists.NODES] - 1].tolist()
+            raise FrontError(
+                "the front runs over itself: the scan is too rough or too sparse for this length", where=(x, y, z)
+            )
         if status == lists.FULL:
             front = grown(front)

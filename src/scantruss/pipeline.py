@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import InputError
+from .errors import FrontError, InputError
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def grid_from_cloud(
     front = advance_front(cloud, boundary, settings, progress=progress)
     advanced = perf_counter()
     grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
+    check_grid(grid)
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -97,6 +98,24 @@ def grid_from_cloud(
         "total": read_seconds + ended - started,
     }
     return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
+
+
+def check_grid(grid: Grid) -> None:
+    """Refuse a grid that is none: rather no result than a wrong one that looks right.
+
+    Raises
+    ------
+    FrontError
+        No triangles, or the grid is not manifold, or not orientable.
+    """
+    if len(grid.triangles) == 0:
+        raise FrontError("no triangle could be made; use another length, or check the scan", grid)
+    found = grid.topology
+    if not (found.manifold and found.orientable):
+        fault = "not manifold" if not found.manifold else "not orientable"
+        raise FrontError(
+            f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
+        )
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:

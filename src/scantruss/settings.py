@@ -19,32 +19,65 @@ CASE3 = ("merge", "quadrangle")
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # metres
 
 
-def _setting(default: Any, help: str, *, symbol: str = "", unit: str = "", source: str = "", choices: tuple[str, ...] = ()) -> Any:
+def _setting(
+    default: Any, help: str, *, symbol: str = "", unit: str = "", source: str = "", choices: tuple[str, ...] = ()
+) -> Any:
     """A field of the record with all that the docs and the command line say of it."""
-    return field(default=default, metadata={"help": help, "symbol": symbol, "unit": unit, "source": source, "choices": choices})
+    return field(
+        default=default, metadata={"help": help, "symbol": symbol, "unit": unit, "source": source, "choices": choices}
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """One record of all settings; unknown or impossible values raise InputError."""
 
-    length: float = field(metadata={"help": "desired length of the members", "symbol": "l_e", "unit": "scan unit", "source": "Eq. 10", "choices": ()})
+    length: float = field(
+        metadata={
+            "help": "desired length of the members",
+            "symbol": "l_e",
+            "unit": "scan unit",
+            "source": "Eq. 10",
+            "choices": (),
+        }
+    )
     method: str = _setting("default", "the paper to the letter, or what we found better", choices=METHODS)
     unit: str = _setting("", "unit of the scan's coordinates", choices=tuple(u for u in UNITS if u))
-    advance_from: str = _setting("external", "which boundaries the front starts from", source="Sec. 3.6", choices=ADVANCE_FROM)
-    fixed: tuple[tuple[float, float, float], ...] = _setting((), "positions that must become nodes, in the scan's own frame", unit="scan unit", source="Sec. 4.2")
-    max_deviation: float | None = _setting(None, "smoothing stops when the nodes have moved by more than this on average; none: length / 20", unit="scan unit", source="Sec. 4.1 (c)")
+    advance_from: str = _setting(
+        "external", "which boundaries the front starts from", source="Sec. 3.6", choices=ADVANCE_FROM
+    )
+    fixed: tuple[tuple[float, float, float], ...] = _setting(
+        (), "positions that must become nodes, in the scan's own frame", unit="scan unit", source="Sec. 4.2"
+    )
+    max_deviation: float | None = _setting(
+        None,
+        "smoothing stops when the nodes have moved by more than this on average; none: length / 20",
+        unit="scan unit",
+        source="Sec. 4.1 (c)",
+    )
     shape_weight: float = _setting(1.0, "weight of the shape quality of a triangle", symbol="alpha_1", source="Eq. 5")
     size_weight: float = _setting(1.0, "weight of the size quality of a triangle", symbol="alpha_2", source="Eq. 5")
-    length_weight: float = _setting(0.8, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10")
-    search_range: float = _setting(3.0, "half width of the search region in point spacings", symbol="b, h", source="Sec. 3.4 (1)")
+    length_weight: float = _setting(
+        0.8, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10"
+    )
+    search_range: float = _setting(
+        3.0, "half width of the search region in point spacings", symbol="b, h", source="Sec. 3.4 (1)"
+    )
     nearness: float = _setting(0.5, "a new node keeps this distance to the front, in lengths", source="Sec. 3.4 (2)")
-    merge_angle: float = _setting(90.0, "limit of the angles alpha and beta in the six cases", unit="degree", source="Table 1")
-    case3: str = _setting("merge", "case 3: merge the free nodes, or Foucault's quadrangle", source="Table 1, [30]", choices=CASE3)
+    merge_angle: float = _setting(
+        90.0, "limit of the angles alpha and beta in the six cases", unit="degree", source="Table 1"
+    )
+    case3: str = _setting(
+        "merge", "case 3: merge the free nodes, or Foucault's quadrangle", source="Table 1, [30]", choices=CASE3
+    )
     box_size: float = _setting(0.2, "size of a search box, in lengths", symbol="d_B", source="Eq. 1")
-    boundary_radius: float = _setting(0.4, "radius of the disc rolled along the boundary, in lengths", source="Sec. 3.3")
+    boundary_radius: float = _setting(
+        0.4, "radius of the disc rolled along the boundary, in lengths", source="Sec. 3.3"
+    )
     smallest_hole: float = _setting(4.0, "holes with a rim shorter than this are closed, in lengths", source="Sec. 3.6")
-    corner_angle: float = _setting(40.0, "a boundary that turns by more than this has a corner", unit="degree", source="Sec. 3.3")
+    corner_angle: float = _setting(
+        40.0, "a boundary that turns by more than this has a corner", unit="degree", source="Sec. 3.3"
+    )
     smooth_forward: float = _setting(0.5, "forward factor of the smoothing", symbol="lambda", source="Sec. 4.1, [34]")
     smooth_backward: float = _setting(-0.53, "backward factor of the smoothing", symbol="mu", source="Sec. 4.1, [34]")
     smooth_passes: int = _setting(100, "most passes of the smoothing", source="Sec. 4.1")
@@ -61,14 +94,19 @@ class Settings:
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{spec.name} must be a finite number, got {value}")
         for name, low, high in (
-            ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1), ("search_range", 0.5, 20),
-            ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5), ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
+            ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
+            ("search_range", 0.5, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
+            ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
             ("corner_angle", 10, 180), ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise InputError(f"{name} must be a number, got {value!r}")
             if not low <= value <= high:
                 raise InputError(f"{name} must lie between {low} and {high}, got {value}")
-        if self.max_deviation is not None and not self.max_deviation > 0:
+        if self.max_deviation is not None and not (
+            isinstance(self.max_deviation, int | float) and self.max_deviation > 0
+        ):
             raise InputError(f"max_deviation must be positive, got {self.max_deviation}")
         try:
             fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)
@@ -109,6 +147,7 @@ class Settings:
             raise InputError(f"cannot read settings {path}: {error.strerror}") from None
         except ValueError:
             raise InputError(f"{path} is not a settings file (JSON)") from None
+        values = values.get("settings", values) if isinstance(values, dict) else None
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
-        return cls.from_dict(values.get("settings", values))
+        return cls.from_dict(values)

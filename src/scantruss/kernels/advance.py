@@ -41,6 +41,7 @@ from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .triangles import quality, turned
 from .vectors import Vector, along, norm, row, subtract
 
+
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
     """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
@@ -73,7 +74,9 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
 
 
 @kernel
-def choose_by_quality(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray) -> bool:
+def choose_by_quality(
+    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray
+) -> bool:
     """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
     length, strict = numbers[LENGTH], numbers[STRICT]
     a, b = front.tail[s], front.head[s]
@@ -94,7 +97,7 @@ def choose_by_quality(surface: Surface, front: Front, s: int, numbers: np.ndarra
             continue
         pq = row(front.nodes, q)
         value = quality(pa, pb, pq, side, numbers[SHAPE], numbers[SIZE])
-        if q == c or q == d:
+        if q in (c, d):
             if (q == c and alpha < widest) or (q == d and beta < widest):
                 score[i] = value
         elif norm(subtract(pq, place)) < around:

@@ -14,7 +14,7 @@ import numpy as np
 from .boxes import SearchBoxes, search
 from .compile import kernel
 from .surface import Surface, flood, walk
-from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
+from .vectors import Vector, across, along, cross, dot, row, subtract, unit
 
 DIRECTIONS = 64
 BINS = 240
@@ -113,7 +113,16 @@ def _nearest_clear(cover: np.ndarray) -> int:
 
 
 @kernel
-def roll_disc(surface: Surface, site: int, centre: Vector, radii: np.ndarray, path: np.ndarray, seen: np.ndarray, visit: np.ndarray, banned: np.ndarray) -> tuple[int, int]:
+def roll_disc(
+    surface: Surface,
+    site: int,
+    centre: Vector,
+    radii: np.ndarray,
+    path: np.ndarray,
+    seen: np.ndarray,
+    visit: np.ndarray,
+    banned: np.ndarray,
+) -> tuple[int, int]:
     """Roll an empty disc along the boundary from a site that it touches, the surface to its left.
 
     Parameters
@@ -187,7 +196,9 @@ def roll_disc(surface: Surface, site: int, centre: Vector, radii: np.ndarray, pa
 
 
 @kernel
-def touch_points(surface: Surface, places: np.ndarray, ahead: np.ndarray, sites: np.ndarray, radius: float, touched: np.ndarray) -> None:
+def touch_points(
+    surface: Surface, places: np.ndarray, ahead: np.ndarray, sites: np.ndarray, radius: float, touched: np.ndarray
+) -> None:
     """Slide a disc from outside against the points at each place of a loop.
 
     Parameters

@@ -34,7 +34,12 @@ def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, s
     size = np.where(extent > 0, extent / parts, box)
     table = 1 << max(int(2 * slots - 1).bit_length(), 4)
     return SearchBoxes(
-        np.array(lower, float), size, parts + 1, np.full(table, -1, np.int64), np.full(table, -1, np.int64), np.full(capacity, -1, np.int64)
+        np.array(lower, float),
+        size,
+        parts + 1,
+        np.full(table, -1, np.int64),
+        np.full(table, -1, np.int64),
+        np.full(capacity, -1, np.int64),
     )
 
 
@@ -87,7 +92,9 @@ def take(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> None:
 
 
 @kernel
-def search(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float, found: np.ndarray) -> int:
+def search(
+    boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float, found: np.ndarray
+) -> int:
     """Items within `reach` of a place, into `found`; returns their number (at most len(found))."""
     count = 0
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):

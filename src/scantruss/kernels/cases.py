@@ -9,7 +9,6 @@ import numpy as np
 from .boxes import put, take
 from .compile import kernel
 from .front import (
-    ACTIVE,
     LENGTH,
     MERGE,
     NEARNESS,
@@ -139,7 +138,9 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 
 
 @kernel
-def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray) -> bool:
+def merge_neighbors(
+    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray
+) -> bool:
     """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
     Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
@@ -271,7 +272,10 @@ def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, p
                 continue
             for p in range(surface.start[t], surface.start[t + 1]):
                 place = row(surface.points, p)
-                if abs(dot(subtract(place, middle), e)) > extent or abs(distance_to_segment(place, pa, pb) - r) > extent:
+                if (
+                    abs(dot(subtract(place, middle), e)) > extent
+                    or abs(distance_to_segment(place, pa, pb) - r) > extent
+                ):
                     continue
                 if not on_unmeshed_side(pa, pb, place, normal):
                     continue
@@ -318,7 +322,9 @@ def best_existing_node(front: Front, s: int, numbers: np.ndarray, found: np.ndar
 
 
 @kernel
-def new_node(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray) -> bool:
+def new_node(
+    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray
+) -> bool:
     """Case 4: the three steps of Sec. 3.4."""
     if not optimal_point(surface, front, s, numbers, patch):
         return False
@@ -336,7 +342,9 @@ def new_node(surface: Surface, front: Front, s: int, numbers: np.ndarray, found:
 
 
 @kernel
-def choose_by_case(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray) -> bool:
+def choose_by_case(
+    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray
+) -> bool:
     """Advance a segment by the six cases of Table 1; False where the case's triangle does not fit."""
     near = near_nodes(surface, front, s, 2.4 * numbers[LENGTH], numbers[LENGTH], found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), numbers[MERGE])

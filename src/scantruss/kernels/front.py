@@ -14,7 +14,14 @@ import numpy as np
 from .boxes import SearchBoxes, put, search
 from .compile import kernel
 from .surface import Surface, linked
-from .triangles import angle_from, distance_to_segment, inside_triangle, on_unmeshed_side, onto_tangent_plane, segments_cross
+from .triangles import (
+    angle_from,
+    distance_to_segment,
+    inside_triangle,
+    on_unmeshed_side,
+    onto_tangent_plane,
+    segments_cross,
+)
 from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
@@ -42,7 +49,7 @@ class Front(NamedTuple):
     corner: np.ndarray  #: (C,) last corner (3 t + k) at the node, -1: none
     corner_next: np.ndarray  #: (3 T,) another corner at the same node, -1: none
     queue: np.ndarray  #: (Q,) segments to be advanced
-    count: np.ndarray  #: (8,) counters
+    count: np.ndarray  # type: ignore[assignment]  #: (8,) counters; hides tuple.count
     boxes: SearchBoxes  #: the nodes by box
 
 
@@ -213,7 +220,9 @@ def near_nodes(surface: Surface, front: Front, s: int, reach: float, length: flo
     """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
-    count = search(front.boxes, front.nodes, 0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]), reach, found)
+    count = search(
+        front.boxes, front.nodes, 0.5 * (pa[0] + pb[0]), 0.5 * (pa[1] + pb[1]), 0.5 * (pa[2] + pb[2]), reach, found
+    )
     kept = 0
     for i in range(count):
         q = found[i]
@@ -331,7 +340,12 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
         if q != p and i < near:
             if inside_triangle(q2, a2, b2, p2):
                 return False
-            if room > 0.0 and front.out[q] >= 0 and q != front.tail[front.previous[s]] and q != front.head[front.next[s]]:
+            if (
+                room > 0.0
+                and front.out[q] >= 0
+                and q != front.tail[front.previous[s]]
+                and q != front.head[front.next[s]]
+            ):
                 if distance_to_segment(pq, pa, pp) < room or distance_to_segment(pq, pb, pp) < room:
                     return False
         t = front.out[q]
@@ -357,6 +371,8 @@ def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: in
             if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
                 return False
             t = front.out_next[t]
-        if i < near and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, 0.45 * length)):
+        if i < near and norm(subtract(pp, row(front.nodes, q))) < (
+            least if front.out[q] >= 0 else max(least, 0.45 * length)
+        ):
             return False
     return True

@@ -17,7 +17,9 @@ from .vectors import dot, row, smallest_eigenvector, subtract, unit
 
 
 @kernel
-def thin_points(points: np.ndarray, radius: float, boxes: SearchBoxes, owner: np.ndarray, chosen: np.ndarray, begin: int, count: int) -> tuple[int, int]:
+def thin_points(
+    points: np.ndarray, radius: float, boxes: SearchBoxes, owner: np.ndarray, chosen: np.ndarray, begin: int, count: int
+) -> tuple[int, int]:
     """Choose sites from points[begin:] so that every point has one within `radius`; sites keep that distance.
 
     Parameters
@@ -68,7 +70,9 @@ def thin_points(points: np.ndarray, radius: float, boxes: SearchBoxes, owner: np
 
 
 @kernel
-def group_points(points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, index: np.ndarray, mean: np.ndarray) -> None:
+def group_points(
+    points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, index: np.ndarray, mean: np.ndarray
+) -> None:
     """Sort the points by site (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each site's points."""
     sites = len(start) - 1
     for p in range(len(points)):
@@ -174,12 +178,16 @@ def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, t
                 yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
         v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
-        square = v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+        square = (
+            v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+        )
         thickness[s] = math.sqrt(max(square, 0.0) / count)
 
 
 @kernel
-def settle_sites(mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray) -> None:
+def settle_sites(
+    mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
+) -> None:
     """Move each rough site (thickness over `rough`) to the plane of the sites linked to it within a wider radius.
 
     Noise, plants and doubled layers thicker than a site leave a cloud of sites instead of a sheet; this gives the sheet back.
@@ -290,7 +298,9 @@ def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
 
 
 @kernel
-def orient_normals(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, order: np.ndarray, piece: np.ndarray) -> None:
+def orient_normals(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, order: np.ndarray, piece: np.ndarray
+) -> None:
     """Turn all normals of a connected piece to the same side, along the spanning tree of the most certain links.
 
     order : links as s * K + k, most certain first. piece : (S,) filled with the smallest site of each connected piece.

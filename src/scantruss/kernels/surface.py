@@ -82,10 +82,16 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
     if a == b:
         return True
     count = flood(surface, a, place, reach)
+    return count > 0 and surface.stamp[b] == surface.counter[0] and _queued(surface, b, count)
+
+
+@kernel
+def _queued(surface: Surface, site: int, count: int) -> bool:
+    """Whether a site is among those the last flood found (it stamps the sites just outside too)."""
+    found = False
     for i in range(count):
-        if surface.queue[i] == b:
-            return True
-    return False
+        found = found or surface.queue[i] == site
+    return found
 
 
 @kernel
@@ -185,7 +191,9 @@ def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray)
 
 
 @kernel
-def _heights(buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Vector, v: Vector, patch: np.ndarray) -> None:
+def _heights(
+    buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Vector, v: Vector, patch: np.ndarray
+) -> None:
     """Least-squares heights over the plane: a quadric, a plane for few points; buffer[:, 4] gets the distances from it."""
     size = 6 if taken >= 10 else (3 if taken >= 4 else 1)
     solved = False

@@ -59,13 +59,17 @@ def _side(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 
 
 @kernel
-def segments_cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]) -> bool:
+def segments_cross(
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
+) -> bool:
     """Eqs. 8 and 9: whether the segments ab and cd cross in the plane (touching does not count)."""
     return _side(c, a, b) * _side(d, a, b) < 0.0 and _side(a, c, d) * _side(b, c, d) < 0.0
 
 
 @kernel
-def inside_triangle(p: tuple[float, float], a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+def inside_triangle(
+    p: tuple[float, float], a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
+) -> bool:
     """Whether p lies in the anticlockwise triangle abc, its sides included."""
     return _side(a, b, p) >= 0.0 and _side(b, c, p) >= 0.0 and _side(c, a, p) >= 0.0
 
@@ -82,7 +86,10 @@ def distance_to_segment(p: Vector, a: Vector, b: Vector) -> float:
 @kernel
 def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
     """Unit vector at an angle anticlockwise from a direction, in the plane of a unit normal."""
-    flat = subtract(direction, (normal[0] * dot(direction, normal), normal[1] * dot(direction, normal), normal[2] * dot(direction, normal)))
+    flat = subtract(
+        direction,
+        (normal[0] * dot(direction, normal), normal[1] * dot(direction, normal), normal[2] * dot(direction, normal)),
+    )
     length = norm(flat)
     if length <= 0.0:
         flat, length = across(normal), 1.0

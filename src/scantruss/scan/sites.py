@@ -190,6 +190,10 @@ def check_two_sided(sites: Sites) -> None:
     site, other = site[against], other[against]
     step = surface.mean[other] - surface.mean[site]
     far = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
-    rise = np.maximum(np.abs((step * surface.normals[site]).sum(axis=1)), np.abs((step * surface.normals[other]).sum(axis=1)))
+    rise = np.maximum(
+        np.abs((step * surface.normals[site]).sum(axis=1)), np.abs((step * surface.normals[other]).sum(axis=1))
+    )
     if (rise < 0.3 * far).sum() >= 48:
-        raise InputError("the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces")
+        raise InputError(
+            "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
+        )
