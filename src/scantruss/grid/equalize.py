@@ -14,12 +14,13 @@ import numpy as np
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
 from ..kernels.search import Scratch, search, suit_nodes, total_energy
+from ..kernels.smoothing import return_to_scan
 from .flips import FOLD, ROUNDS
 from .relief import Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = 2.0  # the same in the last sweeps, which no longer change the topology
-PRICE = 6.0  # of a mean length that is not the desired one
+PRICE = 12.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 NEAR, FAR = 0.25, 0.5  # how far a node may leave the middle of its patch, in lengths: at last, on the way
@@ -71,4 +72,6 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
 
 def finish(relief: Relief) -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, members a little more even."""
+    return_to_scan(relief.net, relief.surface, relief.patches, relief.rim, relief.length)
     settle(relief, EVEN, NEAR, 1e-5, 40)
+    return_to_scan(relief.net, relief.surface, relief.patches, relief.rim, relief.length)

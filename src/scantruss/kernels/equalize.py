@@ -70,9 +70,10 @@ def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: fl
 
 
 @kernel
-def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, reach: float, slope: np.ndarray) -> float:
+def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, reach: float, still: float, slope: np.ndarray) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
+    Steps shorter than `still` are not made.
     The local surface is fitted anew where the node has left the middle of its patch by more than `reach` [scan unit].
     """
     kind = net.kind[v]
@@ -88,7 +89,7 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
     step = STRIDE * length * length / (net.degree[v] * (weight + 1.3))
     most = 0.3 * length
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
-    if size < 1e-5 * length:
+    if size < still:
         return 0.0
     if size > most:
         step *= most / size
@@ -113,12 +114,21 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
 @kernel
 def settle_all(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float, weight: float, reach: float, enough: float, sweeps: int) -> int:
     """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made."""
+    used = net.count[1]
     slope = np.empty(3)
+    awake = np.ones(used, np.int64)  # nodes that have moved, or whose neighbours have, since they were last looked at
     for sweep in range(sweeps):
         gain = 0.0
-        for v in range(net.count[1]):
-            gain += settle_node(net, surface, patches, rim, v, length, weight, reach, slope)
-        if gain < enough * net.count[1]:
+        for v in range(used):
+            if awake[v] == 1:
+                awake[v] = 0
+                gained = settle_node(net, surface, patches, rim, v, length, weight, reach, 1e-4 * length, slope)
+                gain += gained
+                if gained > 0.1 * enough:
+                    awake[v] = 1
+                    for i in range(net.degree[v]):
+                        awake[net.ring[v, i]] = 1
+        if gain < enough * used:
             return sweep + 1
     return sweeps
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from .compile import kernel
 from .grid import Net, flip, may_flip, wings
 from .vectors import Vector, cross, dot, norm, row, subtract

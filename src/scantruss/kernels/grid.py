@@ -234,7 +234,7 @@ def may_split(net: Net, a: int, b: int) -> bool:
     for v in (a, b, right, left):
         if v >= 0 and net.kind[v] == LOCKED:
             return False
-    if right >= 0 and net.degree[right] >= most or left >= 0 and net.degree[left] >= most:
+    if (right >= 0 and net.degree[right] >= most) or (left >= 0 and net.degree[left] >= most):
         return False
     if (right < 0 or left < 0) and (net.curve[a] < 0 or net.curve[a] != net.curve[b]):
         return False

@@ -16,7 +16,11 @@ from .vectors import cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
 TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
-SWEEPS = 3
+SWEEPS = 2
+HOPE = 0.06  # energy above the old one after one sweep that the next may still make good
+STILL = 0.005  # shorter steps are not made in trials, in lengths
+TIDIED = 6  # growth beyond that which flips around may take back
+FLIPS = 4  # most of these flips
 
 
 class Scratch(NamedTuple):
@@ -156,54 +160,102 @@ def disorder(net: Net, ideal: np.ndarray, move: int, a: int, b: int) -> int:
 
 
 @kernel
-def try_move(
-    net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
-) -> bool:
-    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
+def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
+    """Flip edges at the first `seeds` nodes of the neighbourhood while that lessens the disorder; returns the change of it."""
+    stamp, total, ideal = scratch.counter[0], 0, scratch.ideal
+    for _ in range(FLIPS):
+        best, a, b = 0, -1, -1
+        for k in range(seeds):
+            v = scratch.around[k]
+            d = net.degree[v]
+            for i in range(d):
+                if net.is_open[v] == 1 and (i == 0 or i == d - 1):
+                    continue
+                u, right, left = net.ring[v, i], net.ring[v, (i + d - 1) % d], net.ring[v, (i + 1) % d]
+                if scratch.mark[u] == stamp and scratch.mark[right] == stamp and scratch.mark[left] == stamp:
+                    change = 4 - 2 * (d - ideal[v] + net.degree[u] - ideal[u])
+                    change += 2 * (net.degree[right] - ideal[right] + net.degree[left] - ideal[left])
+                    if change < best and may_flip(net, v, u):
+                        best, a, b = change, v, u
+        if a < 0:
+            break
+        flip(net, a, b)
+        total += best
+    return total
 
-    `worth` is what one more node may cost. Moves that bring the numbers of neighbours far from the ideal never pay (tried: none of
-    5,000), and are not made.
-    """
-    if disorder(net, scratch.ideal, move, a, b) > TOLERATED[move]:
-        return False
-    gather(net, scratch, a, b)
-    before = local_energy(net, scratch, length, weight)
-    added = -1
+
+@kernel
+def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int) -> int:
+    """Make a move at the edge a-b; returns the node that a split adds, else -1."""
     if move == FLIP:
         flip(net, a, b)
-    elif move == COLLAPSE:
+        return -1
+    if move == COLLAPSE:
         if net.kind[a] == net.kind[b]:
             place_between(net, rim, a, a, b)
         collapse(net, a, b)
-        before -= worth
-    else:
-        added = split(net, a, b)
-        patches[added] = patches[a]
-        place_between(net, rim, added, a, b)
-        scratch.ideal[added] = 4 if net.is_open[added] == 1 else 6
-        scratch.mark[added] = scratch.counter[0]
-        scratch.around[scratch.counter[1]] = added
-        scratch.counter[1] += 1
-        before += worth
-    after = before
-    for sweep in range(SWEEPS):
-        for i in range(scratch.counter[1]):
-            settle_node(net, surface, patches, rim, scratch.around[i], length, weight, length, scratch.slope)
-        after = local_energy(net, scratch, length, weight)
-        if after > before + (0.06 if sweep == 0 else 0.02):
-            break
-    if after < before - 1e-4:
-        for i in range(scratch.counter[1]):
-            scratch.tried[scratch.around[i]] = 0
-        scratch.counter[2] += 1
-        return True
+        return -1
+    added = split(net, a, b)
+    patches[added] = patches[a]
+    place_between(net, rim, added, a, b)
+    scratch.ideal[added] = 4 if net.is_open[added] == 1 else 6
+    scratch.mark[added] = scratch.counter[0]
+    scratch.around[scratch.counter[1]] = added
+    scratch.counter[1] += 1
+    return added
+
+
+@kernel
+def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
+    """Put all around back as it was before a move."""
     if added >= 0:
+        scratch.mark[added] = 0
         scratch.counter[1] -= 1
         net.degree[added] = 0
         net.count[0] += 1
     elif move == COLLAPSE:
         net.count[0] -= 1
     put_back(net, scratch)
+
+
+@kernel
+def try_move(
+    net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
+) -> bool:
+    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
+
+    `worth` is what one more node may cost. Moves that leave the numbers of neighbours farther from the ideal hardly ever pay and
+    are not made; those that flips around can make good are.
+    """
+    change = disorder(net, scratch.ideal, move, a, b)
+    tidied = move != FLIP and change > 0
+    if change > TOLERATED[move] + (TIDIED if tidied else 0):
+        return False
+    gather(net, scratch, a, b)
+    if change > TOLERATED[move]:
+        added = make_move(net, patches, rim, scratch, move, a, b)
+        change += tidy(net, scratch, 4)
+        undo_move(net, scratch, move, added)
+        if change > TOLERATED[move]:
+            return False
+    before = local_energy(net, scratch, length, weight)
+    before += worth if move == SPLIT else (-worth if move == COLLAPSE else 0.0)
+    added = make_move(net, patches, rim, scratch, move, a, b)
+    if tidied:
+        tidy(net, scratch, 4)
+    after = before
+    for sweep in range(SWEEPS):
+        for i in range(scratch.counter[1]):
+            settle_node(net, surface, patches, rim, scratch.around[i], length, weight, length, STILL * length, scratch.slope)
+        after = local_energy(net, scratch, length, weight)
+        if after > before + HOPE:
+            break
+    if after < before - 1e-4:
+        for i in range(scratch.counter[1]):
+            scratch.tried[scratch.around[i]] = 0
+        scratch.counter[2] += 1
+        return True
+    undo_move(net, scratch, move, added)
     return False
 
 
@@ -243,6 +295,9 @@ def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: S
                 a, b = u, v
             elif choice == 3:
                 move = SPLIT
+            if choice == 0 and scratch.tried[u] == 1 and not is_regular(net, scratch.ideal, u, length):
+                i += 3  # this edge was tried from its other end
+                continue
             if move == FLIP:
                 allowed = may_flip(net, a, b)
             elif move == COLLAPSE:
