@@ -1,0 +1,148 @@
+"""Slow, obvious twins of the kernels, in plain numpy."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+
+import numpy as np
+
+
+def within(positions, place, reach):
+    """Ids of the positions within `reach` of a place, sorted."""
+    return np.flatnonzero(((np.asarray(positions) - place) ** 2).sum(axis=1) <= reach * reach).tolist()
+
+
+def thin(points, radius):
+    """Points that become sites: each that has no earlier site nearer than `radius`."""
+    chosen = []
+    for p, place in enumerate(points):
+        if not chosen or ((points[chosen] - place) ** 2).sum(axis=1).min() >= radius * radius:
+            chosen.append(p)
+    return np.array(chosen)
+
+
+def nearest(positions, site, count, far):
+    """Ids of the `count` positions nearest to one of them within `far`, nearest first, without itself."""
+    distance = np.linalg.norm(positions - positions[site], axis=1)
+    order = np.lexsort((np.arange(len(positions)), distance))
+    return [int(s) for s in order if s != site and distance[s] <= far][:count]
+
+
+def plane_normal(points):
+    """Normal of the least-squares plane, of either sign."""
+    return np.linalg.eigh(np.cov(points.T))[1][:, 0]
+
+
+def reachable(neighbors, mean, site, place, reach):
+    """Sites linked to one site over sites within `reach` of a place; the first one counts wherever it is."""
+    inside = np.linalg.norm(mean - place, axis=1) <= reach
+    found, waiting = {site}, [site]
+    while waiting:
+        for n in neighbors[waiting.pop()]:
+            if n >= 0 and inside[n] and n not in found:
+                found.add(int(n))
+                waiting.append(int(n))
+    return found
+
+
+def shape_quality(a, b, c):
+    """Eq. 5: 4 sqrt(3) area / (sum of squared sides), the area after Heron."""
+    x, y, z = np.linalg.norm(np.subtract(b, a)), np.linalg.norm(np.subtract(c, b)), np.linalg.norm(np.subtract(a, c))
+    half = (x + y + z) / 2
+    area = np.sqrt(max(half * (half - x) * (half - y) * (half - z), 0.0))
+    return 4 * np.sqrt(3) * area / (x * x + y * y + z * z)
+
+
+def size_quality(length, l1, l2):
+    """Eq. 6."""
+    return min(l1 / length, length / l1) * min(l2 / length, length / l2)
+
+
+def cross_inside(a, b, c, d):
+    """Whether two segments in the plane meet at a place inside both: where the lines through them meet."""
+    a, b, c, d = (np.asarray(p, float) for p in (a, b, c, d))
+    matrix = np.stack([b - a, c - d], axis=1)
+    if abs(np.linalg.det(matrix)) < 1e-12:
+        return False
+    s, t = np.linalg.solve(matrix, c - a)
+    return bool(0 < s < 1 and 0 < t < 1)
+
+
+def distance_to_segment(p, a, b):
+    """Least distance of a place from very many places of a segment."""
+    t = np.linspace(0, 1, 20001)[:, None]
+    return float(np.linalg.norm(np.asarray(a) + t * np.subtract(b, a) - p, axis=1).min())
+
+
+def optimal_point(points, a, b, normal, length, w1, extent):
+    """Sec. 3.4 (1): the point that makes the best triangle on ab among those in the search region; -1: none."""
+    a, b, normal = np.asarray(a, float), np.asarray(b, float), np.asarray(normal, float)
+    l0 = np.linalg.norm(b - a)
+    r = np.sqrt(3) / 2 * (w1 * length + (1 - w1) * l0)
+    best, chosen = -1.0, -1
+    for i, p in enumerate(points):
+        share = np.clip(np.dot(p - a, b - a) / l0**2, 0, 1)
+        d1 = abs(np.dot(p - (a + b) / 2, (b - a) / l0))
+        d2 = np.linalg.norm(p - a - share * (b - a))
+        if d1 <= extent and abs(d2 - r) <= extent and np.dot(np.cross(b - a, p - a), normal) > 0:
+            delta = shape_quality(a, b, p) + size_quality(l0, np.linalg.norm(p - a), np.linalg.norm(p - b))
+            if delta > best:
+                best, chosen = delta, i
+    return chosen
+
+
+def triangulations(count):
+    """Yield every way of dividing a polygon of `count` corners into triangles, as tuples of corners."""
+
+    @cache
+    def between(i, j):
+        if j - i < 2:
+            return ((),)
+        return tuple(
+            (*left, *right, (i, k, j)) for k in range(i + 1, j) for left in between(i, k) for right in between(k, j)
+        )
+
+    return between(0, count - 1)
+
+
+def directed_edges(triangles):
+    """How often each directed edge occurs."""
+    return Counter((int(t[k]), int(t[(k + 1) % 3])) for t in np.asarray(triangles) for k in range(3))
+
+
+def faults(triangles):
+    """What is wrong with a net of triangles: an empty list for a manifold one whose triangles face the same way.
+
+    Twice the same directed edge means either three triangles at an edge or two that face opposite sides; a node with
+    two separate fans is pinched.
+    """
+    found = [f"edge {e} is used {n} times in one direction" for e, n in directed_edges(triangles).items() if n > 1]
+    opposite = {}
+    for t in np.asarray(triangles).tolist():
+        if len(set(t)) < 3:
+            found.append(f"triangle {t} has a node twice")
+        for k in range(3):
+            opposite.setdefault(t[k], []).append((t[(k + 1) % 3], t[(k + 2) % 3]))
+    for node, sides in opposite.items():
+        if len(groups(sides)) > 1:
+            found.append(f"node {node} is pinched")
+    return found
+
+
+def groups(pairs):
+    """Sets of what is joined by pairs."""
+    sets = []
+    for pair in pairs:
+        joined = set(pair).union(*(s for s in sets if s & set(pair)))
+        sets = [s for s in sets if not s & set(pair)] + [joined]
+    return sets
+
+
+def topology(triangles):
+    """Components, boundary loops and Euler number of a manifold net, counted one by one."""
+    edges = directed_edges(triangles)
+    open_edges = [e for e in edges if (e[1], e[0]) not in edges]
+    whole = {tuple(sorted(e)) for e in edges}
+    nodes = {n for e in edges for n in e}
+    return len(groups(edges)), len(groups(open_edges)), len(nodes) - len(whole) + len(triangles)

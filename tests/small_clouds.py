@@ -1,0 +1,138 @@
+"""Small clouds made by hand, the scan prepared of them, and fronts laid on them segment by segment."""
+
+import numpy as np
+
+from scantruss import PointCloud, Settings
+from scantruss.front import new_front
+from scantruss.kernels import front as lists
+from scantruss.kernels.surface import PATCH
+from scantruss.scan.sites import prepare_sites
+
+
+def sheet(width, depth, spacing, *, keep=None, noise=0.0, seed=0):
+    """Points of a plate [-width/2, width/2] x [-depth/2, depth/2], on a jittered lattice that reaches the rim."""
+    rng = np.random.default_rng(seed)
+    x, y = (np.linspace(-e / 2, e / 2, round(e / spacing) + 1) for e in (width, depth))
+    u, v = (a.ravel() for a in np.meshgrid(x, y))
+    inner = (abs(u) < width / 2 - 1e-9) & (abs(v) < depth / 2 - 1e-9)
+    jitter = 0.3 * spacing * rng.uniform(-1, 1, (len(u), 2)) * inner[:, None]
+    points = np.stack([u + jitter[:, 0], v + jitter[:, 1], noise * rng.normal(size=len(u))], axis=1)
+    if keep is not None:
+        points = points[keep(points[:, 0], points[:, 1])]
+    return rng.permutation(points)
+
+
+def ring(inner, outer, spacing, *, seed=0):
+    """Points between two circles, both rims dense; `inner` 0 gives a disc."""
+    body = sheet(2 * outer, 2 * outer, spacing, seed=seed)
+    away = np.hypot(body[:, 0], body[:, 1])
+    parts = [body[(away < outer - 0.5 * spacing) & (away > inner + (0.5 * spacing if inner else -1))]]
+    for radius in (inner, outer):
+        if radius:
+            turn = np.linspace(0, 2 * np.pi, round(2 * np.pi * radius / (0.7 * spacing)), endpoint=False)
+            parts.append(radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1))
+    return np.random.default_rng(seed).permutation(np.concatenate(parts))
+
+
+def ball(radius, count, *, noise=0.0, seed=0):
+    """Points of a sphere, evenly on a spiral."""
+    rng = np.random.default_rng(seed)
+    z = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (3 - 5**0.5) * np.arange(count)
+    flat = np.sqrt(1 - z * z)
+    points = radius * np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    return rng.permutation(points + noise * rng.normal(size=points.shape))
+
+
+def tire(radius, tube, spacing, *, seed=0):
+    """Points of a torus around z."""
+    rng = np.random.default_rng(seed)
+    m, n = round(2 * np.pi * (radius + tube) / spacing), round(2 * np.pi * tube / spacing)
+    a, b = (c.ravel() for c in np.meshgrid(np.arange(m) * 2 * np.pi / m, np.arange(n) * 2 * np.pi / n))
+    a, b = a + rng.uniform(-1, 1, len(a)) / m, b + rng.uniform(-1, 1, len(b)) / n
+    away = radius + tube * np.cos(b)
+    return rng.permutation(np.stack([away * np.cos(a), away * np.sin(a), tube * np.sin(b)], axis=1))
+
+
+def cap(radius, opening, spacing, *, seed=0):
+    """Points of a dome around z, down to `opening` [radian] from its top, its rim dense."""
+    flat = ring(0.0, radius * opening, spacing, seed=seed)
+    away = np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-12)
+    side = radius * np.sin(away / radius) / away
+    return np.stack([side * flat[:, 0], side * flat[:, 1], radius * np.cos(away / radius)], axis=1)
+
+
+def turn_of(seed):
+    """A random rotation matrix."""
+    turn, upper = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    turn = turn * np.sign(np.diag(upper))
+    return turn * [1, 1, np.sign(np.linalg.det(turn))]
+
+
+def sites_of(points, length=1.0, **settings):
+    """The scan prepared for a member length."""
+    return prepare_sites(PointCloud.from_array(points), Settings(length=length, **settings))
+
+
+class HandFront:
+    """A front on the plane z = 0, laid segment by segment; the unmeshed area is on the left."""
+
+    def __init__(self, *loops, points=None, inner=(), state=(), length=1.0, **settings):
+        """loops: places (H, 2) of closed loops. inner: numbers of the nodes that are not of a boundary."""
+        points = sheet(8.0, 8.0, 0.125) if points is None else points
+        self.settings = Settings(length=length, **settings)
+        self.sites = sites_of(points, length)
+        self.surface = self.sites.surface
+        self.front = new_front(self.sites, self.settings)
+        self.numbers = numbers_of(self.settings, self.sites.spacing)
+        self.found, self.patch = np.empty(lists.NEAR, np.int64), np.zeros(PATCH)
+        self.segments = []
+        for i, loop in enumerate(loops):
+            ids = [self.add_node(*place, boundary=True) for place in loop]
+            on = state[i] if state else lists.ACTIVE
+            own = [lists.add_segment(self.front, a, b, on) for a, b in zip(ids, ids[1:] + ids[:1], strict=True)]
+            for s, after in zip(own, own[1:] + own[:1], strict=True):
+                lists.link(self.front, s, after)
+            self.segments.append(own)
+        self.front.on_boundary[list(inner)] = False
+
+    def add_node(self, x, y, z=0.0, *, boundary=False):
+        place = (float(x), float(y), float(z))
+        site = int(((self.surface.mean - place) ** 2).sum(axis=1).argmin())
+        up = (0.0, 0.0, 1.0) if self.surface.normals[site, 2] > 0 else (0.0, 0.0, -1.0)
+        assert up[2] > 0, "the normals of a plate point upwards"
+        n = lists.propose_node(self.front, place, up, site, boundary)
+        lists.add_node(self.front)
+        return n
+
+    def near(self, s, reach=2.4):
+        """Number of nodes near a segment, in `found`."""
+        return lists.near_nodes(self.surface, self.front, s, reach, self.settings.length, self.found)
+
+    @property
+    def triangles(self):
+        """Sets of the nodes of the triangles so far, in order."""
+        return [frozenset(t) for t in self.front.triangles[: self.front.count[lists.TRIANGLES]].tolist()]
+
+    @property
+    def alive(self):
+        """(tail, head) of the segments of the front that are left, with their states."""
+        count = self.front.count[lists.SEGMENTS]
+        rows = zip(self.front.tail[:count], self.front.head[:count], self.front.state[:count], strict=True)
+        return {(int(t), int(h)): int(state) for t, h, state in rows if state != lists.GONE}
+
+    @property
+    def nodes(self):
+        return self.front.nodes[: self.front.count[lists.NODES]]
+
+
+def numbers_of(settings, spacing, strict=1.0):
+    """The numbers that steer a front, for the kernels."""
+    numbers = np.zeros(10)
+    numbers[lists.LENGTH], numbers[lists.NEARNESS] = settings.length, settings.nearness
+    numbers[lists.W1], numbers[lists.MERGE] = settings.length_weight, np.radians(settings.merge_angle)
+    numbers[lists.SHAPE], numbers[lists.SIZE] = settings.shape_weight, settings.size_weight
+    numbers[lists.RANGE], numbers[lists.STRICT] = settings.search_range * spacing, strict
+    numbers[lists.PAPER] = float(settings.method == "paper")
+    numbers[lists.QUADRANGLE] = float(settings.case3 == "quadrangle")
+    return numbers

@@ -1,0 +1,94 @@
+"""3-vectors as tuples agree with numpy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scantruss.kernels.vectors import across, along, cross, dot, norm, row, smallest_eigenvector, subtract, unit
+
+pytestmark = pytest.mark.kernels
+
+number = st.floats(-1e3, 1e3).map(lambda x: x if abs(x) > 1e-9 else 0.0)
+vector = st.tuples(number, number, number)
+
+
+@given(vector, vector, number)
+def test_arithmetic_is_that_of_numpy(a, b, t):
+    u, v = np.array(a), np.array(b)
+    assert np.allclose(subtract(a, b), u - v)
+    assert np.allclose(along(a, t, b), u + t * v)
+    assert np.isclose(dot(a, b), u @ v)
+    assert np.allclose(cross(a, b), np.cross(u, v))
+    assert np.isclose(norm(a), np.linalg.norm(u))
+    assert row(np.stack([v, u]), 1) == a
+
+
+@given(vector)
+def test_unit_has_length_one_and_keeps_the_direction(a):
+    length = np.linalg.norm(a)
+    if length > 1e-100:
+        assert np.allclose(np.array(unit(a)) * length, a)
+        assert np.isclose(np.linalg.norm(unit(a)), 1)
+
+
+def test_the_zero_vector_stays_zero():
+    assert unit((0.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
+    assert norm((0.0, 0.0, 0.0)) == 0.0
+
+
+@given(vector)
+def test_across_is_a_unit_vector_at_right_angles(a):
+    if np.linalg.norm(a) > 1e-6:
+        n = unit(a)
+        u = across(n)
+        assert np.isclose(np.linalg.norm(u), 1)
+        assert abs(dot(u, n)) < 1e-12
+        assert across(n) == u
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_across_works_along_every_axis(axis):
+    n = tuple(float(axis == k) for k in range(3))
+    assert np.isclose(norm(across(n)), 1) and dot(across(n), n) == 0
+
+
+def assert_smallest(matrix):
+    """The vector is a unit vector, and its Rayleigh quotient is the smallest eigenvalue of numpy."""
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = matrix.tolist()
+    v = np.array(smallest_eigenvector(xx, xy, xz, yy, yz, zz))
+    values = np.linalg.eigvalsh(matrix)
+    assert np.isclose(np.linalg.norm(v), 1)
+    assert v @ matrix @ v <= values[0] + 1e-7 * max(np.abs(values).max(), 1e-300)
+
+
+@given(st.lists(vector, min_size=1, max_size=12))
+def test_smallest_eigenvector_agrees_with_numpy(rows):
+    points = np.array(rows)
+    points -= points.mean(axis=0)
+    assert_smallest(points.T @ points)
+
+
+@given(st.tuples(number, number, number), st.integers(0, 50))
+def test_smallest_eigenvector_of_a_turned_diagonal_matrix(values, seed):
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    matrix = turn @ np.diag(values) @ turn.T
+    assert_smallest((matrix + matrix.T) / 2)
+
+
+def test_smallest_eigenvector_where_eigenvalues_coincide():
+    assert_smallest(np.diag([2.0, 2.0, 2.0]))
+    assert_smallest(np.diag([2.0, 2.0, 1.0]))
+    assert_smallest(np.diag([1.0, 1.0, 2.0]))  # points on a line: any normal of it
+    assert smallest_eigenvector(0.0, 0.0, 0.0, 0.0, 0.0, 0.0) == (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1.0, 1e6, 1e12])
+def test_smallest_eigenvector_does_not_depend_on_the_scale(scale):
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(20, 3)) * [1.0, 0.7, 0.1]
+    matrix = points.T @ points
+    expected = np.linalg.eigh(matrix)[1][:, 0]
+    m = matrix * scale
+    found = np.array(smallest_eigenvector(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]))
+    assert abs(found @ expected) > 1 - 1e-12
