@@ -12,9 +12,12 @@ FILE = Path(__file__).resolve().parents[1] / "docs" / "numbers.md"
 
 def main() -> None:
     """Measure and write, losses first."""
+    print("speed ...", flush=True)
     speed = first_figures.first_figures()
-    surface = table3.table3()
+    print("the examples of the paper ...", flush=True)
     examples = quality.examples()
+    print("by way of a surface ...", flush=True)
+    surface = table3.table3()
     losses = [f"- {row.what}: {row.ratio:.2f}, the aim is at most {row.aim:g}." for row in speed if row.lost]
     losses += [f"- By way of a B-spline surface, {c.name}: {c.ratio:.2f} of our time." for c in surface if c.ratio < 1]
     losses += [f"- {loss}" for example in examples for loss in example.losses()]

@@ -112,7 +112,7 @@ HEADER = (
 )
 
 
-def table3(rounds: int = 5) -> list[Comparison]:
+def table3(rounds: int = 3) -> list[Comparison]:
     """Return the four examples."""
     return [compare(make(name, POINTS), rounds) for name in PAPER]
 
