@@ -22,6 +22,7 @@ ARM = (0.1, 0.8)  # part of the curve at each side of a place that tells its dir
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
+NEAR_CORNER = 0.2  # what lies nearer to a corner, in member lengths, is rounded off and does not tell its place
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
 
@@ -249,7 +250,7 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
 
     The direction before and after each place comes from curves fitted to its two arms; a corner is where they differ most, by more
     than `corner_angle`. Quadratics tell a corner from a bend, lines are not misled by a ragged rim: both must turn. The place of
-    the corner is where the two quadratics meet.
+    the corner is where the two arms meet.
     """
     if len(curve) < 2 * round(ARM[1] / STEP) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
@@ -261,13 +262,32 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     at: list[int] = []
     places: list[np.ndarray] = []
     for i in np.flatnonzero((turn >= highest) & (turn > settings.corner_angle)).tolist():
-        place = _meeting([c[i] for c in before], [c[i] for c in after])
+        place, centre = curve[i], i
+        for _ in range(3):
+            place = _meeting(_best_arm(curve, centre, -1), _best_arm(curve, centre, 1))
+            window = np.arange(i - half, i + half + 1) % len(curve)
+            centre = int(window[np.argmin(((curve[window] - place) ** 2).sum(axis=1))])
         if np.linalg.norm(place - curve[i]) < 0.5 * settings.length and (not at or i - at[-1] > half):
             at.append(i)
             places.append(place)
     if len(at) > 1 and at[0] + len(curve) - at[-1] <= half:
         at, places = at[:-1], places[:-1]
     return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
+
+
+def _best_arm(curve: np.ndarray, at: int, sign: int) -> list[np.ndarray]:
+    """Coefficients of one arm as in `_arm`: a line, unless a quadratic lies clearly nearer; it carries on with less noise."""
+    offsets = sign * np.arange(round(NEAR_CORNER / STEP), round(ARM[1] / STEP) + 1)
+    places = curve[(at + offsets) % len(curve)]
+    fits = []
+    for degree in (1, 2):
+        terms = np.vander(offsets.astype(float), degree + 1, increasing=True)
+        found = np.linalg.lstsq(terms, places, rcond=None)[0]
+        fits.append((float(((terms @ found - places) ** 2).sum()), found))
+    (error, line), (least, quadratic) = fits
+    if error < 2.0 * least + 1e-6 * ((places[-1] - places[0]) ** 2).sum():
+        return [line[0], line[1], np.zeros(3)]
+    return list(quadratic)
 
 
 def _meeting(before: list[np.ndarray], after: list[np.ndarray]) -> np.ndarray:

@@ -60,7 +60,7 @@ def optimize_grid(
         A fixed position is farther than half a member from the scan or closer than that to another.
     """
     from ..boundary import find_boundary
-    from ..scan.sites import surface_of
+    from ..scan.sites import narrow_surface, prepare_sites, surface_of
 
     surface = surface_of(cloud, settings)
     positions = check_positions(settings.fixed if fixed is None else fixed, cloud, surface, settings.length)
@@ -83,6 +83,8 @@ def optimize_grid(
         equalize(relief, report)
         fix_nodes(relief, positions)
         finish(relief)
+    sites = prepare_sites(cloud, settings)
+    relief.land(narrow_surface(sites, 40.0), narrow_surface(sites, 120.0))
     if report:
         report(1.0)
     return relief.to_grid(grid).replace(settings=settings, before=before)

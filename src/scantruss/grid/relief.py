@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import grid as kernels
-from ..kernels.equalize import measure_deviation, seat_nodes
+from ..kernels import seat
 from ..kernels.grid import INTERIOR, LOCKED, REST, RIM, Net
+from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
 from .grid import Grid
 
+NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
 
 
@@ -49,7 +51,8 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         count=np.zeros(2, np.int64),
     )
     source = np.full(capacity, -1, np.int64)
-    used = kernels.fill_rings(corner_node, partner, net.ring, net.degree, net.is_open, source, count)
+    fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
+    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.degree, net.is_open, source, count)
     net.nodes[:used] = grid.nodes[source[:used]]
     spare = np.arange(capacity - 1, used - 1, -1)
     net.free[: len(spare)] = spare
@@ -92,6 +95,7 @@ class Relief:
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
     length: float  #: desired member length [scan unit]
+    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
 
     @classmethod
     def from_grid(cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float) -> Relief:
@@ -121,13 +125,30 @@ class Relief:
             if not at_corner and not fixed[v]:
                 net.kind[v] = RIM
         patches = np.zeros((len(net.degree), PATCH))
-        seat_nodes(net, surface, patches, length)
-        return cls(net, source, surface, patches, fixed, rim, length)
+        queue, seated = np.zeros((2, len(net.degree)), np.int64)
+        seat.seat_nodes(net, surface, patches, length, queue, seated)
+        seat.renew_patches(net, surface, patches, 0.0)
+        return cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan))
+
+    def land(self, fine: Surface, middle: Surface) -> None:
+        """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes stay."""
+        self.landed[:] = 0.0
+        land_nodes(self.net, fine, middle, self.surface, self.patches, self.fixed, self.landed)
+
+    def renew(self, near: float) -> int:
+        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; returns how many."""
+        return seat.renew_patches(self.net, self.surface, self.patches, near * self.length)
+
+    def return_to_scan(self, near: float) -> None:
+        """Bring the nodes back onto the scan and the boundary curves; patches no farther than `near` lengths."""
+        self.renew(near)
+        seat.return_to_scan(self.net, self.patches, self.rim, 0.5 * self.length)
 
     def deviation(self) -> np.ndarray:
         """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
         values = np.zeros(len(self.net.degree))
-        measure_deviation(self.net, self.surface, self.patches, 0.05 * self.length, values)
+        self.renew(0.05)
+        seat.distances_from_scan(self.net, self.patches, values)
         return values
 
     def to_grid(self, grid: Grid) -> Grid:

@@ -142,7 +142,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
                         buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
                         buffer[taken, 3] = w * w
                         taken += 1
-        if taken >= 12 or radius >= 1.6 * surface.scale[2]:
+        if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]):
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)

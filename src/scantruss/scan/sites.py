@@ -50,6 +50,15 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     return kept[key]
 
 
+def narrow_surface(sites: Sites, points: float) -> Surface:
+    """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan."""
+    surface = sites.surface
+    radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
+    scale = surface.scale.copy()
+    scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
+    return surface._replace(scale=scale)
+
+
 def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
     """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
     normals = surface.normals

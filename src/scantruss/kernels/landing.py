@@ -1,0 +1,72 @@
+"""The last step: every node comes down on the scanned surface itself, not on the smoother one that it was moved over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compile import kernel
+from .grid import INTERIOR, Net
+from .surface import Surface, fit_patch, onto_patch, patch_normal
+from .vectors import Vector, along, dot, norm, row, subtract
+
+
+LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
+
+
+@kernel
+def _fit_widest(fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
+    """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off."""
+    taken = fit_patch(fine, patch, site, place)
+    least = patch[17]
+    kept = patch.copy()
+    for turn in range(2):
+        more = fit_patch(middle if turn == 0 else broad, patch, site, place)
+        if more < 4 or patch[17] > LIKE * least:
+            patch[:] = kept
+            break
+        taken = more
+        kept[:] = patch
+    return taken
+
+
+@kernel
+def land_nodes(
+    net: Net,
+    fine: Surface,
+    middle: Surface,
+    broad: Surface,
+    patches: np.ndarray,
+    fixed: np.ndarray,
+    deviation: np.ndarray,
+) -> None:
+    """Move each node to its foot on the surface of the nearest points; nodes of a boundary only along the normal.
+
+    Parameters
+    ----------
+    fine, middle, broad : Surface
+        The same scan with narrow patches, which follow it, and with wider ones, which average its noise.
+    patches : (C, PATCH), scratch; column 15 is the site near each node
+    fixed : (C,) bool, nodes that stay where they are
+    deviation : (C,), filled with the distance of each node from the surface [scan unit]
+    """
+    for v in range(net.count[1]):
+        if net.degree[v] == 0:
+            continue
+        for turn in range(3):
+            place = row(net.nodes, v)
+            site = int(patches[v, 15])
+            if turn == 0:
+                taken = fit_patch(broad, patches[v], site, place)
+            else:
+                taken = _fit_widest(fine, middle, broad, patches[v], site, place)
+            if taken < 4:
+                break
+            foot = onto_patch(patches[v], place)
+            if net.kind[v] != INTERIOR:
+                normal = patch_normal(patches[v], foot)
+                foot = along(place, dot(subtract(foot, place), normal), normal)
+            if fixed[v] or norm(subtract(foot, place)) > 0.6 * broad.scale[0]:
+                break
+            net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
+        place = row(net.nodes, v)
+        deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))
