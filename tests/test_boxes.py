@@ -108,6 +108,12 @@ def test_places_outside_the_bounds_belong_to_the_outermost_box():
     assert box_index(boxes, 0, 1e6) == boxes.counts[0] - 1
 
 
+@pytest.mark.parametrize("thickness", [1e-12, 1e-20, 1e-200])
+def test_a_hair_of_thickness_hides_no_point(thickness):
+    points = np.array([[0.0, 0, 0], [1, 0, thickness], [2, 1, 0], [2, 2, thickness]])
+    assert found_in(filled(points, 1.0), points, (1.0, 0.0, 0.0), 5.0) == [0, 1, 2, 3]
+
+
 def test_very_many_boxes_cost_no_memory():
     """Two clusters very far apart: only occupied boxes are kept."""
     points = np.array([[0.0, 0, 0], [1e6, 1e6, 1e6], [1e6 + 0.5, 1e6, 1e6]])

@@ -83,7 +83,14 @@ def test_smallest_eigenvector_where_eigenvalues_coincide():
     assert smallest_eigenvector(0.0, 0.0, 0.0, 0.0, 0.0, 0.0) == (0.0, 0.0, 1.0)
 
 
-@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1.0, 1e6, 1e12])
+@pytest.mark.parametrize("line", [(1, 0, 0), (0, 1, -1), (1, -1, 0), (1, 1, -2), (1, 1, 1), (-3, 2, 1)])
+@pytest.mark.parametrize("length", [1.0, 1 / 3, 0.7, 123.4])
+def test_smallest_eigenvector_of_points_on_a_line_is_across_it(line, length):
+    points = np.array([[-1.0], [0.0], [1.0]]) * np.array(line) * length
+    assert_smallest(points.T @ points)
+
+
+@pytest.mark.parametrize("scale", [1e-190, 1e-90, 1e-12, 1.0, 1e12, 1e90, 1e190])
 def test_smallest_eigenvector_does_not_depend_on_the_scale(scale):
     rng = np.random.default_rng(1)
     points = rng.normal(size=(20, 3)) * [1.0, 0.7, 0.1]
