@@ -120,7 +120,8 @@ def test_equation_8_lines_that_cross():
 def test_equation_9_lines_whose_extensions_cross_do_not():
     """Eq. 8 holds (C and D lie on two sides of the line through AB), but the lines meet at x = 5, beyond B."""
     a, b, c, d = (0.0, 0.0), (4.0, 0.0), (5.0, -1.0), (5.0, 1.0)
-    eight = np.cross([*np.subtract(a, c), 0], [*np.subtract(b, c), 0]) @ np.cross([*np.subtract(a, d), 0], [*np.subtract(b, d), 0])  # fmt: skip
+    ca, cb, da, db = (np.array([*np.subtract(to, start), 0.0]) for start in (c, d) for to in (a, b))
+    eight = np.cross(ca, cb) @ np.cross(da, db)
     assert eight < 0
     assert not segments_cross(a, b, c, d)
     assert segments_cross(a, (6.0, 0.0), c, d)

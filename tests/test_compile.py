@@ -1,0 +1,167 @@
+"""Machine code is kept under the contents of all kernel files, and nothing fails for want of a folder."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from scantruss.kernels import compile as compiling
+
+KERNELS = Path(compiling.__file__).parent
+
+
+@pytest.fixture
+def copied(tmp_path, monkeypatch):
+    """The kernel files, copied where they may be changed."""
+    folder = tmp_path / "kernels"
+    shutil.copytree(KERNELS, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(compiling, "__file__", str(folder / "compile.py"))
+    return folder
+
+
+@pytest.fixture
+def no_home(monkeypatch):
+    """Neither of the places that are tried is named by the environment."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_the_name_changes_when_any_kernel_file_changes(copied):
+    seen = {compiling._contents()}
+    assert compiling._contents() in seen
+    for path in sorted(copied.glob("*.py")):
+        path.write_text(path.read_text() + "\n# a change\n")
+        digest = compiling._contents()
+        assert digest not in seen, path.name
+        seen.add(digest)
+    (copied / "another.py").write_text("")
+    (copied / "another.py").write_text("x = 1\n")
+    assert compiling._contents() not in seen
+
+
+def test_a_copy_of_the_same_files_has_the_same_name(copied, monkeypatch):
+    copy = compiling._contents()
+    monkeypatch.setattr(compiling, "__file__", str(KERNELS / "compile.py"))
+    assert compiling._contents() == copy
+
+
+def test_bounds_checks_have_a_folder_of_their_own(monkeypatch):
+    monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
+    plain = compiling._contents()
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    assert compiling._contents() != plain
+
+
+def test_another_numba_has_a_folder_of_its_own(monkeypatch):
+    plain = compiling._contents()
+    monkeypatch.setattr(compiling.numba, "__version__", "0.0.1")
+    assert compiling._contents() != plain
+
+
+@pytest.mark.parametrize("name", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
+def test_the_folder_is_where_the_environment_says(name, tmp_path, no_home, monkeypatch):
+    monkeypatch.setenv(name, str(tmp_path / "cache"))
+    folder = compiling._folder()
+    assert folder is not None and folder.is_dir()
+    assert folder.is_relative_to(tmp_path / "cache")
+    assert compiling._contents() in folder.name
+
+
+def refuse(*allowed):
+    """Return a `TemporaryFile` that fails but in the folders below `allowed`, as on a disk that cannot be written."""
+    real = tempfile.TemporaryFile
+
+    def temporary_file(*args, dir=None, **others):
+        if not any(Path(dir).is_relative_to(a) for a in allowed):
+            raise PermissionError(13, "Permission denied", str(dir))
+        return real(*args, dir=dir, **others)
+
+    return temporary_file
+
+
+def test_the_temporary_folder_serves_where_home_cannot_be_written(tmp_path, no_home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse(tmp_path / "temporary"))
+    folder = compiling._folder()
+    assert folder is not None and folder.is_relative_to(tmp_path / "temporary")
+
+
+def test_no_folder_at_all_is_no_error(tmp_path, no_home, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse())
+    assert compiling._folder() is None
+
+
+def test_no_home_is_no_error(tmp_path, no_home, monkeypatch):
+    def no_home_folder():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", no_home_folder)
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
+    folder = compiling._folder()
+    assert folder is not None and folder.is_relative_to(tmp_path)
+
+
+def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch):
+    monkeypatch.setattr(compiling, "FOLDER", None)
+
+    @compiling.kernel
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    assert twice(21.0) == 42.0
+    assert not compiling.is_compiled()
+
+
+def test_the_decorator_leaves_the_settings_of_numba_alone():
+    kept = compiling.numba.config.CACHE_DIR
+
+    @compiling.kernel
+    def one() -> float:
+        return 1.0
+
+    assert one() == 1.0
+    assert kept == compiling.numba.config.CACHE_DIR
+
+
+CODE = """
+import scantruss.kernels.vectors as v
+from scantruss.kernels import compile as c
+assert v.norm((3.0, 4.0, 0.0)) == 5.0
+print(c.FOLDER, c.is_compiled())
+"""
+
+
+def run(**environment):
+    """Run CODE in another process; return the words it prints."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    kept.pop("NUMBA_DISABLE_JIT", None)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", CODE], capture_output=True, text=True, env=kept | environment
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_a_fresh_process_keeps_its_machine_code_and_finds_it_again(tmp_path):
+    first, kept = run(NUMBA_CACHE_DIR=str(tmp_path))
+    files = sorted(path for path in Path(first).rglob("*.nbc"))
+    assert Path(first).is_relative_to(tmp_path) and kept == "True" and files
+    stamps = [path.stat().st_mtime_ns for path in files]
+    assert run(NUMBA_CACHE_DIR=str(tmp_path)) == [first, "True"]
+    again = sorted(path for path in Path(first).rglob("*.nbc"))
+    assert again == files and [path.stat().st_mtime_ns for path in again] == stamps  # nothing was compiled again
+
+
+def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path):
+    """The home of the cache and the temporary folder are files: no folder can be made in them, not even by root."""
+    file = tmp_path / "file"
+    file.write_text("")
+    folder, _ = run(XDG_CACHE_HOME=str(file), HOME=str(file), TMPDIR=str(file), TEMP=str(file), TMP=str(file))
+    assert not Path(folder).is_relative_to(file)
