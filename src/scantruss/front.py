@@ -43,7 +43,6 @@ def advance_front(
             settings.size_weight,
             settings.search_range * sites.spacing,
             1.0,
-            float(settings.method == "paper"),
             float(settings.case3 == "quadrangle"),
         ]
     )
@@ -52,7 +51,8 @@ def advance_front(
         count = int(front.count[lists.SEGMENTS])
         for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
             lists.enqueue(front, s)
-        front = run(front, sites, numbers, progress)
+        by_cases = settings.method == "paper" and strict == STRICTNESS[0]
+        front = run(front, sites, numbers, progress, kernels.advance_by_cases if by_cases else kernels.advance)
     close_gaps(front, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     used, numbered = np.unique(triangles, return_inverse=True)
@@ -179,11 +179,13 @@ def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
         lists.link(front, s, segments[(i + 1) % 3])
 
 
-def run(front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None) -> lists.Front:
-    """Advance until no active segment is left; arrays grow as needed."""
+def run(
+    front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
+) -> lists.Front:
+    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = sites.area / (0.433 * numbers[lists.LENGTH] ** 2)
     while True:
-        status = kernels.advance(sites.surface, front, numbers, BUDGET)
+        status = step(sites.surface, front, numbers, BUDGET)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:

@@ -19,7 +19,6 @@ from .front import (
     NEAR,
     NEARNESS,
     NODES,
-    PAPER,
     SEGMENTS,
     SHAPE,
     SIZE,
@@ -125,28 +124,54 @@ def choose_by_quality(
 
 
 @kernel
+def has_room(front: Front) -> bool:
+    """Whether the arrays hold what advancing one segment may add."""
+    return (
+        front.count[NODES] + 2 <= len(front.nodes)
+        and front.count[SEGMENTS] + 4 <= len(front.tail)
+        and front.count[TRIANGLES] + 3 <= len(front.triangles)
+        and front.count[LAST] - front.count[FIRST] + 4 <= len(front.queue)
+    )
+
+
+@kernel
+def take_segment(front: Front) -> int:
+    """Next active segment of the queue, -1 where it is empty."""
+    while front.count[FIRST] < front.count[LAST]:
+        s = front.queue[front.count[FIRST] % len(front.queue)]
+        front.count[FIRST] += 1
+        if front.state[s] == ACTIVE:
+            return s
+    return -1
+
+
+@kernel
 def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
-    """Advance queued segments until the queue is empty (DONE), the budget is spent (MORE) or an array is full (FULL)."""
+    """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(NEAR, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):
-        if front.count[FIRST] == front.count[LAST]:
-            return DONE
-        if (
-            front.count[NODES] + 2 > len(front.nodes)
-            or front.count[SEGMENTS] + 4 > len(front.tail)
-            or front.count[TRIANGLES] + 3 > len(front.triangles)
-            or front.count[LAST] - front.count[FIRST] + 4 > len(front.queue)
-        ):
+        if not has_room(front):
             return FULL
-        s = front.queue[front.count[FIRST] % len(front.queue)]
-        front.count[FIRST] += 1
-        if front.state[s] != ACTIVE:
-            continue
-        if numbers[PAPER] > 0.0 and numbers[STRICT] == 1.0:
-            advanced = choose_by_case(surface, front, s, numbers, found, patch)
-        else:
-            advanced = choose_by_quality(surface, front, s, numbers, found, patch)
-        if not advanced:
+        s = take_segment(front)
+        if s < 0:
+            return DONE
+        if not choose_by_quality(surface, front, s, numbers, found, patch):
+            front.state[s] = WAITING
+    return MORE
+
+
+@kernel
+def advance_by_cases(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
+    """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
+    found = np.empty(NEAR, np.int64)
+    patch = np.zeros(PATCH)
+    for _ in range(budget):
+        if not has_room(front):
+            return FULL
+        s = take_segment(front)
+        if s < 0:
+            return DONE
+        if not choose_by_case(surface, front, s, numbers, found, patch):
             front.state[s] = WAITING
     return MORE

@@ -27,7 +27,7 @@ from .vectors import Vector, across, along, cross, dot, norm, row, subtract, uni
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
-LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, PAPER, QUADRANGLE = range(10)  # places in `numbers`
+LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(9)  # places in `numbers`
 NEAR = 400  # most front nodes looked at in one step
 
 

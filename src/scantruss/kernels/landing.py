@@ -9,7 +9,6 @@ from .grid import INTERIOR, Net
 from .surface import Surface, fit_patch, onto_patch, patch_normal
 from .vectors import Vector, along, dot, norm, row, subtract
 
-
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 
 

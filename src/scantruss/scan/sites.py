@@ -25,6 +25,7 @@ class Sites:
     surface: Surface
     boxes: SearchBoxes  #: the sites by box
     piece: np.ndarray  #: (S,) int64 number of the connected piece of each site, the largest piece is 0
+    thickness: np.ndarray  #: (S,) rms distance of each site and its neighbours from their plane [scan unit]
     spacing: float  #: typical distance between neighbouring points [scan unit]
     area: float  #: rough area of the scanned surface [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
@@ -102,7 +103,7 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float)
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
     piece = _number(piece)
     area = _site_areas(surface)
-    return Sites(surface, boxes, piece, spacing, float(area.sum()), _large_pieces(piece, area, length))
+    return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), _large_pieces(piece, area, length))
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -190,7 +191,8 @@ def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> N
 def check_two_sided(sites: Sites) -> None:
     """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
 
-    Counted are links in which smooth neighbours lie side by side and yet face opposite sides; rough scans have a few by chance.
+    Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
+    or overgrown that happens by chance.
     """
     surface = sites.surface
     site, k = np.nonzero(surface.neighbors >= 0)
@@ -202,7 +204,8 @@ def check_two_sided(sites: Sites) -> None:
     rise = np.maximum(
         np.abs((step * surface.normals[site]).sum(axis=1)), np.abs((step * surface.normals[other]).sum(axis=1))
     )
-    if (rise < 0.3 * far).sum() >= 48:
+    smooth = np.maximum(sites.thickness[site], sites.thickness[other]) < 0.15 * surface.scale[4]
+    if (smooth & (rise < 0.3 * far)).sum() >= 40:
         raise InputError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
         )
