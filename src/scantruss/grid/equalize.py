@@ -14,16 +14,15 @@ import numpy as np
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
 from ..kernels.search import Scratch, search, suit_nodes, total_energy
-from ..kernels.smoothing import return_to_scan
 from .flips import FOLD, ROUNDS
-from .relief import Relief
+from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = 2.0  # the same in the last sweeps, which no longer change the topology
 PRICE = 12.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
-NEAR, FAR = 0.25, 0.5  # how far a node may leave the middle of its patch, in lengths: at last, on the way
+FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
 def new_scratch(relief: Relief) -> Scratch:
@@ -35,16 +34,16 @@ def new_scratch(relief: Relief) -> Scratch:
 
     scratch = Scratch(
         mark=ids(capacity), ideal=ids(capacity), tried=ids(capacity), around=ids(capacity), nodes=np.zeros((capacity, 4)),
-        ring=ids(capacity, width), degree=ids(capacity), counter=ids(3), slope=np.zeros(3),
+        ring=ids(capacity, width), degree=ids(capacity), counter=ids(3),
     )  # fmt: skip
     suit_nodes(relief.net, scratch.ideal)
     return scratch
 
 
-def settle(relief: Relief, weight: float, reach: float, enough: float, sweeps: int) -> int:
+def settle(relief: Relief, weight: float, enough: float, sweeps: int) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made."""
-    net, length = relief.net, relief.length
-    return settle_all(net, relief.surface, relief.patches, relief.rim, length, weight, reach * length, enough, sweeps)
+    awake = np.ones(len(relief.net.degree), np.int64)
+    return settle_all(relief.net, relief.patches, relief.rim, awake, relief.length, weight, enough, sweeps)
 
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
@@ -52,26 +51,26 @@ def search_once(relief: Relief, scratch: Scratch) -> int:
     energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
     share = min(energy / max(count, 1), SHARE)
     strain = mean / relief.length - 1.0
-    return search(
-        relief.net, relief.surface, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share
-    )
+    return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
 
 
 def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle, search while it pays, settle: the default way to improve a grid."""
     flip_by_angle(relief.net, FOLD, ROUNDS)
-    settle(relief, WEIGHT, FAR, 1e-3, 60)
+    settle(relief, WEIGHT, 1e-3, 60)
     scratch = new_scratch(relief)
     for done in range(SEARCHES):
         if progress:
             progress(0.2 + 0.6 * done / SEARCHES)
         if search_once(relief, scratch) == 0:
             break
-        settle(relief, WEIGHT, FAR, 1e-4, 8)
+        relief.renew(FAR)
+        settle(relief, WEIGHT, 1e-4, 8)
 
 
 def finish(relief: Relief) -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, members a little more even."""
-    return_to_scan(relief.net, relief.surface, relief.patches, relief.rim, relief.length)
-    settle(relief, EVEN, NEAR, 1e-5, 40)
-    return_to_scan(relief.net, relief.surface, relief.patches, relief.rim, relief.length)
+    for sweeps in (20, 20):
+        relief.renew(NEAR)
+        settle(relief, EVEN, 1e-5, sweeps)
+    relief.return_to_scan(NEAR)

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from ..kernels.equalize import nearest_site
+from ..kernels.seat import nearest_site
 from ..kernels.grid import REST, RIM, Net, may_split, split
 from ..kernels.rim import nearest_on_rim
 from ..kernels.search import Scratch, total_energy
 from ..kernels.surface import Surface
 from ..scan.cloud import PointCloud
-from .equalize import WEIGHT, new_scratch, search_once, settle
+from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
 AT_RIM = 0.3  # a position this near to the boundary becomes a boundary node, in lengths
@@ -170,7 +170,8 @@ def _take(relief: Relief, scratch: Scratch, way: tuple[int, int], place: np.ndar
         around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
     scratch.tried[sorted(around)] = 0
     for _ in range(3):
-        settle(relief, WEIGHT, 0.5, 1e-3, 6)
+        relief.renew(FAR)
+        settle(relief, WEIGHT, 1e-3, 6)
         if search_once(relief, scratch) == 0:
             break
 

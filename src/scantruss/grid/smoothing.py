@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kernels import smoothing as kernels
 from ..settings import Settings
-from .relief import Relief
+from .relief import NEAR, Relief
 
 
 class State(NamedTuple):
@@ -61,7 +61,7 @@ def smooth(relief: Relief, settings: Settings) -> Smoothing:
         before[:], arc[:] = net.nodes, net.arc
         kernels.move_to_middle(net, settings.smooth_forward, spare)
         kernels.move_to_middle(net, settings.smooth_backward, spare)
-        kernels.return_to_scan(net, relief.surface, relief.patches, relief.rim, relief.length)
+        relief.return_to_scan(NEAR)
         after = State(*kernels.state_of(net, start))
         stop = ""
         if moved_too_far(after, allowed):

@@ -13,16 +13,15 @@ import numpy as np
 from .compile import kernel
 from .grid import INTERIOR, REST, RIM, Net
 from .rim import Rim, slide
-from .surface import Surface, fit_patch, onto_patch, walk
-from .vectors import norm, row, subtract
+from .surface import onto_patch
 
 ROOT = 4.0 * math.sqrt(3.0)
 STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes move together
 
 
 @kernel
-def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float, slope: np.ndarray) -> float:
-    """Energy of the members and triangles at node v if it stood at (x, y, z); `slope` (3,) gets its gradient.
+def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float) -> tuple[float, float, float, float]:
+    """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient.
 
     A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
     """
@@ -65,23 +64,20 @@ def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: fl
         sy += h * (by + cy) - f * (ez * ux - ex * uz)
         sz += h * (bz + cz) - f * (ex * uy - ey * ux)
     side = 1.0 if shape >= 0.0 else -1.0
-    slope[0], slope[1], slope[2] = gx - side * sx, gy - side * sy, gz - side * sz
-    return energy - side * shape
+    return energy - side * shape, gx - side * sx, gy - side * sy, gz - side * sz
 
 
 @kernel
-def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, reach: float, still: float, slope: np.ndarray) -> float:
+def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
     Steps shorter than `still` are not made.
-    The local surface is fitted anew where the node has left the middle of its patch by more than `reach` [scan unit].
     """
     kind = net.kind[v]
     if kind >= REST or net.degree[v] == 0:
         return 0.0
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
-    before = star_energy(net, patches, v, x, y, z, length, weight, slope)
-    gx, gy, gz = slope[0], slope[1], slope[2]
+    before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight)
     if kind == INTERIOR:
         nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
         across = gx * nx + gy * ny + gz * nz
@@ -99,10 +95,8 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
         if kind == RIM:
             arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
-            if norm(subtract(place, row(patches, v))) > reach:
-                fit_patch(surface, patches[v], int(patches[v, 15]), place)
             px, py, pz = onto_patch(patches[v], place)
-        after = star_energy(net, patches, v, px, py, pz, length, weight, slope)
+        after = star_energy(net, patches, v, px, py, pz, length, weight)[0]
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
             net.arc[v] = arc
@@ -112,17 +106,18 @@ def settle_node(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, v: in
 
 
 @kernel
-def settle_all(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float, weight: float, reach: float, enough: float, sweeps: int) -> int:
-    """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made."""
+def settle_all(net: Net, patches: np.ndarray, rim: Rim, awake: np.ndarray, length: float, weight: float, enough: float, sweeps: int) -> int:
+    """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made.
+
+    `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.
+    """
     used = net.count[1]
-    slope = np.empty(3)
-    awake = np.ones(used, np.int64)  # nodes that have moved, or whose neighbours have, since they were last looked at
     for sweep in range(sweeps):
         gain = 0.0
         for v in range(used):
             if awake[v] == 1:
                 awake[v] = 0
-                gained = settle_node(net, surface, patches, rim, v, length, weight, reach, 1e-4 * length, slope)
+                gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length)
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1
@@ -131,56 +126,3 @@ def settle_all(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length
         if gain < enough * used:
             return sweep + 1
     return sweeps
-
-
-@kernel
-def nearest_site(surface: Surface, x: float, y: float, z: float) -> int:
-    """Site of the scan nearest to a place, by trying all."""
-    best, site = np.inf, 0
-    for s in range(len(surface.mean)):
-        dx, dy, dz = surface.mean[s, 0] - x, surface.mean[s, 1] - y, surface.mean[s, 2] - z
-        square = dx * dx + dy * dy + dz * dz
-        if square < best:
-            best, site = square, s
-    return site
-
-
-@kernel
-def seat_nodes(net: Net, surface: Surface, patches: np.ndarray, length: float) -> None:
-    """Fit the local surface of every node; from node to node over the members, so that each stays on its sheet of the scan."""
-    used = net.count[1]
-    queue = np.empty(used, np.int64)
-    seated = np.zeros(used, np.int64)
-    for seed in range(used):
-        if seated[seed] == 1 or net.degree[seed] == 0:
-            continue
-        queue[0], count, at = seed, 1, 0
-        seated[seed] = 1
-        patches[seed, 15] = nearest_site(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
-        while at < count:
-            v = queue[at]
-            at += 1
-            place = row(net.nodes, v)
-            site = walk(surface, int(patches[v, 15]), place)
-            if norm(subtract(row(surface.mean, site), place)) > 0.5 * length:
-                site = nearest_site(surface, place[0], place[1], place[2])
-            patches[v, 15] = site
-            fit_patch(surface, patches[v], site, place)
-            for i in range(net.degree[v]):
-                u = net.ring[v, i]
-                if seated[u] == 0:
-                    seated[u] = 1
-                    patches[u, 15] = site
-                    queue[count] = u
-                    count += 1
-
-
-@kernel
-def measure_deviation(net: Net, surface: Surface, patches: np.ndarray, near: float, deviation: np.ndarray) -> None:
-    """Distance of each node from the scanned surface, fitted around it anew unless its patch is centred within `near`."""
-    for v in range(net.count[1]):
-        if net.degree[v] > 0:
-            place = row(net.nodes, v)
-            if norm(subtract(place, row(patches, v))) > near:
-                fit_patch(surface, patches[v], int(patches[v, 15]), place)
-            deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))

@@ -33,13 +33,17 @@ class Net(NamedTuple):
 
 
 @kernel
-def fill_rings(corner_node: np.ndarray, partner: np.ndarray, ring: np.ndarray, degree: np.ndarray, is_open: np.ndarray, source: np.ndarray, used: int) -> int:
+def fill_rings(
+    corner_node: np.ndarray, partner: np.ndarray, fan: np.ndarray, first: np.ndarray, ring: np.ndarray, degree: np.ndarray, is_open: np.ndarray, source: np.ndarray, used: int
+) -> int:
     """Walk the fan of each corner and write the rings.
 
     Parameters
     ----------
-    corner_node : (3 T,) int64 node of corner 3 t + k, in: of the grid; out: of the net (a node with two fans becomes two)
+    corner_node : (3 T,) int64 node of the grid at corner 3 t + k
     partner : (3 T,) int64 the half-edge opposite to each half-edge (from its corner on), -1 none
+    fan : (3 T,) int64, -1 at the start; filled with the node of the net at each corner: a node with two fans becomes two
+    first : (C,) int64 scratch
     ring, degree, is_open : arrays of the net, degree 0 at the start
     source : (C,) int64 node of the grid that each node of the net stands for, filled
     used : nodes of the grid
@@ -48,12 +52,9 @@ def fill_rings(corner_node: np.ndarray, partner: np.ndarray, ring: np.ndarray, d
     -------
     int : nodes of the net
     """
-    total = len(corner_node)
-    fan = np.full(total, -1, np.int64)
-    first = np.empty(total, np.int64)  # first corner of each fan, by node of the net
     for node in range(used):
         source[node] = node
-    for corner in range(total):
+    for corner in range(len(corner_node)):
         if fan[corner] >= 0:
             continue
         at = corner
@@ -86,7 +87,6 @@ def fill_rings(corner_node: np.ndarray, partner: np.ndarray, ring: np.ndarray, d
             if is_open[v] == 1:
                 ring[v, i + 1] = fan[last]
             at = partner[last]
-    corner_node[:] = fan
     return used
 
 

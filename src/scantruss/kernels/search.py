@@ -11,7 +11,6 @@ from .compile import kernel
 from .equalize import ROOT, settle_node
 from .grid import RIM, Net, collapse, flip, may_collapse, may_flip, may_split, split, wings
 from .rim import Rim, at_arc
-from .surface import Surface
 from .vectors import cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
@@ -34,7 +33,6 @@ class Scratch(NamedTuple):
     ring: np.ndarray  #: (C, W) their rings before
     degree: np.ndarray  #: (C,) int64
     counter: np.ndarray  #: (3,) int64 trials made; nodes around; trials that paid
-    slope: np.ndarray  #: (3,) scratch of `settle_node`
 
 
 @kernel
@@ -164,7 +162,7 @@ def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
     """Flip edges at the first `seeds` nodes of the neighbourhood while that lessens the disorder; returns the change of it."""
     stamp, total, ideal = scratch.counter[0], 0, scratch.ideal
     for _ in range(FLIPS):
-        best, a, b = 0, -1, -1
+        best, a, b = 0, scratch.around[0], scratch.around[0]
         for k in range(seeds):
             v = scratch.around[k]
             d = net.degree[v]
@@ -177,7 +175,7 @@ def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
                     change += 2 * (net.degree[right] - ideal[right] + net.degree[left] - ideal[left])
                     if change < best and may_flip(net, v, u):
                         best, a, b = change, v, u
-        if a < 0:
+        if best == 0:
             break
         flip(net, a, b)
         total += best
@@ -196,7 +194,8 @@ def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: i
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
-    patches[added] = patches[a]
+    for c in range(patches.shape[1]):
+        patches[added, c] = patches[a, c]
     place_between(net, rim, added, a, b)
     scratch.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.mark[added] = scratch.counter[0]
@@ -220,7 +219,7 @@ def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
 
 @kernel
 def try_move(
-    net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
+    net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
 ) -> bool:
     """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
 
@@ -246,7 +245,7 @@ def try_move(
     after = before
     for sweep in range(SWEEPS):
         for i in range(scratch.counter[1]):
-            settle_node(net, surface, patches, rim, scratch.around[i], length, weight, length, STILL * length, scratch.slope)
+            settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length)
         after = local_energy(net, scratch, length, weight)
         if after > before + HOPE:
             break
@@ -272,7 +271,7 @@ def is_regular(net: Net, ideal: np.ndarray, v: int, length: float) -> bool:
 
 
 @kernel
-def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, strain: float, price: float, share: float) -> int:
+def search(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, strain: float, price: float, share: float) -> int:
     """One round over all nodes that ask for a move; returns how many moves were kept.
 
     Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`
@@ -306,7 +305,7 @@ def search(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, scratch: S
                 allowed = may_split(net, a, b)
             half = 0.5 if move == SPLIT else -0.5
             worth = share + price * (strain - 0.5 * (free - net.count[0] + half) / count)
-            if allowed and try_move(net, surface, patches, rim, scratch, move, a, b, length, weight, worth):
+            if allowed and try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
                 i = 0
                 if net.degree[v] == 0 or is_regular(net, scratch.ideal, v, length):
                     break

@@ -9,8 +9,6 @@ import numpy as np
 from .compile import kernel
 from .equalize import ROOT
 from .grid import INTERIOR, RIM, Net
-from .rim import Rim, slide
-from .surface import Surface, onto_surface
 from .vectors import cross, dot, norm, row, subtract
 
 
@@ -21,7 +19,8 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
     All nodes move at once: `before` (C, 3) gets the places from which they start.
     """
     used = net.count[1]
-    before[:used] = net.nodes[:used]
+    for v in range(used):
+        before[v, 0], before[v, 1], before[v, 2] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     for v in range(used):
         d = net.degree[v]
         if d == 0 or net.kind[v] > RIM:
@@ -35,18 +34,6 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
         net.nodes[v, 0] += factor * (x / count - before[v, 0])
         net.nodes[v, 1] += factor * (y / count - before[v, 1])
         net.nodes[v, 2] += factor * (z / count - before[v, 2])
-
-
-@kernel
-def return_to_scan(net: Net, surface: Surface, patches: np.ndarray, rim: Rim, length: float) -> None:
-    """Bring every free node back: onto the scanned surface, or onto its boundary curve."""
-    for v in range(net.count[1]):
-        x, y, z = row(net.nodes, v)
-        if net.degree[v] > 0 and net.kind[v] == INTERIOR:
-            x, y, z = onto_surface(surface, patches, v, x, y, z)
-        elif net.degree[v] > 0 and net.kind[v] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], 0.5 * length, x, y, z)
-        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 
 @kernel

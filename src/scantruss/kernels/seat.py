@@ -1,0 +1,87 @@
+"""The local surface of the scan under each node of a net."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compile import kernel
+from .grid import INTERIOR, RIM, Net
+from .rim import Rim, slide
+from .surface import Surface, fit_patch, onto_patch, walk
+from .vectors import norm, row, subtract
+
+
+@kernel
+def nearest_site(surface: Surface, x: float, y: float, z: float) -> int:
+    """Site of the scan nearest to a place, by trying all."""
+    best, site = np.inf, 0
+    for s in range(len(surface.mean)):
+        dx, dy, dz = surface.mean[s, 0] - x, surface.mean[s, 1] - y, surface.mean[s, 2] - z
+        square = dx * dx + dy * dy + dz * dz
+        if square < best:
+            best, site = square, s
+    return site
+
+
+@kernel
+def seat_nodes(net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, seated: np.ndarray) -> None:
+    """Find the site under every node; from node to node over the members, so that each stays on its sheet of the scan.
+
+    `queue` and `seated` (C,) int64 are scratch, zero at the start.
+    """
+    used = net.count[1]
+    for seed in range(used):
+        if seated[seed] == 1 or net.degree[seed] == 0:
+            continue
+        queue[0], count, at = seed, 1, 0
+        seated[seed] = 1
+        patches[seed, 15] = nearest_site(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
+        while at < count:
+            v = queue[at]
+            at += 1
+            place = row(net.nodes, v)
+            site = walk(surface, int(patches[v, 15]), place)
+            if norm(subtract(row(surface.mean, site), place)) > 0.5 * length:
+                site = nearest_site(surface, place[0], place[1], place[2])
+            patches[v, 15] = site
+            for i in range(net.degree[v]):
+                u = net.ring[v, i]
+                if seated[u] == 0:
+                    seated[u] = 1
+                    patches[u, 15] = site
+                    queue[count] = u
+                    count += 1
+
+
+@kernel
+def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float) -> int:
+    """Fit the local surface anew under each node that is not within `near` of the middle of its patch; returns how many."""
+    count = 0
+    for v in range(net.count[1]):
+        if net.degree[v] > 0:
+            place = row(net.nodes, v)
+            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near:
+                fit_patch(surface, patches[v], int(patches[v, 15]), place)
+                count += 1
+    return count
+
+
+@kernel
+def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> None:
+    """Bring every free node back: onto its patch of the scanned surface, or onto its boundary curve within `reach` along it."""
+    for v in range(net.count[1]):
+        x, y, z = row(net.nodes, v)
+        if net.degree[v] > 0 and net.kind[v] == INTERIOR:
+            x, y, z = onto_patch(patches[v], (x, y, z))
+        elif net.degree[v] > 0 and net.kind[v] == RIM:
+            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], reach, x, y, z)
+        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
+
+
+@kernel
+def distances_from_scan(net: Net, patches: np.ndarray, distance: np.ndarray) -> None:
+    """Distance of each node from its patch of the scanned surface, (C,)."""
+    for v in range(net.count[1]):
+        if net.degree[v] > 0:
+            place = row(net.nodes, v)
+            distance[v] = norm(subtract(place, onto_patch(patches[v], place)))
