@@ -43,7 +43,7 @@ def moved_too_far(after: State, max_deviation: float) -> bool:
 
 def deviation_allowed(settings: Settings) -> float:
     """Return the criterion of stop (c): as set, else a share of the desired length [scan unit]."""
-    return settings.length / 20 if settings.max_deviation is None else settings.max_deviation
+    return settings.length / 4 if settings.max_deviation is None else settings.max_deviation
 
 
 def smooth(relief: Relief, settings: Settings) -> Smoothing:
