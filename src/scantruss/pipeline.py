@@ -16,6 +16,7 @@ from .settings import Settings
 if TYPE_CHECKING:
     from .grid.grid import Grid
     from .scan.cloud import PointCloud
+    from .scan.sites import Sites
 
 Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
 
@@ -24,6 +25,8 @@ GAPS = 2.2  #: ... and where points lie at random, this many distances to the si
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
 LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+COVER = 1.2  #: members from the nearest node at which a part of the scan counts as left out
+LEFT_OUT = 0.2  #: share of the scan that a grid may leave out
 SAMPLE = 200  #: points at which the gap is measured
 
 
@@ -45,6 +48,7 @@ def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progre
         With `settings`, `before` (quality before the optimization) and `seconds` of each stage.
     """
     from .scan.cloud import PointCloud
+    from .scan.sites import Sites
 
     started = perf_counter()
     cloud = PointCloud.from_array(points, unit=settings.unit)
@@ -89,6 +93,7 @@ def grid_from_cloud(
     advanced = perf_counter()
     grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
     check_grid(grid)
+    check_cover(grid, boundary.sites, settings.length)
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -115,6 +120,31 @@ def check_grid(grid: Grid) -> None:
         fault = "not manifold" if not found.manifold else "not orientable"
         raise FrontError(
             f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
+        )
+
+
+def check_cover(grid: Grid, sites: Sites, length: float) -> None:
+    """Refuse a grid that has left out a good part of the scan.
+
+    Raises
+    ------
+    FrontError
+        More than a fifth of the scan is farther than 1.2 members from every node; names a place there.
+    """
+    from .kernels.boxes import new_boxes
+    from .kernels.cover import find_uncovered
+
+    places = np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
+    uncovered = np.empty(len(places), np.bool_)
+    boxes = new_boxes(grid.nodes.min(axis=0), grid.nodes.max(axis=0), length, len(grid.nodes), len(grid.nodes))
+    count = find_uncovered(grid.nodes, boxes, places, COVER * length, uncovered)
+    if count > LEFT_OUT * len(places):
+        x, y, z = (places[np.argmax(uncovered)] + grid.origin).tolist()
+        raise FrontError(
+            f"the grid leaves out {count / len(places):.0%} of the scan, for example near ({x:.6g}, {y:.6g}, {z:.6g}),"
+            " so it is not written; try another length, or clean the scan of what is not surface",
+            grid,
+            (x, y, z),
         )
 
 

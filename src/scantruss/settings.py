@@ -51,17 +51,20 @@ class Settings:
     )
     max_deviation: float | None = _setting(
         None,
-        "smoothing stops when the nodes have moved by more than this on average; none: length / 20",
+        "smoothing stops when the nodes have moved by more than this on average; none: length / 4",
         unit="scan unit",
         source="Sec. 4.1 (c)",
     )
     shape_weight: float = _setting(1.0, "weight of the shape quality of a triangle", symbol="alpha_1", source="Eq. 5")
     size_weight: float = _setting(1.0, "weight of the size quality of a triangle", symbol="alpha_2", source="Eq. 5")
     length_weight: float = _setting(
-        0.8, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10"
+        0.88, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10"
     )
     search_range: float = _setting(
-        3.0, "half width of the search region in point spacings", symbol="b, h", source="Sec. 3.4 (1)"
+        0.5,
+        "half width of the search region in point spacings; doubled once if it holds no point",
+        symbol="b, h",
+        source="Sec. 3.4 (1)",
     )
     nearness: float = _setting(0.5, "a new node keeps this distance to the front, in lengths", source="Sec. 3.4 (2)")
     merge_angle: float = _setting(
@@ -78,9 +81,9 @@ class Settings:
     corner_angle: float = _setting(
         40.0, "a boundary that turns by more than this has a corner", unit="degree", source="Sec. 3.3"
     )
-    smooth_forward: float = _setting(0.5, "forward factor of the smoothing", symbol="lambda", source="Sec. 4.1, [34]")
-    smooth_backward: float = _setting(-0.53, "backward factor of the smoothing", symbol="mu", source="Sec. 4.1, [34]")
-    smooth_passes: int = _setting(100, "most passes of the smoothing", source="Sec. 4.1")
+    smooth_forward: float = _setting(0.6, "forward factor of the smoothing", symbol="lambda", source="Sec. 4.1, [34]")
+    smooth_backward: float = _setting(-0.1, "backward factor of the smoothing", symbol="mu", source="Sec. 4.1, [34]")
+    smooth_passes: int = _setting(500, "most passes of the smoothing", source="Sec. 4.1")
 
     def __post_init__(self) -> None:
         """Check every value, with a message that says what is needed."""
@@ -95,7 +98,7 @@ class Settings:
                 raise InputError(f"{spec.name} must be a finite number, got {value}")
         for name, low, high in (
             ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
-            ("search_range", 0.5, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
+            ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
             ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
             ("corner_angle", 10, 180), ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip

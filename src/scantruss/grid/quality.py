@@ -30,9 +30,7 @@ class GridQuality:
 
     def __str__(self) -> str:
         """Return shape and length in one line."""
-        return (
-            f"shape {self.shape_mean:.3f} +- {self.shape_std:.3f}, length {self.length_mean:.4g} +- {self.length_std:.2g} {self.unit}".rstrip()
-        )
+        return f"shape {self.shape_mean:.3f} +- {self.shape_std:.3f}, length {self.length_mean:.4g} +- {self.length_std:.2g} {self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON."""
@@ -150,7 +148,9 @@ def _is_orientable(grid: Grid) -> bool:
     starts = grid.triangles.T.ravel()
     turned = starts[one] == starts[other]
     a, b = one % count, other % count
-    label = _labels(2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned]))
+    label = _labels(
+        2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned])
+    )
     return not np.any(label[:count] == label[count:])
 
 

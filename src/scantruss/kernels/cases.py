@@ -249,7 +249,7 @@ def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, p
     """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False where there is none.
 
     Searched are the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
-    unmeshed side (Eq. 7). A region without points is doubled once.
+    unmeshed side (Eq. 7). A region without points is doubled once; then the segment waits for a later round.
     """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)

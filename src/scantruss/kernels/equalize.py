@@ -20,7 +20,9 @@ STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes mov
 
 
 @kernel
-def star_energy(net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float) -> tuple[float, float, float, float]:
+def star_energy(
+    net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float
+) -> tuple[float, float, float, float]:
     """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient.
 
     A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
@@ -106,7 +108,9 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
 
 
 @kernel
-def settle_all(net: Net, patches: np.ndarray, rim: Rim, awake: np.ndarray, length: float, weight: float, enough: float, sweeps: int) -> int:
+def settle_all(
+    net: Net, patches: np.ndarray, rim: Rim, awake: np.ndarray, length: float, weight: float, enough: float, sweeps: int
+) -> int:
     """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made.
 
     `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.

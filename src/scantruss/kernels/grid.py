@@ -34,7 +34,15 @@ class Net(NamedTuple):
 
 @kernel
 def fill_rings(
-    corner_node: np.ndarray, partner: np.ndarray, fan: np.ndarray, first: np.ndarray, ring: np.ndarray, degree: np.ndarray, is_open: np.ndarray, source: np.ndarray, used: int
+    corner_node: np.ndarray,
+    partner: np.ndarray,
+    fan: np.ndarray,
+    first: np.ndarray,
+    ring: np.ndarray,
+    degree: np.ndarray,
+    is_open: np.ndarray,
+    source: np.ndarray,
+    used: int,
 ) -> int:
     """Walk the fan of each corner and write the rings.
 

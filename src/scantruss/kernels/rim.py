@@ -26,7 +26,11 @@ def _foot(rim: Rim, curve: int, i: int, x: float, y: float, z: float) -> tuple[f
     if j == rim.start[curve + 1]:
         j = rim.start[curve]
     px, py, pz = x - rim.points[i, 0], y - rim.points[i, 1], z - rim.points[i, 2]
-    ux, uy, uz = rim.points[j, 0] - rim.points[i, 0], rim.points[j, 1] - rim.points[i, 1], rim.points[j, 2] - rim.points[i, 2]
+    ux, uy, uz = (
+        rim.points[j, 0] - rim.points[i, 0],
+        rim.points[j, 1] - rim.points[i, 1],
+        rim.points[j, 2] - rim.points[i, 2],
+    )
     square = ux * ux + uy * uy + uz * uz
     t = 0.0 if square == 0.0 else min(max((px * ux + py * uy + pz * uz) / square, 0.0), 1.0)
     px, py, pz = px - t * ux, py - t * uy, pz - t * uz
@@ -70,7 +74,9 @@ def at_arc(rim: Rim, curve: int, arc: float) -> tuple[float, float, float, float
 
 
 @kernel
-def slide(rim: Rim, curve: int, arc: float, reach: float, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+def slide(
+    rim: Rim, curve: int, arc: float, reach: float, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
     """Place on a curve nearest to a position, within `reach` of arc length to both sides: (arc, x, y, z)."""
     first, last = rim.start[curve], rim.start[curve + 1]
     total = rim.total[curve]

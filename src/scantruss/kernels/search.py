@@ -57,7 +57,11 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
                 count += 1
     for i in range(count):
         v = scratch.around[i]
-        scratch.nodes[i, 0], scratch.nodes[i, 1], scratch.nodes[i, 2] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
+        scratch.nodes[i, 0], scratch.nodes[i, 1], scratch.nodes[i, 2] = (
+            net.nodes[v, 0],
+            net.nodes[v, 1],
+            net.nodes[v, 2],
+        )
         scratch.nodes[i, 3] = net.arc[v]
         scratch.degree[i] = net.degree[v]
         for j in range(net.degree[v]):
@@ -70,7 +74,11 @@ def put_back(net: Net, scratch: Scratch) -> None:
     """Undo a trial: all around as it was."""
     for i in range(scratch.counter[1]):
         v = scratch.around[i]
-        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = scratch.nodes[i, 0], scratch.nodes[i, 1], scratch.nodes[i, 2]
+        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = (
+            scratch.nodes[i, 0],
+            scratch.nodes[i, 1],
+            scratch.nodes[i, 2],
+        )
         net.arc[v] = scratch.nodes[i, 3]
         net.degree[v] = scratch.degree[i]
         for j in range(scratch.degree[i]):
@@ -130,7 +138,9 @@ def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
         ahead = (net.arc[b] - net.arc[a]) % total if total > 0.0 else 0.0
         if ahead > 0.5 * total:
             ahead -= total
-        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.curve[v], net.arc[a] + 0.5 * ahead)
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(
+            rim, net.curve[v], net.arc[a] + 0.5 * ahead
+        )
     else:
         for c in range(3):
             net.nodes[v, c] = 0.5 * (net.nodes[a, c] + net.nodes[b, c])
@@ -219,7 +229,16 @@ def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
 
 @kernel
 def try_move(
-    net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int, length: float, weight: float, worth: float
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    scratch: Scratch,
+    move: int,
+    a: int,
+    b: int,
+    length: float,
+    weight: float,
+    worth: float,
 ) -> bool:
     """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
 
@@ -271,7 +290,17 @@ def is_regular(net: Net, ideal: np.ndarray, v: int, length: float) -> bool:
 
 
 @kernel
-def search(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, length: float, weight: float, strain: float, price: float, share: float) -> int:
+def search(
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    scratch: Scratch,
+    length: float,
+    weight: float,
+    strain: float,
+    price: float,
+    share: float,
+) -> int:
     """One round over all nodes that ask for a move; returns how many moves were kept.
 
     Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`

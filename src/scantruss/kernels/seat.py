@@ -24,7 +24,9 @@ def nearest_site(surface: Surface, x: float, y: float, z: float) -> int:
 
 
 @kernel
-def seat_nodes(net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, seated: np.ndarray) -> None:
+def seat_nodes(
+    net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, seated: np.ndarray
+) -> None:
     """Find the site under every node; from node to node over the members, so that each stays on its sheet of the scan.
 
     `queue` and `seated` (C,) int64 are scratch, zero at the start.

@@ -37,27 +37,18 @@ def thin_points(
     used = 0
     for p in range(begin, len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        i0, j0, k0 = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
-        home = -1
-        item = boxes.first[slot_of(boxes, i0, j0, k0)]
-        while item >= 0 and home < 0:
-            q = chosen[item]
-            dx, dy, dz = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
-            if dx * dx + dy * dy + dz * dz < radius * radius:
-                home = item
-            item = boxes.next[item]
-        if home < 0:
-            for i in range(max(box_index(boxes, 0, x - radius), 0), box_index(boxes, 0, x + radius) + 1):
-                for j in range(box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius) + 1):
-                    for k in range(box_index(boxes, 2, z - radius), box_index(boxes, 2, z + radius) + 1):
-                        if home < 0 and not (i == i0 and j == j0 and k == k0):
-                            item = boxes.first[slot_of(boxes, i, j, k)]
-                            while item >= 0 and home < 0:
-                                q = chosen[item]
-                                dx, dy, dz = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
-                                if dx * dx + dy * dy + dz * dz < radius * radius:
-                                    home = item
-                                item = boxes.next[item]
+        home = -1  # of several sites within reach the earliest, however the boxes lie
+        for i in range(box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius) + 1):
+            for j in range(box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius) + 1):
+                for k in range(box_index(boxes, 2, z - radius), box_index(boxes, 2, z + radius) + 1):
+                    item = boxes.first[slot_of(boxes, i, j, k)]
+                    while item >= 0:
+                        if home < 0 or item < home:
+                            q = chosen[item]
+                            dx, dy, dz = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
+                            if dx * dx + dy * dy + dz * dz < radius * radius:
+                                home = item
+                        item = boxes.next[item]
         if home < 0:
             if count == len(chosen) or 2 * (count + 1) > len(boxes.keys):
                 return p, count

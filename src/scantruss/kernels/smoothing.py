@@ -62,4 +62,8 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
                 if edges > 0.0:
                     shape += 0.5 * ROOT * norm(cross(a, b)) / edges
     mean = total / max(members, 1)
-    return shape / max(triangles, 1), math.sqrt(max(squares / max(members, 1) - mean * mean, 0.0)), moved / max(count, 1)
+    return (
+        shape / max(triangles, 1),
+        math.sqrt(max(squares / max(members, 1) - mean * mean, 0.0)),
+        moved / max(count, 1),
+    )

@@ -182,7 +182,7 @@ def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> N
     up = np.stack([np.bincount(inverse, normals[:, c]) / count for c in range(3)], axis=1)
     for i in range(len(count)):
         side = bulge[i]
-        if abs(side) < 1e-6 * max(size[i], 1e-300):
+        if abs(side) < 0.01 * max(size[i], 1e-300):
             side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
         if side < 0:
             normals[inverse == i] *= -1.0
