@@ -16,7 +16,8 @@ from .vectors import cross, dot, norm, row, subtract
 def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
     """Move every free node by `factor` of the way to the middle of its neighbours; on the rim, of its two neighbours there.
 
-    All nodes move at once: `before` (C, 3) gets the places from which they start.
+    Neighbours weigh as much as their members are long, so that long members become shorter: with equal weights a grid keeps
+    the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from which they start.
     """
     used = net.count[1]
     for v in range(used):
@@ -26,14 +27,16 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
         if d == 0 or net.kind[v] > RIM:
             continue
         step = 1 if net.kind[v] == INTERIOR else d - 1
-        x = y = z = 0.0
+        x = y = z = total = 0.0
         for i in range(0, d, step):
-            u = net.ring[v, i]
-            x, y, z = x + before[u, 0], y + before[u, 1], z + before[u, 2]
-        count = d if step == 1 else 2
-        net.nodes[v, 0] += factor * (x / count - before[v, 0])
-        net.nodes[v, 1] += factor * (y / count - before[v, 1])
-        net.nodes[v, 2] += factor * (z / count - before[v, 2])
+            arm = subtract(row(before, net.ring[v, i]), row(before, v))
+            weight = norm(arm)
+            total += weight
+            x, y, z = x + weight * arm[0], y + weight * arm[1], z + weight * arm[2]
+        if total > 0.0:
+            net.nodes[v, 0] += factor * x / total
+            net.nodes[v, 1] += factor * y / total
+            net.nodes[v, 2] += factor * z / total
 
 
 @kernel
