@@ -48,7 +48,6 @@ def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progre
         With `settings`, `before` (quality before the optimization) and `seconds` of each stage.
     """
     from .scan.cloud import PointCloud
-    from .scan.sites import Sites
 
     started = perf_counter()
     cloud = PointCloud.from_array(points, unit=settings.unit)

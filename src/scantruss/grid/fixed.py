@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from ..kernels.seat import nearest_site
-from ..kernels.grid import REST, RIM, Net, may_split, split
+from ..kernels.grid import REST, RIM, may_split, split
 from ..kernels.rim import nearest_on_rim
 from ..kernels.search import Scratch, total_energy
+from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..scan.cloud import PointCloud
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle

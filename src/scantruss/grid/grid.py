@@ -71,7 +71,7 @@ class Grid:
     @cached_property
     def boundary_loops(self) -> list[np.ndarray]:
         """Ordered node ids of each boundary loop, in the direction of its triangles."""
-        ends, edges, inverse = self._half_edges
+        ends, _, inverse = self._half_edges
         single = self.edge_uses[inverse] == 1
         following: dict[int, list[int]] = {}
         for a, b in ends[single].tolist():

@@ -30,7 +30,8 @@ class GridQuality:
 
     def __str__(self) -> str:
         """Return shape and length in one line."""
-        return f"shape {self.shape_mean:.3f} +- {self.shape_std:.3f}, length {self.length_mean:.4g} +- {self.length_std:.2g} {self.unit}".rstrip()
+        shape = f"shape {self.shape_mean:.3f} +- {self.shape_std:.3f}"
+        return f"{shape}, length {self.length_mean:.4g} +- {self.length_std:.2g} {self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON."""
@@ -109,8 +110,8 @@ def measure_quality(grid: Grid) -> GridQuality:
         angle_min=float(angles.min()),
         angle_max=float(angles.max()),
         valence6=_mean(valence[interior] == 6),
-        node_deviation_mean=float(np.mean(deviation)) if measured else None,
-        node_deviation_max=float(np.max(deviation)) if measured else None,
+        node_deviation_mean=float(np.mean(deviation)) if measured and deviation is not None else None,
+        node_deviation_max=float(np.max(deviation)) if measured and deviation is not None else None,
         unit=grid.unit,
     )
 
@@ -160,7 +161,8 @@ def _count_pinched_nodes(grid: Grid) -> int:
     corners = grid.triangles.T.ravel()  # corner k of triangle t stands at k * count + t, as does the half-edge k
     one, other = _links(grid)
     lower, upper = grid.edges[grid.half_edge_edges[one]].T
-    first, second = [], []
+    first: list[np.ndarray] = []
+    second: list[np.ndarray] = []
     for node in (lower, upper):
         for half, found in ((one, first), (other, second)):
             starts = corners[half] == node

@@ -29,7 +29,7 @@ class Net(NamedTuple):
     curve: np.ndarray  #: (C,) int64 boundary curve of the node, -1 none
     arc: np.ndarray  #: (C,) place on that curve as arc length from its start
     free: np.ndarray  #: (C,) int64 stack of free nodes
-    count: np.ndarray  #: (2,) int64 nodes on that stack; nodes in use
+    count: np.ndarray  # type: ignore[assignment]  #: (2,) int64 nodes on that stack; nodes in use
 
 
 @kernel
@@ -223,7 +223,7 @@ def collapse(net: Net, a: int, b: int) -> None:
     take_out(net, a, b)
     for step in range(others):
         u = net.ring[b, (begin + step) % d]
-        if u == right or u == left:
+        if u in (right, left):
             take_out(net, u, b)
         else:
             net.ring[u, place_of(net, u, b)] = a

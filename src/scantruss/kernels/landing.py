@@ -54,10 +54,11 @@ def land_nodes(
         for turn in range(3):
             place = row(net.nodes, v)
             site = int(patches[v, 15])
-            if turn == 0:
-                taken = fit_patch(broad, patches[v], site, place)
-            else:
-                taken = _fit_widest(fine, middle, broad, patches[v], site, place)
+            first = turn == 0
+            patch = patches[v]
+            taken = (
+                fit_patch(broad, patch, site, place) if first else _fit_widest(fine, middle, broad, patch, site, place)
+            )
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)

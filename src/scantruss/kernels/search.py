@@ -262,7 +262,7 @@ def try_move(
     if tidied:
         tidy(net, scratch, 4)
     after = before
-    for sweep in range(SWEEPS):
+    for _ in range(SWEEPS):
         for i in range(scratch.counter[1]):
             settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length)
         after = local_energy(net, scratch, length, weight)

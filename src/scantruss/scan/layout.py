@@ -173,7 +173,7 @@ def _finish(
     named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
     counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
     four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
-    columns = named or tuple(numeric[: 4 if four else 3])
+    columns: tuple[int, ...] = named or tuple(numeric[: 4 if four else 3])
     return Layout(encoding, separator, comma, skip, columns, int(counts[-1]) if counts else None)
 
 
