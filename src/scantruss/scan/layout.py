@@ -173,8 +173,8 @@ def _finish(
     named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
     counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
     four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
-    columns: tuple[int, ...] = named or tuple(numeric[: 4 if four else 3])
-    return Layout(encoding, separator, comma, skip, columns, int(counts[-1]) if counts else None)
+    chosen = named or tuple(numeric[: 4 if four else 3])
+    return Layout(encoding, separator, comma, skip, chosen, int(counts[-1]) if counts else None)
 
 
 def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
