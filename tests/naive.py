@@ -14,12 +14,16 @@ def within(positions, place, reach):
 
 
 def thin(points, radius):
-    """Points that become sites: each that has no earlier site nearer than `radius`."""
-    chosen = []
+    """Points that become sites, each that has no earlier site nearer than `radius`; and the earliest site near enough to each point."""
+    chosen, owner = [], []
     for p, place in enumerate(points):
-        if not chosen or ((points[chosen] - place) ** 2).sum(axis=1).min() >= radius * radius:
+        square = ((points[chosen] - place) ** 2).sum(axis=1) if chosen else np.array([np.inf])
+        if square.min() >= radius * radius:
+            owner.append(len(chosen))
             chosen.append(p)
-    return np.array(chosen)
+        else:
+            owner.append(int((square < radius * radius).argmax()))
+    return owner, chosen
 
 
 def nearest(positions, site, count, far):

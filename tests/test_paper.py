@@ -18,7 +18,7 @@ from scantruss.front import new_front, start_front
 from scantruss.grid.smoothing import State, lengths_no_longer_even_out, moved_too_far, shape_no_longer_improves
 from scantruss.kernels import cases
 from scantruss.kernels import front as lists
-from scantruss.kernels.advance import advance
+from scantruss.kernels.advance import advance_by_cases
 from scantruss.kernels.boxes import box_index, new_boxes
 from scantruss.kernels.triangles import (
     on_unmeshed_side,
@@ -159,7 +159,7 @@ AB = 1  # segment of `square` from (0, 0) to (1, 0)
 @pytest.mark.parametrize("w1", [0.0, 0.5, 1.0])
 def test_section_3_4_step_1_the_optimal_point(w1):
     """Of the points with d_1 <= b and r - h <= d_2 <= r + h on the unmeshed side, the one of the best triangle."""
-    hand = HandFront(square(), length=1.2, length_weight=w1)
+    hand = HandFront(square(), length=1.2, length_weight=w1, search_range=3.0)
     assert cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch)
     found = hand.front.nodes[hand.front.count[lists.NODES]]
     expected = naive.optimal_point(
@@ -172,13 +172,12 @@ def test_section_3_4_step_1_the_optimal_point(w1):
 
 
 @pytest.mark.kernels
-def test_section_3_4_step_1_b_and_h_are_three_times_the_distance_of_the_points():
-    """A hole of 6 spacings around the ideal point leaves no point in the search region, nor in the doubled one if it is twice that."""
-    assert st.Settings(length=1.0).search_range == 3.0
+def test_section_3_4_step_1_b_and_h_bound_the_search():
+    """With 3 spacings of 0.1 the region holds no point where none lies within 0.95 of its middle, even if it is doubled."""
     points = sheet(8, 8, 0.1)
     away = np.hypot(points[:, 0] - 0.5, points[:, 1] - ROOT3 / 2)
     for radius, there in ((0.2, True), (0.95, False)):
-        hand = HandFront(square(5), points=points[away > radius])
+        hand = HandFront(square(5), points=points[away > radius], length=1.0, search_range=3.0)
         assert cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch) == there
 
 
@@ -271,11 +270,11 @@ def test_table_1_case_2_a_quadrangle_is_divided_by_its_better_diagonal():
     """A (0, 0), B (1, 0), D (1.4, 0.9), C (0.4, 0.9): BC = 1.08 is shorter than AD = 1.66, and its triangles are better."""
     hand = HandFront([A, B, (1.4, 0.9), (0.4, 0.9)], method="paper")
     assert case(hand) == 2
-    assert advance(hand.surface, hand.front, hand.numbers, 100) == lists.DONE
+    assert advance_by_cases(hand.surface, hand.front, hand.numbers, 100) == lists.DONE
     assert set(hand.triangles) == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
     assert not hand.alive
     mirrored = HandFront([A, B, (0.6, 0.9), (-0.4, 0.9)], method="paper")
-    advance(mirrored.surface, mirrored.front, mirrored.numbers, 100)
+    advance_by_cases(mirrored.surface, mirrored.front, mirrored.numbers, 100)
     assert set(mirrored.triangles) == {frozenset({0, 1, 2}), frozenset({0, 2, 3})}
 
 
