@@ -31,7 +31,7 @@ def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, s
     """
     extent = np.asarray(upper, float) - lower
     parts = np.minimum(np.maximum(np.ceil(extent / box), 1), 100_000).astype(np.int64)
-    size = np.where(extent > 0, extent / parts, box)
+    size = np.where(extent > 0.5 * box, extent / parts, box)
     table = 1 << max(int(2 * slots - 1).bit_length(), 4)
     return SearchBoxes(
         np.array(lower, float),

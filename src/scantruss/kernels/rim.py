@@ -19,22 +19,29 @@ class Rim(NamedTuple):
 
 
 @kernel
-def _foot(rim: Rim, curve: int, i: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Squared distance of a place from segment i of a curve, and how far along the segment its foot lies."""
-    j = i + 1
-    end = rim.arc[j] if j < rim.start[curve + 1] else rim.total[curve]
-    if j == rim.start[curve + 1]:
+def foot_on_segment(
+    rim: Rim, curve: int, i: int, low: float, high: float, x: float, y: float, z: float
+) -> tuple[float, float]:
+    """Squared distance of a place from a part of segment i of a curve, and the share of the segment at its foot.
+
+    The part is `low` to `high` of arc length from the start of the segment.
+    """
+    j, span = i + 1, 0.0
+    if j < rim.start[curve + 1]:
+        span = rim.arc[j] - rim.arc[i]
+    else:
         j = rim.start[curve]
+        span = rim.total[curve] - rim.arc[i]
     px, py, pz = x - rim.points[i, 0], y - rim.points[i, 1], z - rim.points[i, 2]
-    ux, uy, uz = (
-        rim.points[j, 0] - rim.points[i, 0],
-        rim.points[j, 1] - rim.points[i, 1],
-        rim.points[j, 2] - rim.points[i, 2],
-    )
+    ux = rim.points[j, 0] - rim.points[i, 0]
+    uy = rim.points[j, 1] - rim.points[i, 1]
+    uz = rim.points[j, 2] - rim.points[i, 2]
     square = ux * ux + uy * uy + uz * uz
-    t = 0.0 if square == 0.0 else min(max((px * ux + py * uy + pz * uz) / square, 0.0), 1.0)
+    t = 0.0
+    if square > 0.0 and span > 0.0:
+        t = min(max((px * ux + py * uy + pz * uz) / square, low / span), min(high / span, 1.0))
     px, py, pz = px - t * ux, py - t * uy, pz - t * uz
-    return px * px + py * py + pz * pz, rim.arc[i] + t * (end - rim.arc[i])
+    return px * px + py * py + pz * pz, t * span
 
 
 @kernel
@@ -79,28 +86,27 @@ def slide(
 ) -> tuple[float, float, float, float]:
     """Place on a curve nearest to a position, within `reach` of arc length to both sides: (arc, x, y, z)."""
     first, last = rim.start[curve], rim.start[curve + 1]
-    total = rim.total[curve]
-    i = segment_at(rim, curve, arc)
+    home = segment_at(rim, curve, arc)
     best, found = np.inf, arc
-    for step in (1, -1):
-        at, gone = i, 0.0
+    for way in (1, -1):
+        i, begin = home, rim.arc[home] - arc  # the segment and where it starts, seen from `arc`
         for _ in range(last - first):
-            square, along = _foot(rim, curve, at, x, y, z)
+            end = begin + (rim.arc[i + 1] if i + 1 < last else rim.total[curve]) - rim.arc[i]
+            low, high = max(0.0, -reach - begin), max(0.0, reach - begin)
+            square, along = foot_on_segment(rim, curve, i, low, high, x, y, z)
             if square < best:
-                best, found = square, along
-            end = rim.arc[at + 1] if at + 1 < last else total
-            gone = ((end - arc) if step == 1 else (arc - rim.arc[at])) % total if total > 0.0 else np.inf
-            if gone >= reach:
-                break
-            at += step
-            if at == last:
-                at = first
-            elif at < first:
-                at = last - 1
-    ahead = (found - arc) % total if total > 0.0 else 0.0
-    if ahead > 0.5 * total:
-        ahead -= total
-    return at_arc(rim, curve, arc + min(max(ahead, -reach), reach))
+                best, found = square, arc + begin + along
+            if way == 1:
+                begin = end
+                i = i + 1 if i + 1 < last else first
+                if begin >= reach:
+                    break
+            else:
+                if begin <= -reach:
+                    break
+                i = i - 1 if i > first else last - 1
+                begin -= (rim.arc[i + 1] if i + 1 < last else rim.total[curve]) - rim.arc[i]
+    return at_arc(rim, curve, found)
 
 
 @kernel
@@ -109,7 +115,7 @@ def nearest_on_rim(rim: Rim, x: float, y: float, z: float) -> tuple[int, float, 
     best, curve, arc = np.inf, -1, 0.0
     for c in range(len(rim.total)):
         for i in range(rim.start[c], rim.start[c + 1]):
-            square, along = _foot(rim, c, i, x, y, z)
+            square, along = foot_on_segment(rim, c, i, 0.0, np.inf, x, y, z)
             if square < best:
-                best, curve, arc = square, c, along
+                best, curve, arc = square, c, rim.arc[i] + along
     return curve, arc, np.sqrt(best)

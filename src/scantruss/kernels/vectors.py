@@ -70,6 +70,10 @@ def across(normal: Vector) -> Vector:
 @kernel
 def smallest_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> Vector:
     """Unit eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix (closed form); (0, 0, 1) for a zero matrix."""
+    largest = max(abs(xx), abs(yy), abs(zz), abs(xy), abs(xz), abs(yz))
+    if largest == 0.0:
+        return 0.0, 0.0, 1.0
+    xx, xy, xz, yy, yz, zz = xx / largest, xy / largest, xz / largest, yy / largest, yz / largest, zz / largest
     mean = (xx + yy + zz) / 3.0
     off = xy * xy + xz * xz + yz * yz
     a, b, c = xx - mean, yy - mean, zz - mean
@@ -82,13 +86,17 @@ def smallest_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, 
     second = (xy, yy - smallest, yz)
     third = (xz, yz, zz - smallest)
     best = cross(first, second)
-    most = dot(best, best)
     other = cross(second, third)
-    if dot(other, other) > most:
-        best, most = other, dot(other, other)
+    if dot(other, other) > dot(best, best):
+        best = other
     other = cross(third, first)
-    if dot(other, other) > most:
-        best, most = other, dot(other, other)
-    if most <= (1e-14 * p * p) * (p * p):
-        return across(unit((xx - smallest + xy + xz, xy + yy - smallest + yz, xz + yz + zz - smallest)))
-    return unit(best)
+    if dot(other, other) > dot(best, best):
+        best = other
+    if dot(best, best) > 1e-20 * p * p * p * p:
+        return unit(best)
+    longest = first  # points on a line: the rows are all along it
+    if dot(second, second) > dot(longest, longest):
+        longest = second
+    if dot(third, third) > dot(longest, longest):
+        longest = third
+    return across(unit(longest))
