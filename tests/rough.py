@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
+import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
 from scantruss import Grid, PointCloud, Settings
 from scantruss.grid.relief import Relief
 from scantruss.kernels.rim import Rim
 from scantruss.scan.sites import surface_of
+
+compiled_only = pytest.mark.skipif(
+    numba.config.DISABLE_JIT, reason="takes minutes without compiling; others run the same kernels"
+)
 
 
 class Rough(NamedTuple):
@@ -50,7 +56,12 @@ def hexagonal(length, size):
     """Places of a triangular pattern that covers a square of half width `size`."""
     rows = np.arange(-size, size, length * 3**0.5 / 2)
     return np.concatenate(
-        [np.column_stack([np.arange(-size, size, length) + (k % 2) * length / 2, 0 * np.arange(-size, size, length) + y]) for k, y in enumerate(rows)]
+        [
+            np.column_stack(
+                [np.arange(-size, size, length) + (k % 2) * length / 2, 0 * np.arange(-size, size, length) + y]
+            )
+            for k, y in enumerate(rows)
+        ]
     )
 
 
@@ -59,7 +70,12 @@ def rough_disc(length=0.22, jitter=0.25, bulge=0.4, seed=0, corners=False, point
     rng = np.random.default_rng(seed)
     if corners:
         side = np.linspace(-1, 1, 80, endpoint=False)
-        outline = np.concatenate([np.column_stack(p) for p in ((side, 0 * side - 1), (0 * side + 1, side), (-side, 0 * side + 1), (0 * side - 1, -side))])
+        outline = np.concatenate(
+            [
+                np.column_stack(p)
+                for p in ((side, 0 * side - 1), (0 * side + 1, side), (-side, 0 * side + 1), (0 * side - 1, -side))
+            ]
+        )
         count = round(2 / length)
         rim_xy = outline[(np.arange(4 * count) * 80 / count).round().astype(int)]
     else:

@@ -18,7 +18,9 @@ BROKEN = {
     "pinched": lambda: make_grid(CORNERS, [(0, 1, 2), (2, 3, 4)]),
     "three at an edge": lambda: make_grid(CORNERS, [(0, 1, 2), (1, 0, 3), (0, 1, 4)]),
     "moebius": lambda: strip_of(9, 1),
-    "one turned over": lambda: make_grid(fan().nodes, [t if k else t[::-1] for k, t in enumerate(fan().triangles.tolist())]),
+    "one turned over": lambda: make_grid(
+        fan().nodes, [t if k else t[::-1] for k, t in enumerate(fan().triangles.tolist())]
+    ),
     "two cones": lambda: make_grid(
         [(0, 0, 0), (1, 0, 1), (-1, 1, 1), (-1, -1, 1), (1, 0, -1), (-1, 1, -1), (-1, -1, -1)],
         [(0, 1, 2), (0, 2, 3), (0, 3, 1), (0, 5, 4), (0, 6, 5), (0, 4, 6)],
@@ -88,7 +90,10 @@ def slid(net):
 
 
 @settings(max_examples=60)
-@given(some.sampled_from(sorted(SOUND)), some.lists(some.tuples(some.integers(0, 2), some.integers(0, 999), some.integers(0, 99)), max_size=25))
+@given(
+    some.sampled_from(sorted(SOUND)),
+    some.lists(some.tuples(some.integers(0, 2), some.integers(0, 999), some.integers(0, 99)), max_size=25),
+)
 def test_no_sequence_of_moves_changes_the_topology(name, moves):
     grid = SOUND[name]()
     net, source = open_net(grid)
@@ -135,4 +140,8 @@ def test_a_move_and_its_opposite_leave_the_grid_as_it_was(make):
 def test_corners_and_fixed_nodes_are_never_drawn_in():
     grid = dome(5, fixed=(12,))
     net, _ = open_net(grid)
-    assert not any(kernels.may_collapse(net, u, v) for v in np.flatnonzero(net.kind == kernels.REST) for u in net.ring[v, : net.degree[v]])
+    assert not any(
+        kernels.may_collapse(net, u, v)
+        for v in np.flatnonzero(net.kind == kernels.REST)
+        for u in net.ring[v, : net.degree[v]]
+    )

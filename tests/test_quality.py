@@ -36,7 +36,9 @@ def test_figures_agree_with_plain_loops(name):
     shape = [naive.shape(*grid.nodes[t]) for t in grid.triangles]
     lengths = [np.linalg.norm(grid.nodes[a] - grid.nodes[b]) for a, b in naive.wings(grid)]
     angles = [naive.angles(*grid.nodes[t]) for t in grid.triangles]
-    inside = set(range(len(grid.nodes))) - {v for edge, third in naive.wings(grid).items() if len(third) == 1 for v in edge}
+    inside = set(range(len(grid.nodes))) - {
+        v for edge, third in naive.wings(grid).items() if len(third) == 1 for v in edge
+    }
     six = [len(naive.neighbors(grid)[v]) == 6 for v in inside]
     assert quality.shape_mean == pytest.approx(np.mean(shape))
     assert quality.shape_std == pytest.approx(np.std(shape), abs=1e-9)

@@ -1,0 +1,207 @@
+"""Equalizing: one energy that falls, members of one length, a topology that stays; curves on which the rim slides."""
+
+import naive_grid as naive
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from rough import compiled_only, curve_of, rough_disc, rough_sphere, same_topology
+
+from scantruss.grid.equalize import PRICE, WEIGHT, equalize, finish, new_scratch, search_once, settle
+from scantruss.kernels import equalize as kernels
+from scantruss.kernels import rim as curves
+from scantruss.kernels import search
+from scantruss.kernels.grid import INTERIOR, REST, may_collapse, may_flip, may_split
+
+MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
+
+
+@pytest.fixture(params=sorted(MAKERS))
+def rough(request):
+    return MAKERS[request.param]()
+
+
+def test_the_slope_of_the_energy_agrees_with_differences():
+    rough = rough_disc()
+    relief = rough.relief()
+    net, length = relief.net, rough.settings.length
+    for v in range(0, len(rough.grid.nodes), 5):
+        place = net.nodes[v].copy()
+        slope = np.array(kernels.star_energy(net, relief.patches, v, *place, length, 1.7)[1:])
+        for c in range(3):
+            step = np.eye(3)[c] * 1e-6
+            up = kernels.star_energy(net, relief.patches, v, *(place + step), length, 1.7)[0]
+            down = kernels.star_energy(net, relief.patches, v, *(place - step), length, 1.7)[0]
+            assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
+
+
+def test_the_energy_agrees_with_plain_loops(rough):
+    relief = rough.relief()
+    scratch = new_scratch(relief)
+    energy, mean, count = search.total_energy(relief.net, scratch, rough.settings.length, 1.7)
+    assert energy == pytest.approx(naive.energy(rough.grid, rough.settings.length, 1.7))
+    assert mean == pytest.approx(rough.grid.lengths.mean()) and count == len(rough.grid.nodes)
+
+
+def test_a_fold_counts(rough):
+    relief = rough.relief()
+    net, length = relief.net, rough.settings.length
+    v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
+    net.nodes[v] += 3.0 * (net.nodes[net.ring[v, 0]] - net.nodes[v])
+    grid = rough.grid.replace(nodes=net.nodes[: len(rough.grid.nodes)].copy())
+    energy = search.total_energy(net, new_scratch(relief), length, WEIGHT)[0]
+    assert energy == pytest.approx(naive.energy(grid, length, WEIGHT))
+    settle(relief, WEIGHT, 1e-6, 60)
+    healed = relief.to_grid(rough.grid)
+    assert naive.energy(healed, length, 0.0) < 0.2 * len(healed.triangles)
+
+
+def test_settling_never_raises_the_energy(rough):
+    relief = rough.relief()
+    scratch, length = new_scratch(relief), rough.settings.length
+    at_rest = relief.net.nodes[relief.net.kind >= REST].copy()
+    before = search.total_energy(relief.net, scratch, length, WEIGHT)[0]
+    for _ in range(4):
+        settle(relief, WEIGHT, 0.0, 3)
+        after = search.total_energy(relief.net, scratch, length, WEIGHT)[0]
+        assert after <= before + 1e-9
+        before = after
+    assert np.array_equal(at_rest, relief.net.nodes[relief.net.kind >= REST])
+
+
+def test_a_move_that_does_not_pay_leaves_no_trace(rough):
+    relief = rough.relief()
+    net, scratch, length = relief.net, new_scratch(relief), rough.settings.length
+    settle(relief, WEIGHT, 1e-4, 20)
+    live = net.degree > 0
+    kept = [array[live].copy() for array in (net.nodes, net.degree, net.arc, net.kind)]
+    rings = [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
+    free = net.count[0]
+    for v in range(0, len(rough.grid.nodes), 5):
+        for u in net.ring[v, : net.degree[v]].tolist():
+            for move, allowed in enumerate((may_flip, may_collapse, may_split)):
+                if allowed(net, v, u):
+                    worth = 0.0 if move == 0 else (99.0 if move == 1 else -99.0)
+                    if search.disorder(net, scratch.ideal, move, v, u) > 0 or move > 0:
+                        assert (
+                            not search.try_move(
+                                net, relief.patches, relief.rim, scratch, move, v, u, length, WEIGHT, worth
+                            )
+                            or move == 0
+                        )
+                        if scratch.counter[2]:
+                            return  # a flip that paid: from here on the net is another
+    assert net.count[0] == free
+    for array, values in zip((net.nodes, net.degree, net.arc, net.kind), kept, strict=True):
+        assert np.array_equal(array[live], values)
+    assert rings == [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
+
+
+def stated_energy(relief, scratch):
+    """The energy that the search lowers, but for the share of each node."""
+    energy, mean, count = search.total_energy(relief.net, scratch, relief.length, WEIGHT)
+    return energy + PRICE * count * (mean / relief.length - 1) ** 2 - 0.1 * count
+
+
+def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
+    relief = rough.relief()
+    settle(relief, WEIGHT, 1e-4, 30)
+    scratch = new_scratch(relief)
+    before, kept = stated_energy(relief, scratch), search_once(relief, scratch)
+    assert kept > 0
+    assert stated_energy(relief, scratch) < before
+    assert same_topology(rough.grid, relief.to_grid(rough.grid))
+
+
+@compiled_only
+def test_members_become_equal_and_triangles_regular(rough):
+    relief = rough.relief()
+    equalize(relief)
+    finish(relief)
+    after = relief.to_grid(rough.grid)
+    quality, length = after.quality, rough.settings.length
+    assert same_topology(rough.grid, after)
+    assert quality.shape_mean > max(0.97, rough.grid.quality.shape_mean)
+    assert quality.shape_std < rough.grid.quality.shape_std
+    assert quality.length_cv < min(0.12, rough.grid.quality.length_cv)
+    assert abs(quality.length_mean / length - 1) < 0.04
+    assert quality.angle_min > 30
+    assert quality.node_deviation_mean < 0.01 * length
+    for corner in rough.corners:
+        assert np.abs(after.nodes - corner).max(axis=1).min() == 0.0
+    if len(rough.rim.total):
+        rim = np.concatenate(after.boundary_loops)
+        far = [naive.nearest_on_polyline(rough.rim.points, place, 50) for place in after.nodes[rim]]
+        assert max(far) < 0.01 * length
+
+
+@compiled_only
+@pytest.mark.parametrize("stretch", [0.8, 1.25])
+def test_the_mean_length_comes_to_the_desired_one(stretch):
+    rough = rough_disc(length=0.16)
+    rough = rough._replace(settings=rough.settings.replace(length=0.16 * stretch))
+    relief = rough.relief()
+    equalize(relief)
+    finish(relief)
+    after = relief.to_grid(rough.grid)
+    assert same_topology(rough.grid, after)
+    assert abs(after.lengths.mean() / (0.16 * stretch) - 1) < 0.06
+
+
+@compiled_only
+def test_the_same_grid_comes_out_twice(rough):
+    found = []
+    for _ in range(2):
+        relief = rough.relief()
+        equalize(relief)
+        finish(relief)
+        found.append(relief.to_grid(rough.grid))
+    assert found[0].nodes.tobytes() == found[1].nodes.tobytes()
+    assert found[0].triangles.tobytes() == found[1].triangles.tobytes()
+
+
+def test_a_grid_in_disorder_is_mended():
+    rough = rough_disc(jitter=0.1)
+    rng = np.random.default_rng(0)
+    nodes = rough.grid.nodes.copy()
+    inside = np.setdiff1d(np.arange(len(nodes)), np.concatenate(rough.grid.boundary_loops))
+    nodes[inside, :2] += rough.settings.length * rng.uniform(-0.7, 0.7, (len(inside), 2))
+    rough = rough._replace(grid=rough.grid.replace(nodes=nodes))
+    assert rough.grid.quality.angle_min < 10
+    relief = rough.relief()
+    equalize(relief)
+    finish(relief)
+    after = relief.to_grid(rough.grid)
+    assert same_topology(rough.grid, after)
+    assert after.quality.angle_min > 25 and after.quality.shape_mean > 0.96
+
+
+LOOP = np.array([(0, 0, 0), (1, 0, 0.2), (1.5, 1, 0), (0.5, 1.7, -0.3), (-0.4, 0.9, 0)])
+
+
+@given(some.floats(-7, 13), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
+def test_places_on_a_curve_agree_with_sampling(arc, place):
+    rim = curve_of(LOOP)
+    curve, at, distance = curves.nearest_on_rim(rim, *place)
+    assert curve == 0 and distance == pytest.approx(naive.nearest_on_polyline(LOOP, np.array(place)), abs=2e-3)
+    there = curves.at_arc(rim, 0, at)
+    assert np.linalg.norm(np.array(there[1:]) - place) == pytest.approx(distance, abs=1e-9)
+    found = curves.slide(rim, 0, arc % rim.total[0], 100.0, *place)
+    assert np.linalg.norm(np.array(found[1:]) - place) == pytest.approx(distance, abs=1e-9)
+
+
+@given(some.floats(0, 5), some.floats(0.01, 1), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
+def test_sliding_stays_within_reach_and_never_leads_away(arc, reach, place):
+    rim = curve_of(LOOP)
+    total = rim.total[0]
+    arc, *start = curves.at_arc(rim, 0, arc)
+    found, *there = curves.slide(rim, 0, arc, reach, *place)
+    gone = abs((found - arc + total / 2) % total - total / 2)
+    assert gone <= reach + 1e-9
+    assert np.linalg.norm(np.subtract(there, place)) <= np.linalg.norm(np.subtract(start, place)) + 1e-9
+
+
+def test_no_curve_is_nearest_where_there_is_none():
+    from rough import no_rim
+
+    assert curves.nearest_on_rim(no_rim(), 0.0, 0.0, 0.0)[0] == -1

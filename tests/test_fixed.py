@@ -1,0 +1,142 @@
+"""Fixed nodes: exactly in place, good triangles around them, refused in words where that is impossible."""
+
+import numpy as np
+import pytest
+from rough import compiled_only, rough_disc, rough_sphere, same_topology
+
+from scantruss import InputError, Settings, optimize_grid
+from scantruss.boundary import find_boundary
+from scantruss.grid.quality import corner_angles
+
+MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda: rough_disc(corners=True)}
+
+
+@pytest.fixture(scope="module", params=sorted(MAKERS))
+def scene(request):
+    rough = MAKERS[request.param]()
+    return rough, find_boundary(rough.cloud, rough.settings)
+
+
+def angle_around(grid):
+    """Smallest angle of the triangles at fixed nodes [degree]."""
+    return corner_angles(grid.nodes, grid.triangles)[grid.fixed[grid.triangles].any(axis=1)].min()
+
+
+def spread_out(points, count, gap, seed):
+    """Points of a cloud that keep a distance from each other."""
+    rng = np.random.default_rng(seed)
+    chosen = []
+    while len(chosen) < count:
+        place = points[rng.integers(len(points))]
+        if all(np.linalg.norm(place - other) >= gap for other in chosen):
+            chosen.append(place)
+    return np.array(chosen)
+
+
+@compiled_only
+@pytest.mark.parametrize("method", ["default", "paper"])
+@pytest.mark.parametrize("seed", range(2))
+def test_ten_fixed_nodes_anywhere(scene, method, seed):
+    rough, boundary = scene
+    length = rough.settings.length
+    places = spread_out(rough.cloud.points, 10, 1.3 * length, seed) + rough.cloud.origin
+    grid = optimize_grid(rough.grid, rough.cloud, rough.settings.replace(method=method), places, boundary=boundary)
+    assert same_topology(rough.grid, grid)
+    assert grid.fixed.sum() == 10
+    found = grid.nodes[grid.fixed] + grid.origin
+    for place in places:
+        assert np.abs(found - place).max(axis=1).min() <= 1e-12
+    assert angle_around(grid) > (25 if method == "default" else 12)
+    assert grid.quality.shape_mean > (0.96 if method == "default" else 0.9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_fixed_nodes_half_a_member_apart(scene, seed):
+    rough, boundary = scene
+    points, length = rough.cloud.points, rough.settings.length
+    rng = np.random.default_rng(seed)
+    first = points[rng.integers(len(points))]
+    distance = np.linalg.norm(points - first, axis=1)
+    second = points[np.flatnonzero((distance > 0.5 * length) & (distance < 0.58 * length))[0]]
+    places = np.stack([first, second]) + rough.cloud.origin
+    grid = optimize_grid(rough.grid, rough.cloud, rough.settings, places, boundary=boundary)
+    assert same_topology(rough.grid, grid)
+    assert grid.fixed.sum() == 2
+    assert angle_around(grid) > 18
+
+
+def test_positions_are_in_the_frame_of_the_scan():
+    rough = rough_disc()
+    far = rough.cloud.points + rough.cloud.origin + [5e5, 4e6, 100.0]
+    from scantruss import PointCloud
+
+    cloud = PointCloud.from_array(far)
+    grid = rough.grid.replace(
+        nodes=rough.grid.nodes + rough.cloud.origin + [5e5, 4e6, 100.0] - cloud.origin, origin=cloud.origin
+    )
+    place = far[17]
+    done = optimize_grid(grid, cloud, rough.settings, [place])
+    assert np.abs(done.nodes[done.fixed] + done.origin - place).max() < 1e-8
+
+
+def test_a_corner_may_be_fixed_and_stays_one_node():
+    rough = rough_disc(corners=True)
+    boundary = find_boundary(rough.cloud, rough.settings)
+    nodes = rough.grid.nodes.copy()
+    for corner in boundary.corners:
+        nodes[np.linalg.norm(nodes - corner, axis=1).argmin()] = corner
+    grid = rough.grid.replace(nodes=nodes)
+    assert len(boundary.corners) == 4
+    done = optimize_grid(
+        grid, rough.cloud, rough.settings, boundary.corners[:1] + rough.cloud.origin, boundary=boundary
+    )
+    assert done.fixed.sum() == 1 and same_topology(grid, done)
+    assert np.array_equal(done.nodes[done.fixed][0], boundary.corners[0])
+
+
+def test_settings_hold_the_positions_too():
+    rough = rough_disc()
+    place = (rough.cloud.points[5] + rough.cloud.origin).tolist()
+    grid = optimize_grid(rough.grid, rough.cloud, rough.settings.replace(fixed=(tuple(place),)))
+    assert grid.nodes[grid.fixed] + grid.origin == pytest.approx(np.array([place]), abs=1e-12)
+
+
+@compiled_only
+def test_an_improved_grid_keeps_its_fixed_nodes_when_it_is_improved_again():
+    rough = rough_disc()
+    place = rough.cloud.points[5] + rough.cloud.origin
+    once = optimize_grid(rough.grid, rough.cloud, rough.settings, [place])
+    again = optimize_grid(once, rough.cloud, rough.settings, [place])
+    assert again.fixed.sum() == 1
+    assert np.array_equal(once.nodes[once.fixed], again.nodes[again.fixed])
+    third = optimize_grid(once, rough.cloud, rough.settings)
+    assert np.array_equal(once.nodes[once.fixed], third.nodes[third.fixed])
+
+
+@pytest.mark.parametrize(
+    ("places", "words"),
+    [
+        ([(0, 0, 3.0)], r"\(0, 0, 3\) is 2\.6.* away from the scan; it must lie within half a member, 0\.11"),
+        (
+            [(0, 0, 0.4), (0.05, 0, 0.4)],
+            r"\(0, 0, 0\.4\) and \(0\.05, 0, 0\.4\) are 0\.05 apart; they need half a member",
+        ),
+        ([(0, 0, 0.4), (0, 0, 0.4)], "are 0 apart"),
+        ([(0, 0, np.nan)], "finite"),
+        ([(0, 0)], r"shape \(K, 3\)"),
+        ([("a", 0, 0)], r"shape \(K, 3\)"),
+        ([(1.3, 0, 0)], "away from the scan"),
+    ],
+)
+def test_positions_that_cannot_be_are_refused(places, words):
+    rough = rough_disc()
+    with pytest.raises(InputError, match=words):
+        optimize_grid(rough.grid, rough.cloud, rough.settings, places)
+
+
+def test_a_refusal_names_the_unit():
+    rough = rough_disc()
+    from dataclasses import replace
+
+    with pytest.raises(InputError, match="mm away from the scan"):
+        optimize_grid(rough.grid, replace(rough.cloud, unit="mm"), Settings(length=0.22), [(9, 9, 9)])
