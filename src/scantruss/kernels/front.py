@@ -337,7 +337,7 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
         q2 = onto_tangent_plane(pq, pa, u, v)
-        if q != p and i < near:
+        if i < near and q != p and q != a and q != b:
             if inside_triangle(q2, a2, b2, p2):
                 return False
             if (
