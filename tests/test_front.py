@@ -330,6 +330,35 @@ def test_a_gap_never_repeats_an_edge():
 
 
 @pytest.mark.kernels
+def test_triangles_at_the_nodes_of_a_gap_do_not_forbid_its_diagonals():
+    corners = [(0, 0), (2, 0), (2.2, 2.2), (0, 2)]
+    free, hand = (HandFront(corners, points=plate_points(), length=2.0) for _ in range(2))
+    for n in range(4):
+        lists.add_triangle(hand.front, n, hand.add_node(-3, -3 + n), hand.add_node(3, -3 + n))
+    for each in (free, hand):
+        loop, count = gap_of(each)
+        assert gaps.close_gap(each.front, loop, count, 2.0) == 2
+    assert set(hand.triangles[4:]) == set(free.triangles)
+
+
+@pytest.mark.kernels
+def test_every_edge_of_every_triangle_exists():
+    """Of a fan around node 0 and of the front; nothing else does."""
+    angles = np.arange(5) * 2 * np.pi / 5
+    hand = HandFront([(-2, -2), (2, -2), (2, 2), (-2, 2)], points=plate_points(), length=2.0)
+    ids = [hand.add_node(0, 0)] + [hand.add_node(np.cos(a), np.sin(a)) for a in angles]
+    edges = {(0, 1), (1, 2), (2, 3), (0, 3)}
+    for k in range(5):
+        a, b, c = ids[0], ids[k + 1], ids[(k + 1) % 5 + 1]
+        lists.add_triangle(hand.front, a, b, c)
+        edges |= {tuple(sorted(e)) for e in ((a, b), (b, c), (c, a))}
+    for a in range(10):
+        for b in range(10):
+            if a != b:
+                assert lists.edge_exists(hand.front, a, b) == (tuple(sorted((a, b))) in edges)
+
+
+@pytest.mark.kernels
 def test_a_gap_that_no_triangles_fit_stays_open():
     """Both diagonals are edges already."""
     hand = HandFront([(0, 0), (2, 0), (2, 2), (0, 2)], points=plate_points(), length=2.0)

@@ -1,7 +1,4 @@
-"""The paper, equation by equation (Ding, Xu and Luo 2017): one test each, with values worked out by hand.
-
-Stops (a), (b), (c) of Sec. 4.1 also have tests of their own in test_smoothing, flips in test_flips.
-"""
+"""The paper, equation by equation (Ding, Xu and Luo 2017): one test each, with values worked out by hand."""
 
 from __future__ import annotations
 
@@ -15,7 +12,16 @@ from small_clouds import HandFront, cap, ring, sheet
 import scantruss as st
 from scantruss.boundary import boundary_nodes
 from scantruss.front import new_front, start_front
-from scantruss.grid.smoothing import State, lengths_no_longer_even_out, moved_too_far, shape_no_longer_improves
+from scantruss.grid.flips import flip_edges
+from scantruss.grid.relief import Relief
+from scantruss.grid.smoothing import (
+    State,
+    deviation_allowed,
+    lengths_no_longer_even_out,
+    moved_too_far,
+    shape_no_longer_improves,
+    smooth,
+)
 from scantruss.kernels import cases
 from scantruss.kernels import front as lists
 from scantruss.kernels.advance import advance_by_cases
@@ -158,15 +164,18 @@ AB = 1  # segment of `square` from (0, 0) to (1, 0)
 @pytest.mark.kernels
 @pytest.mark.parametrize("w1", [0.0, 0.5, 1.0])
 def test_section_3_4_step_1_the_optimal_point(w1):
-    """Of the points with d_1 <= b and r - h <= d_2 <= r + h on the unmeshed side, the one of the best triangle."""
-    hand = HandFront(square(), length=1.2, length_weight=w1, search_range=3.0)
+    """Of the points with d_1 <= b and r - h <= d_2 <= r + h on the unmeshed side, the one of the best triangle.
+
+    With w_1 = 1 the regular triangle, of height 0.87, lies below the search region, which begins at r - h = 1.56 - 0.38.
+    """
+    hand = HandFront(square(), length=1.8, length_weight=w1, search_range=3.0)
     assert cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch)
     found = hand.front.nodes[hand.front.count[lists.NODES]]
     expected = naive.optimal_point(
-        hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.2, w1, hand.numbers[lists.RANGE]
+        hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.8, w1, hand.numbers[lists.RANGE]
     )
     assert found.tolist() == hand.surface.points[expected].tolist()  # to the last bit: a point of the cloud
-    r = ROOT3 / 2 * (w1 * 1.2 + (1 - w1) * 1.0)
+    r = ROOT3 / 2 * (w1 * 1.8 + (1 - w1) * 1.0)
     assert abs(found[0] - 0.5) <= hand.numbers[lists.RANGE]
     assert abs(found[1] - r) <= hand.numbers[lists.RANGE]
 
@@ -481,6 +490,49 @@ def test_section_4_1_stop_c_the_nodes_have_moved_too_far():
 
 def scan_of_a_dome():
     return cap(5.0, 1.2, 0.2)
+
+
+def relief_of(**others):
+    """Return a dome's grid as the front leaves it, ready to be smoothed, with its settings."""
+    cloud, settings = st.PointCloud.from_array(scan_of_a_dome()), st.Settings(length=1.0, method="paper", **others)
+    boundary = st.find_boundary(cloud, settings)
+    grid = st.advance_front(cloud, boundary, settings)
+    surface = boundary.sites.surface
+    return grid, Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length), settings
+
+
+def test_section_4_1_smoothing_ends_at_a_stop_and_keeps_the_better_grid():
+    grid, relief, settings = relief_of()
+    found = smooth(relief, settings)
+    after = relief.to_grid(grid)
+    assert found.passes > 0
+    assert found.stop in ("a", "b", "c") or found.passes == settings.smooth_passes
+    assert after.quality.shape_mean > grid.quality.shape_mean
+    assert after.quality.length_std < grid.quality.length_std
+    assert np.linalg.norm(after.nodes - grid.nodes, axis=1).mean() <= deviation_allowed(settings)
+
+
+def test_section_4_1_a_pass_that_moves_the_nodes_too_far_is_undone():
+    grid, relief, settings = relief_of(max_deviation=1e-9)
+    assert smooth(relief, settings) == (0, "c")
+    assert relief.to_grid(grid).nodes == pytest.approx(grid.nodes, abs=1e-12)
+
+
+def test_section_4_1_more_deviation_allowed_means_more_passes():
+    passes = [smooth(*relief_of(max_deviation=d)[1:]).passes for d in (0.001, 0.01, 0.1)]
+    assert passes == sorted(passes) and passes[0] < passes[-1]
+
+
+def test_section_4_1_flips_make_the_smallest_angle_as_large_as_they_can():
+    """A rhombus of diagonals 4 and 2: the long one leaves 27 degrees, the short one 53; the short one is taken and stays."""
+    nodes = np.array([(0.0, 0.0, 0.0), (2.0, -1.0, 0.0), (4.0, 0.0, 0.0), (2.0, 1.0, 0.0)])
+    wide = st.Grid(nodes, np.array([(0, 1, 2), (0, 2, 3)]), np.zeros(4, bool), np.zeros(3))
+    flipped, count = flip_edges(wide)
+    assert count == 1
+    assert {frozenset(t) for t in flipped.triangles.tolist()} == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
+    assert naive.directed_edges(flipped.triangles).keys() >= {(0, 1), (1, 2), (2, 3), (3, 0)}
+    again, count = flip_edges(flipped)
+    assert count == 0 and again.triangles.tolist() == flipped.triangles.tolist()
 
 
 @pytest.mark.parametrize("method", ["paper", "default"])
