@@ -84,7 +84,7 @@ def test_corners_of_a_plate_are_found_within_a_tenth_of_a_member(corners, seed):
 
 @pytest.mark.parametrize("corners", [RECTANGLE, ELL, RHOMBUS], ids=["rectangle", "ell", "rhombus"])
 def test_nodes_divide_every_side_equally_and_corners_are_nodes(corners):
-    boundary, origin = found(polygon(corners))
+    boundary, _ = found(polygon(corners))
     nodes, is_corner = boundary_nodes(boundary.loops[0], 1.0)
     assert is_corner.sum() == len(corners)
     assert is_corner[0]

@@ -1,4 +1,7 @@
-"""The paper, equation by equation (Ding, Xu and Luo 2017): one test each, with values worked out by hand."""
+"""The paper, equation by equation (Ding, Xu and Luo 2017): one test each, with values worked out by hand.
+
+The stops (a), (b), (c) of Sec. 4.1 and the smoothing that obeys them: test_smoothing.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,6 @@ import scantruss as st
 from scantruss.boundary import boundary_nodes
 from scantruss.front import new_front, start_front
 from scantruss.grid.flips import flip_edges
-from scantruss.grid.relief import Relief
-from scantruss.grid.smoothing import (
-    State,
-    deviation_allowed,
-    lengths_no_longer_even_out,
-    moved_too_far,
-    shape_no_longer_improves,
-    smooth,
-)
 from scantruss.kernels import cases
 from scantruss.kernels import front as lists
 from scantruss.kernels.advance import advance_by_cases
@@ -466,61 +460,8 @@ def test_section_3_5_nodes_are_points_of_the_cloud():
 # Sec. 4: optimization
 
 
-@pytest.mark.kernels
-def test_section_4_1_stop_a_the_shape_quality_is_no_longer_improved():
-    now = State(shape=0.95, spread=0.3, moved=0.0)
-    assert shape_no_longer_improves(now, now._replace(shape=0.949))
-    assert shape_no_longer_improves(now, now)
-    assert not shape_no_longer_improves(now, now._replace(shape=0.951))
-
-
-@pytest.mark.kernels
-def test_section_4_1_stop_b_the_standard_deviation_of_the_lengths_is_no_longer_reduced():
-    now = State(shape=0.95, spread=0.3, moved=0.0)
-    assert lengths_no_longer_even_out(now, now._replace(spread=0.31))
-    assert lengths_no_longer_even_out(now, now)
-    assert not lengths_no_longer_even_out(now, now._replace(spread=0.29))
-
-
-@pytest.mark.kernels
-def test_section_4_1_stop_c_the_nodes_have_moved_too_far():
-    assert moved_too_far(State(shape=0.95, spread=0.3, moved=0.101), 0.1)
-    assert not moved_too_far(State(shape=0.95, spread=0.3, moved=0.1), 0.1)
-
-
 def scan_of_a_dome():
     return cap(5.0, 1.2, 0.2)
-
-
-def relief_of(**others):
-    """Return a dome's grid as the front leaves it, ready to be smoothed, with its settings."""
-    cloud, settings = st.PointCloud.from_array(scan_of_a_dome()), st.Settings(length=1.0, method="paper", **others)
-    boundary = st.find_boundary(cloud, settings)
-    grid = st.advance_front(cloud, boundary, settings)
-    surface = boundary.sites.surface
-    return grid, Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length), settings
-
-
-def test_section_4_1_smoothing_ends_at_a_stop_and_keeps_the_better_grid():
-    grid, relief, settings = relief_of()
-    found = smooth(relief, settings)
-    after = relief.to_grid(grid)
-    assert found.passes > 0
-    assert found.stop in ("a", "b", "c") or found.passes == settings.smooth_passes
-    assert after.quality.shape_mean > grid.quality.shape_mean
-    assert after.quality.length_std < grid.quality.length_std
-    assert np.linalg.norm(after.nodes - grid.nodes, axis=1).mean() <= deviation_allowed(settings)
-
-
-def test_section_4_1_a_pass_that_moves_the_nodes_too_far_is_undone():
-    grid, relief, settings = relief_of(max_deviation=1e-9)
-    assert smooth(relief, settings) == (0, "c")
-    assert relief.to_grid(grid).nodes == pytest.approx(grid.nodes, abs=1e-12)
-
-
-def test_section_4_1_more_deviation_allowed_means_more_passes():
-    passes = [smooth(*relief_of(max_deviation=d)[1:]).passes for d in (0.001, 0.01, 0.1)]
-    assert passes == sorted(passes) and passes[0] < passes[-1]
 
 
 def test_section_4_1_flips_make_the_smallest_angle_as_large_as_they_can():
