@@ -266,7 +266,8 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
         for _ in range(3):
             place = _meeting(_best_arm(curve, centre, -1), _best_arm(curve, centre, 1))
             window = np.arange(i - half, i + half + 1) % len(curve)
-            centre = int(window[np.argmin(((curve[window] - place) ** 2).sum(axis=1))])
+            away = ((curve[window] - place) ** 2).sum(axis=1)
+            centre = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
         if np.linalg.norm(place - curve[i]) < 0.5 * settings.length and (not at or i - at[-1] > half):
             at.append(i)
             places.append(place)

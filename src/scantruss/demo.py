@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .scan.cloud import PointCloud
 
 SCAN = Path(__file__).parent / "data" / "nefertiti.ply"
-LENGTH = 16.0  #: members of the demo [mm]; the bust is 495 mm high
+LENGTH = 24.0  #: members of the demo [mm]; the bust is 495 mm high
 SCALE = 0.25  #: of the printed model, so that it stands 124 mm high
 MEMBER_DIAMETER = 1.2  #: of the printed model [mm]
 NODE_DIAMETER = 2.0  #: of the printed model [mm]

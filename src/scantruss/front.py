@@ -117,7 +117,8 @@ def grown(front: lists.Front) -> lists.Front:
     larger.count[:] = front.count
     larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
     for n in range(int(front.count[lists.NODES])):
-        boxing.put(boxes, n, *larger.nodes[n])
+        if front.corner[n] >= 0 or front.out[n] >= 0:  # the others were merged away
+            boxing.put(boxes, n, *larger.nodes[n])
     return larger
 
 
