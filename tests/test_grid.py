@@ -71,9 +71,9 @@ def test_nodes_without_a_triangle_are_dropped():
 def test_nothing_changes_at_a_defect(name):
     grid = BROKEN[name]()
     net, source = open_net(grid)
-    locked = source[: net.count[1]][net.kind[: net.count[1]] == kernels.LOCKED]
+    locked = source[: net.used][net.kind[: net.used] == kernels.LOCKED]
     assert len(locked) > 0
-    for v in range(net.count[1]):
+    for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             touched = {v, u} | {w for w in kernels.wings(net, v, u) if w >= 0}
             if any(net.kind[w] == kernels.LOCKED for w in touched):
@@ -100,7 +100,7 @@ def test_no_sequence_of_moves_changes_the_topology(name, moves):
     slid(net)
     before = net.degree.copy()
     for move, v, i in moves:
-        v %= int(net.count[1])
+        v %= net.used
         if net.degree[v] == 0:
             continue
         u = int(net.ring[v, i % net.degree[v]])

@@ -28,16 +28,14 @@ FAR = 0.5  # how far a node may leave the middle of its patch on the way, in len
 def new_scratch(relief: Relief) -> Scratch:
     """Return room for the trials of the search, with the numbers of neighbours that suit the nodes."""
     capacity, width = relief.net.ring.shape
-
-    def ids(*shape: int) -> np.ndarray:
-        return np.zeros(shape, np.int64)
-
-    scratch = Scratch(
-        mark=ids(capacity), ideal=ids(capacity), tried=ids(capacity), around=ids(capacity), nodes=np.zeros((capacity, 4)),
-        ring=ids(capacity, width), degree=ids(capacity), counter=ids(3),
-    )  # fmt: skip
-    suit_nodes(relief.net, scratch.ideal)
-    return scratch
+    suit_nodes(relief.net)
+    return Scratch(
+        note=np.zeros((capacity, 2), np.int64),
+        around=np.zeros(capacity, np.int64),
+        nodes=np.zeros((capacity, 4)),
+        ring=np.zeros((capacity, width + 1), np.int64),
+        counter=np.zeros(3, np.int64),
+    )
 
 
 def settle(relief: Relief, weight: float, enough: float, sweeps: int) -> int:

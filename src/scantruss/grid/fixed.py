@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels.grid import REST, RIM, may_split, split
 from ..kernels.rim import nearest_on_rim
-from ..kernels.search import Scratch, total_energy
+from ..kernels.search import TRIED, Scratch, total_energy
 from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..scan.cloud import PointCloud
@@ -121,7 +121,7 @@ def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
     if not len(positions):
         return
     scratch = new_scratch(relief)
-    scratch.tried[:] = 1
+    scratch.note[:, TRIED] = 1
     for place in positions:
         if (v := _node_at(relief, place)) >= 0:
             _put_node(relief, v, place)
@@ -163,12 +163,12 @@ def _take(relief: Relief, scratch: Scratch, way: tuple[int, int], place: np.ndar
         a, v = v, split(net, v, b)
         relief.patches[v] = relief.patches[a]
         relief.patches[v, 15] = nearest_site(relief.surface, *place.tolist())
-        scratch.ideal[v] = 4 if net.is_open[v] else 6
+        net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(relief, v, place)
     around = {v}
     for _ in range(2):
         around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
-    scratch.tried[sorted(around)] = 0
+    scratch.note[sorted(around), TRIED] = 0
     for _ in range(3):
         relief.renew(FAR)
         settle(relief, WEIGHT, 1e-3, 6)

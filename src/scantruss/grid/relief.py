@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kernels import grid as kernels
 from ..kernels import seat
-from ..kernels.grid import INTERIOR, LOCKED, REST, RIM, Net
+from ..kernels.grid import LOCKED, REST, RIM, Net
 from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
@@ -42,21 +42,18 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     net = Net(
         nodes=np.zeros((capacity, 3)),
         ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
-        degree=np.zeros(capacity, np.int64),
-        is_open=np.zeros(capacity, np.int64),
-        kind=np.full(capacity, INTERIOR, np.int64),
-        curve=np.full(capacity, -1, np.int64),
+        state=np.zeros((capacity, 5), np.int64),
         arc=np.zeros(capacity),
-        free=np.zeros(capacity, np.int64),
-        count=np.zeros(2, np.int64),
+        free=np.zeros(capacity + 2, np.int64),
     )
+    net.curve[:] = -1
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
-    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.degree, net.is_open, source, count)
+    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.state, source, count)
     net.nodes[:used] = grid.nodes[source[:used]]
     spare = np.arange(capacity - 1, used - 1, -1)
     net.free[: len(spare)] = spare
-    net.count[:] = len(spare), used
+    net.free[-2:] = len(spare), used
     net.kind[:used][net.is_open[:used] == 1] = REST
     net.kind[:count][grid.fixed] = REST
     several = np.bincount(source[:used], minlength=count) > 1
@@ -71,7 +68,7 @@ def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | 
 
     `deviation` (C,) is the distance of each node of the net from the scan [scan unit].
     """
-    used = int(net.count[1])
+    used = net.used
     room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
     triangles = room[: kernels.list_triangles(net, room)]
     merged = np.where(source[:used] >= 0, source[:used], np.arange(used))
@@ -113,7 +110,7 @@ class Relief:
         """
         net, source = open_net(grid)
         rim = Rim(*(np.ascontiguousarray(array) for array in rim))
-        used = int(net.count[1])
+        used = net.used
         fixed = np.zeros(len(net.degree), np.bool_)
         fixed[: len(grid.fixed)] = grid.fixed
         for v in np.flatnonzero((net.is_open[:used] == 1) & (net.kind[:used] == REST)).tolist():

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .grid import INTERIOR, REST, RIM, Net
+from .grid import CURVE, DEGREE, INTERIOR, KIND, OPEN, REST, RIM, Net
 from .rim import Rim, slide
 from .surface import onto_patch
 
@@ -31,7 +31,7 @@ def star_energy(
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
     nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
-    d = net.degree[v]
+    d = net.state[v, DEGREE]
     w = net.ring[v, d - 1]
     cx, cy, cz = nodes[w, 0] - x, nodes[w, 1] - y, nodes[w, 2] - z
     cc = cx * cx + cy * cy + cz * cz
@@ -46,7 +46,7 @@ def star_energy(
             energy += weight * stretch * stretch
             f = 2.0 * weight * stretch / (length * size)
             gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
-        if i == 0 and net.is_open[v] == 1:
+        if i == 0 and net.state[v, OPEN] == 1:
             continue
         energy += 1.0
         ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx  # twice the area, as a vector
@@ -75,8 +75,8 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
 
     Steps shorter than `still` are not made.
     """
-    kind = net.kind[v]
-    if kind >= REST or net.degree[v] == 0:
+    kind = net.state[v, KIND]
+    if kind >= REST or net.state[v, DEGREE] == 0:
         return 0.0
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight)
@@ -84,7 +84,7 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
         nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
-    step = STRIDE * length * length / (net.degree[v] * (weight + 1.3))
+    step = STRIDE * length * length / (net.state[v, DEGREE] * (weight + 1.3))
     most = 0.3 * length
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
     if size < still:
@@ -95,7 +95,7 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
     for _ in range(2):
         place = (x - step * gx, y - step * gy, z - step * gz)
         if kind == RIM:
-            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
+            arc, px, py, pz = slide(rim, net.state[v, CURVE], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
         after = star_energy(net, patches, v, px, py, pz, length, weight)[0]
@@ -115,7 +115,7 @@ def settle_all(
 
     `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.
     """
-    used = net.count[1]
+    used = net.free[-1]
     for sweep in range(sweeps):
         gain = 0.0
         for v in range(used):
@@ -125,7 +125,7 @@ def settle_all(
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1
-                    for i in range(net.degree[v]):
+                    for i in range(net.state[v, DEGREE]):
                         awake[net.ring[v, i]] = 1
         if gain < enough * used:
             return sweep + 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .compile import kernel
-from .grid import Net, flip, may_flip, wings
+from .grid import DEGREE, Net, flip, may_flip, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
 
 
@@ -48,9 +48,9 @@ def flip_by_angle(net: Net, fold: float, rounds: int) -> int:
     count = 0
     for _ in range(rounds):
         before = count
-        for v in range(net.count[1]):
+        for v in range(net.free[-1]):
             i = 0
-            while i < net.degree[v]:
+            while i < net.state[v, DEGREE]:
                 u = net.ring[v, i]
                 i += 1
                 if v < u and may_flip(net, v, u) and gain_of_flip(net, v, u, fold) > 1e-9:

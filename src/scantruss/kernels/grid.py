@@ -18,18 +18,50 @@ REST = 2  # corner or fixed node: never moved, never removed
 LOCKED = 3  # at a defect of the grid (pinch, seam): nothing near it changes
 
 
+DEGREE, OPEN, KIND, CURVE, IDEAL = 0, 1, 2, 3, 4  # columns of `Net.state`
+
+
 class Net(NamedTuple):
-    """A grid while it is improved; capacity C nodes of at most W neighbours. A node with degree 0 is free."""
+    """A grid while it is improved; capacity C nodes of at most W neighbours.
+
+    Few arrays, because each costs time to compile in every kernel that is handed a net.
+    """
 
     nodes: np.ndarray  #: (C, 3) positions
     ring: np.ndarray  #: (C, W) int64 neighbours, anticlockwise
-    degree: np.ndarray  #: (C,) int64 number of neighbours
-    is_open: np.ndarray  #: (C,) int64, 1 on the boundary
-    kind: np.ndarray  #: (C,) int64 INTERIOR, RIM, REST or LOCKED
-    curve: np.ndarray  #: (C,) int64 boundary curve of the node, -1 none
-    arc: np.ndarray  #: (C,) place on that curve as arc length from its start
-    free: np.ndarray  #: (C,) int64 stack of free nodes
-    count: np.ndarray  # type: ignore[assignment]  #: (2,) int64 nodes on that stack; nodes in use
+    state: np.ndarray  #: (C, 5) int64, see the properties
+    arc: np.ndarray  #: (C,) place of a boundary node on its curve, as arc length from the start
+    free: np.ndarray  #: (C + 2,) int64 stack of free nodes; last but one their number, last the nodes in use
+
+    @property
+    def degree(self) -> np.ndarray:
+        """(C,) number of neighbours; 0: the node is free."""
+        return self.state[:, DEGREE]
+
+    @property
+    def is_open(self) -> np.ndarray:
+        """(C,) 1 on the boundary, 0 inside."""
+        return self.state[:, OPEN]
+
+    @property
+    def kind(self) -> np.ndarray:
+        """(C,) INTERIOR, RIM, REST or LOCKED."""
+        return self.state[:, KIND]
+
+    @property
+    def curve(self) -> np.ndarray:
+        """(C,) boundary curve of the node, -1 none."""
+        return self.state[:, CURVE]
+
+    @property
+    def ideal(self) -> np.ndarray:
+        """(C,) number of neighbours that suits the node: 6 inside, on the boundary by its angle."""
+        return self.state[:, IDEAL]
+
+    @property
+    def used(self) -> int:
+        """Nodes 0 to `used` - 1 have been in use."""
+        return int(self.free[-1])
 
 
 @kernel
@@ -39,8 +71,7 @@ def fill_rings(
     fan: np.ndarray,
     first: np.ndarray,
     ring: np.ndarray,
-    degree: np.ndarray,
-    is_open: np.ndarray,
+    state: np.ndarray,
     source: np.ndarray,
     used: int,
 ) -> int:
@@ -52,7 +83,7 @@ def fill_rings(
     partner : (3 T,) int64 the half-edge opposite to each half-edge (from its corner on), -1 none
     fan : (3 T,) int64, -1 at the start; filled with the node of the net at each corner: a node with two fans becomes two
     first : (C,) int64 scratch
-    ring, degree, is_open : arrays of the net, degree 0 at the start
+    ring, state : arrays of the net, degree 0 at the start
     source : (C,) int64 node of the grid that each node of the net stands for, filled
     used : nodes of the grid
 
@@ -73,7 +104,7 @@ def fill_rings(
                 break
             at = back
         v = corner_node[corner]
-        if degree[v] > 0:
+        if state[v, DEGREE] > 0:
             v = used
             source[v] = corner_node[corner]
             used += 1
@@ -84,15 +115,15 @@ def fill_rings(
             fan[at] = v
             count += 1
             at = partner[at - at % 3 + (at % 3 + 2) % 3]
-        is_open[v] = 1 if at < 0 else 0
-        degree[v] = count + is_open[v]
+        state[v, OPEN] = 1 if at < 0 else 0
+        state[v, DEGREE] = count + state[v, OPEN]
     for v in range(used):
         at = first[v]
-        for i in range(degree[v] - is_open[v]):
+        for i in range(state[v, DEGREE] - state[v, OPEN]):
             base, k = at - at % 3, at % 3
             ring[v, i] = fan[base + (k + 1) % 3]
             last = base + (k + 2) % 3
-            if is_open[v] == 1:
+            if state[v, OPEN] == 1:
                 ring[v, i + 1] = fan[last]
             at = partner[last]
     return used
@@ -102,9 +133,9 @@ def fill_rings(
 def list_triangles(net: Net, triangles: np.ndarray) -> int:
     """Write each triangle of the net once, by its smallest node; returns their number."""
     count = 0
-    for v in range(net.count[1]):
-        d = net.degree[v]
-        for i in range(d - net.is_open[v]):
+    for v in range(net.free[-1]):
+        d = net.state[v, DEGREE]
+        for i in range(d - net.state[v, OPEN]):
             u, w = net.ring[v, i], net.ring[v, (i + 1) % d]
             if v < u and v < w:
                 triangles[count, 0], triangles[count, 1], triangles[count, 2] = v, u, w
@@ -115,7 +146,7 @@ def list_triangles(net: Net, triangles: np.ndarray) -> int:
 @kernel
 def place_of(net: Net, v: int, u: int) -> int:
     """Position of node u in the ring of node v, -1 where they are not neighbours."""
-    for i in range(net.degree[v]):
+    for i in range(net.state[v, DEGREE]):
         if net.ring[v, i] == u:
             return i
     return -1
@@ -124,26 +155,26 @@ def place_of(net: Net, v: int, u: int) -> int:
 @kernel
 def put_in(net: Net, v: int, i: int, u: int) -> None:
     """Insert node u into the ring of node v before position i."""
-    for j in range(net.degree[v], i, -1):
+    for j in range(net.state[v, DEGREE], i, -1):
         net.ring[v, j] = net.ring[v, j - 1]
     net.ring[v, i] = u
-    net.degree[v] += 1
+    net.state[v, DEGREE] += 1
 
 
 @kernel
 def take_out(net: Net, v: int, u: int) -> None:
     """Remove node u from the ring of node v."""
     i = place_of(net, v, u)
-    net.degree[v] -= 1
-    for j in range(i, net.degree[v]):
+    net.state[v, DEGREE] -= 1
+    for j in range(i, net.state[v, DEGREE]):
         net.ring[v, j] = net.ring[v, j + 1]
 
 
 @kernel
 def wings(net: Net, a: int, b: int) -> tuple[int, int]:
     """Nodes right and left of the edge from a to b: (a, right, b) and (a, b, left) are triangles; -1 where there is none."""
-    i, d = place_of(net, a, b), net.degree[a]
-    if net.is_open[a] == 1:
+    i, d = place_of(net, a, b), net.state[a, DEGREE]
+    if net.state[a, OPEN] == 1:
         return (net.ring[a, i - 1] if i > 0 else -1), (net.ring[a, i + 1] if i + 1 < d else -1)
     return net.ring[a, (i + d - 1) % d], net.ring[a, (i + 1) % d]
 
@@ -151,7 +182,7 @@ def wings(net: Net, a: int, b: int) -> tuple[int, int]:
 @kernel
 def lowest_degree(net: Net, v: int) -> int:
     """Fewest neighbours that a node may be left with."""
-    return 2 if net.is_open[v] == 1 else 4
+    return 2 if net.state[v, OPEN] == 1 else 4
 
 
 @kernel
@@ -162,13 +193,13 @@ def may_flip(net: Net, a: int, b: int) -> bool:
         return False
     most = net.ring.shape[1] - 1
     for v in (a, b, right, left):
-        if net.kind[v] == LOCKED:
+        if net.state[v, KIND] == LOCKED:
             return False
     return (
-        net.degree[a] > lowest_degree(net, a)
-        and net.degree[b] > lowest_degree(net, b)
-        and net.degree[right] < most
-        and net.degree[left] < most
+        net.state[a, DEGREE] > lowest_degree(net, a)
+        and net.state[b, DEGREE] > lowest_degree(net, b)
+        and net.state[right, DEGREE] < most
+        and net.state[left, DEGREE] < most
         and place_of(net, right, left) < 0
     )
 
@@ -186,25 +217,27 @@ def flip(net: Net, a: int, b: int) -> None:
 @kernel
 def may_collapse(net: Net, a: int, b: int) -> bool:
     """Whether node b can be drawn into node a without a change of topology (link condition)."""
-    if net.kind[b] >= REST or net.kind[a] == LOCKED or net.kind[b] > net.kind[a]:
+    if net.state[b, KIND] >= REST or net.state[a, KIND] == LOCKED or net.state[b, KIND] > net.state[a, KIND]:
         return False
     right, left = wings(net, a, b)
     common = 0
-    for i in range(net.degree[b]):
+    for i in range(net.state[b, DEGREE]):
         u = net.ring[b, i]
-        if net.kind[u] == LOCKED:
+        if net.state[u, KIND] == LOCKED:
             return False
         if place_of(net, a, u) >= 0:
             common += 1
     on_rim = right < 0 or left < 0
     if common != (1 if on_rim else 2):
         return False
-    if net.is_open[b] == 1 and (not on_rim or net.degree[b] < 3 or net.curve[a] != net.curve[b]):
+    if net.state[b, OPEN] == 1 and (
+        not on_rim or net.state[b, DEGREE] < 3 or net.state[a, CURVE] != net.state[b, CURVE]
+    ):
         return False
     for v in (right, left):
-        if v >= 0 and net.degree[v] <= lowest_degree(net, v):
+        if v >= 0 and net.state[v, DEGREE] <= lowest_degree(net, v):
             return False
-    after = net.degree[a] + net.degree[b] - (3 if on_rim else 4)
+    after = net.state[a, DEGREE] + net.state[b, DEGREE] - (3 if on_rim else 4)
     return lowest_degree(net, a) <= after < net.ring.shape[1]
 
 
@@ -212,8 +245,8 @@ def may_collapse(net: Net, a: int, b: int) -> bool:
 def collapse(net: Net, a: int, b: int) -> None:
     """Draw node b into node a; b becomes free."""
     right, left = wings(net, a, b)
-    d = net.degree[b]
-    if net.is_open[b] == 1:  # along the rim: the ring of b without a stands in order
+    d = net.state[b, DEGREE]
+    if net.state[b, OPEN] == 1:  # along the rim: the ring of b without a stands in order
         begin = 1 if left < 0 else 0
         others = d - 1
     else:
@@ -229,9 +262,9 @@ def collapse(net: Net, a: int, b: int) -> None:
             net.ring[u, place_of(net, u, b)] = a
             put_in(net, a, i, u)
             i += 1
-    net.degree[b] = 0
-    net.free[net.count[0]] = b
-    net.count[0] += 1
+    net.state[b, DEGREE] = 0
+    net.free[net.free[-2]] = b
+    net.free[-2] += 1
 
 
 @kernel
@@ -240,28 +273,28 @@ def may_split(net: Net, a: int, b: int) -> bool:
     right, left = wings(net, a, b)
     most = net.ring.shape[1] - 1
     for v in (a, b, right, left):
-        if v >= 0 and net.kind[v] == LOCKED:
+        if v >= 0 and net.state[v, KIND] == LOCKED:
             return False
-    if (right >= 0 and net.degree[right] >= most) or (left >= 0 and net.degree[left] >= most):
+    if (right >= 0 and net.state[right, DEGREE] >= most) or (left >= 0 and net.state[left, DEGREE] >= most):
         return False
-    if (right < 0 or left < 0) and (net.curve[a] < 0 or net.curve[a] != net.curve[b]):
+    if (right < 0 or left < 0) and (net.state[a, CURVE] < 0 or net.state[a, CURVE] != net.state[b, CURVE]):
         return False
-    return net.count[0] > 0
+    return net.free[-2] > 0
 
 
 @kernel
 def split(net: Net, a: int, b: int) -> int:
     """Put a free node on the edge a-b; returns it. The caller gives it its place."""
     right, left = wings(net, a, b)
-    net.count[0] -= 1
-    m = net.free[net.count[0]]
-    net.count[1] = max(net.count[1], m + 1)
+    net.free[-2] -= 1
+    m = net.free[net.free[-2]]
+    net.free[-1] = max(net.free[-1], m + 1)
     net.ring[a, place_of(net, a, b)] = m
     net.ring[b, place_of(net, b, a)] = m
-    net.degree[m] = 0
+    net.state[m, DEGREE] = 0
     rim = right < 0 or left < 0
-    net.is_open[m], net.kind[m] = (1, RIM) if rim else (0, INTERIOR)
-    net.curve[m] = net.curve[a] if rim else -1
+    net.state[m, OPEN], net.state[m, KIND] = (1, RIM) if rim else (0, INTERIOR)
+    net.state[m, CURVE] = net.state[a, CURVE] if rim else -1
     if right >= 0:
         put_in(net, right, place_of(net, right, b) + 1, m)
     if left >= 0:
@@ -269,5 +302,5 @@ def split(net: Net, a: int, b: int) -> int:
     around = (a, right, b, left) if left < 0 or right >= 0 else (b, left, a, -1)
     for u in around:
         if u >= 0:
-            put_in(net, m, net.degree[m], u)
+            put_in(net, m, net.state[m, DEGREE], u)
     return m

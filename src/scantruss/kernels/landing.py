@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .grid import INTERIOR, Net
+from .grid import DEGREE, INTERIOR, KIND, Net
 from .surface import Surface, fit_patch, onto_patch, patch_normal
 from .vectors import Vector, along, dot, norm, row, subtract
 
@@ -48,8 +48,8 @@ def land_nodes(
     fixed : (C,) bool, nodes that stay where they are
     deviation : (C,), filled with the distance of each node from the surface [scan unit]
     """
-    for v in range(net.count[1]):
-        if net.degree[v] == 0:
+    for v in range(net.free[-1]):
+        if net.state[v, DEGREE] == 0:
             continue
         for turn in range(3):
             place = row(net.nodes, v)
@@ -62,7 +62,7 @@ def land_nodes(
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)
-            if net.kind[v] != INTERIOR:
+            if net.state[v, KIND] != INTERIOR:
                 normal = patch_normal(patches[v], foot)
                 foot = along(place, dot(subtract(foot, place), normal), normal)
             if fixed[v] or norm(subtract(foot, place)) > 0.6 * broad.scale[0]:

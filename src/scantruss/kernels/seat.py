@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .grid import INTERIOR, RIM, Net
+from .grid import CURVE, DEGREE, INTERIOR, KIND, RIM, Net
 from .rim import Rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
 from .vectors import norm, row, subtract
@@ -31,9 +31,9 @@ def seat_nodes(
 
     `queue` and `seated` (C,) int64 are scratch, zero at the start.
     """
-    used = net.count[1]
+    used = net.free[-1]
     for seed in range(used):
-        if seated[seed] == 1 or net.degree[seed] == 0:
+        if seated[seed] == 1 or net.state[seed, DEGREE] == 0:
             continue
         queue[0], count, at = seed, 1, 0
         seated[seed] = 1
@@ -46,7 +46,7 @@ def seat_nodes(
             if norm(subtract(row(surface.mean, site), place)) > 0.5 * length:
                 site = nearest_site(surface, place[0], place[1], place[2])
             patches[v, 15] = site
-            for i in range(net.degree[v]):
+            for i in range(net.state[v, DEGREE]):
                 u = net.ring[v, i]
                 if seated[u] == 0:
                     seated[u] = 1
@@ -59,8 +59,8 @@ def seat_nodes(
 def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float) -> int:
     """Fit the local surface anew under each node that is not within `near` of the middle of its patch; returns how many."""
     count = 0
-    for v in range(net.count[1]):
-        if net.degree[v] > 0:
+    for v in range(net.free[-1]):
+        if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near:
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
@@ -71,19 +71,19 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float) 
 @kernel
 def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> None:
     """Bring every free node back: onto its patch of the scanned surface, or onto its boundary curve within `reach` along it."""
-    for v in range(net.count[1]):
+    for v in range(net.free[-1]):
         x, y, z = row(net.nodes, v)
-        if net.degree[v] > 0 and net.kind[v] == INTERIOR:
+        if net.state[v, DEGREE] > 0 and net.state[v, KIND] == INTERIOR:
             x, y, z = onto_patch(patches[v], (x, y, z))
-        elif net.degree[v] > 0 and net.kind[v] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], reach, x, y, z)
+        elif net.state[v, DEGREE] > 0 and net.state[v, KIND] == RIM:
+            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach, x, y, z)
         net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 
 @kernel
 def distances_from_scan(net: Net, patches: np.ndarray, distance: np.ndarray) -> None:
     """Distance of each node from its patch of the scanned surface, (C,)."""
-    for v in range(net.count[1]):
-        if net.degree[v] > 0:
+    for v in range(net.free[-1]):
+        if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
             distance[v] = norm(subtract(place, onto_patch(patches[v], place)))

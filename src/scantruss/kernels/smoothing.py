@@ -8,7 +8,7 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT
-from .grid import INTERIOR, RIM, Net
+from .grid import DEGREE, INTERIOR, KIND, OPEN, RIM, Net
 from .vectors import cross, dot, norm, row, subtract
 
 
@@ -19,14 +19,14 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
     Neighbours weigh as much as their members are long, so that long members become shorter: with equal weights a grid keeps
     the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from which they start.
     """
-    used = net.count[1]
+    used = net.free[-1]
     for v in range(used):
         before[v, 0], before[v, 1], before[v, 2] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     for v in range(used):
-        d = net.degree[v]
-        if d == 0 or net.kind[v] > RIM:
+        d = net.state[v, DEGREE]
+        if d == 0 or net.state[v, KIND] > RIM:
             continue
-        step = 1 if net.kind[v] == INTERIOR else d - 1
+        step = 1 if net.state[v, KIND] == INTERIOR else d - 1
         x = y = z = total = 0.0
         for i in range(0, d, step):
             arm = subtract(row(before, net.ring[v, i]), row(before, v))
@@ -44,8 +44,8 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
     """Mean shape quality of the triangles, standard deviation of the member lengths, mean way of the nodes from their start (C, 3)."""
     shape = total = squares = moved = 0.0
     triangles = members = count = 0
-    for v in range(net.count[1]):
-        d = net.degree[v]
+    for v in range(net.free[-1]):
+        d = net.state[v, DEGREE]
         if d == 0:
             continue
         count += 1
@@ -58,7 +58,7 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
                 members += 1
                 total += norm(a)
                 squares += dot(a, a)
-            if v < u and v < w and i < d - net.is_open[v]:
+            if v < u and v < w and i < d - net.state[v, OPEN]:
                 triangles += 1
                 c = subtract(b, a)
                 edges = dot(a, a) + dot(b, b) + dot(c, c)
