@@ -226,7 +226,7 @@ def touch_points(
                 if abs(y) < radius and abs(h) < noise:
                     x = dot(d, out)
                     t = x + math.sqrt(radius * radius - y * y)
-                    if t > best:
+                    if t > best + 1e-9 * radius:  # of two alike the first, whatever rounding says
                         best = t
                         touched[m, 0], touched[m, 1], touched[m, 2] = row(surface.points, p)
 
