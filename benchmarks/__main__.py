@@ -23,7 +23,7 @@ def main() -> None:
     losses += [f"- {loss}" for example in examples for loss in example.losses()]
     parts = [
         "# Numbers\n\nWritten by `uv run --group benchmarks python -m benchmarks`; all figures of one run.",
-        f"Machine: {machine()}; shared with other work, so ratios count, not seconds.\nMedians, both sides in turn.",
+        f"Machine: {machine()};\nshared with other work, so ratios count, not seconds. Medians, both sides in turn.",
         "## What is lost\n\n" + ("\n".join(losses) if losses else "Nothing of what is measured here."),
         "## Speed\n\n" + table(speed),
         "## Table 2: the examples of the paper\n\n" + quality.NOTE + "\n\n" + quality.table(examples),
