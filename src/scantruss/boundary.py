@@ -150,7 +150,7 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
             banned[loop[loop != site]] = True  # the disc is caught in a rough place: let it not feel those sites
         if last - first < 3:
             continue
-        loop = loop.copy()
+        loop = np.roll(loop, -int(loop.argmin()))  # wherever the disc began
         fresh = seen[loop] < 0
         seen[loop] = np.roll(loop, -1)
         if fresh.mean() > 0.5:

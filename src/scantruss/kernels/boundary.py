@@ -157,8 +157,8 @@ def roll_disc(
             angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
             if distance < 2.0 * radius:
                 half = math.acos(distance / (2.0 * radius))
-                begin = int((angle - half - phi) % (2.0 * math.pi) / step)
-                end = int((angle + half - phi) % (2.0 * math.pi) / step) + 1
+                begin = min(int((angle - half - phi) % (2.0 * math.pi) / step), BINS - 1)  # -1e-17 % 2 pi is 2 pi
+                end = min(int((angle + half - phi) % (2.0 * math.pi) / step), BINS - 1) + 1
                 cover[begin] += 1
                 cover[end] -= 1
                 if end <= begin:
