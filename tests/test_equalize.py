@@ -114,6 +114,27 @@ def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
 
 
 @compiled_only
+@pytest.mark.parametrize("seed", range(4))
+def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
+    """Also where much is folded: else neighbours could lower their own energies in turn for ever."""
+    relief = rough_sphere(count=160, seed=seed).relief()
+    net, rng = relief.net, np.random.default_rng(seed)
+    net.nodes[: net.used] += 0.6 * relief.length * rng.uniform(-1, 1, (net.used, 3))
+    scratch = new_scratch(relief)
+    before = search.total_energy(net, scratch, relief.length, WEIGHT)[0]
+    for v in range(net.used):
+        for u in net.ring[v, : net.degree[v]].tolist():
+            if net.degree[v] and may_flip(net, v, u):
+                search.try_move(
+                    net, relief.patches, relief.rim, scratch, search.FLIP, v, u, relief.length, WEIGHT, 0.0
+                )
+                after = search.total_energy(net, scratch, relief.length, WEIGHT)[0]
+                assert after == before or after < before - 9e-5
+                before = after
+    assert scratch.counter[2] > 10
+
+
+@compiled_only
 def test_members_become_equal_and_triangles_regular(rough):
     relief = rough.relief()
     equalize(relief)

@@ -26,7 +26,7 @@ from .grid import (
     wings,
 )
 from .rim import Rim, at_arc
-from .vectors import cross, dot, norm, row, subtract
+from .vectors import Vector, cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
 MARK, TRIED = 0, 1  # columns of `Scratch.note`
@@ -102,10 +102,22 @@ def put_back(net: Net, scratch: Scratch) -> None:
 
 
 @kernel
+def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
+    """Whether triangle (v, a, b) of this normal is folded over a-b, a member with no end in the neighbourhood that v is of."""
+    beyond = wings(net, a, b)[0]
+    if beyond < 0 or (beyond < v and scratch.note[beyond, MARK] == scratch.counter[0]):
+        return False  # the rim, or counted from the other side
+    p = row(net.nodes, a)
+    other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
+    return dot(normal, other) < 0.0
+
+
+@kernel
 def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> float:
     """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
 
-    A member is folded where its two triangles meet at less than 90 degrees.
+    A member is folded where its two triangles meet at less than 90 degrees; those with only a triangle in the neighbourhood count
+    too, or trials beside each other could lower the energy of both in turn for ever.
     """
     nodes, note, stamp = net.nodes, scratch.note, scratch.counter[0]
     energy = 0.0
@@ -114,24 +126,24 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
         d = net.state[v, DEGREE]
         if d == 0:
             continue
-        inside = net.state[v, OPEN] == 0
-        i = d - 2 if inside else d - 1
-        w = net.ring[v, i]
+        closed = net.state[v, OPEN] == 0
+        w = net.ring[v, d - 2 if closed else d - 1]
         cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
         cc = cx * cx + cy * cy + cz * cz
-        counted = note[w, MARK] == stamp and w < v
+        inside = note[w, MARK] == stamp
         ux = uy = uz = 0.0
-        for at in range(-1 if inside else 0, d):
-            bx, by, bz, bb, skipped = cx, cy, cz, cc, counted
+        for at in range(-1 if closed else 0, d):
+            bx, by, bz, bb, before, was_inside = cx, cy, cz, cc, w, inside
             tx, ty, tz = ux, uy, uz  # the triangle before
             w = net.ring[v, at if at >= 0 else d - 1]
-            counted = note[w, MARK] == stamp and w < v
+            inside = note[w, MARK] == stamp
+            skipped, counted = was_inside and before < v, inside and w < v
             cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
             cc = cx * cx + cy * cy + cz * cz
             if at >= 0 and not counted:
                 stretch = math.sqrt(cc) / length - 1.0
                 energy += weight * stretch * stretch
-            if at == 0 and not inside:
+            if at == 0 and not closed:
                 continue
             ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
             if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
@@ -143,6 +155,8 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
             energy += 1.0
             if squares > 0.0:
                 energy -= 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
+            if not inside and not was_inside and folds_outwards(net, scratch, v, before, w, (ux, uy, uz)):
+                energy += 1.0
     return energy
 
 
@@ -346,7 +360,7 @@ def search(
     count = max(len(net.arc) - free, 1)
     for v in range(net.free[-1]):
         i = 0
-        while i < 4 * net.state[v, DEGREE]:
+        while i < 4 * net.state[v, DEGREE] and scratch.counter[2] - kept < count:
             u, way = net.ring[v, i // 4], i % 4  # flip, draw u into v, draw v into u, split
             if i == 0 and scratch.note[v, TRIED] == 1:
                 break
