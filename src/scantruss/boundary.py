@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .corners import STEP, find_corners
 from .kernels import boundary as kernels
 from .kernels.rim import Rim
 from .kernels.surface import Surface
@@ -16,13 +17,10 @@ from .settings import Settings
 
 Progress = Callable[[str, float], None]
 
-STEP = 0.05  # distance of the points of a boundary curve, in member lengths
 SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member lengths
-ARM = (0.1, 0.8)  # part of the curve at each side of a place that tells its direction there, in member lengths
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
-NEAR_CORNER = 0.2  # what lies nearer to a corner, in member lengths, is rounded off and does not tell its place
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
 
@@ -228,78 +226,6 @@ def smooth_loop(curve: np.ndarray, piece: int, settings: Settings) -> Loop | Non
     if length < settings.smallest_hole * settings.length:
         return None
     return Loop(smoothed, corner_at, False, length, piece)
-
-
-def _arm(curve: np.ndarray, sign: int, degree: int) -> np.ndarray:
-    """Coefficients (degree + 1, M, 3) of 1, s, s^2 fitted to the arm before (-1) or after (+1) each place; s in steps."""
-    offsets = sign * np.arange(round(ARM[0] / STEP), round(ARM[1] / STEP) + 1)
-    inverse = np.linalg.pinv(np.vander(offsets.astype(float), degree + 1, increasing=True))
-    arms = np.stack([np.roll(curve, -o, axis=0) for o in offsets], axis=0)
-    return np.einsum("ko,omc->kmc", inverse, arms)
-
-
-def _turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Angle (M,) between the directions of two arms at their place [degree]."""
-    cosine = (before[1] * after[1]).sum(axis=1)
-    cosine /= np.maximum(np.linalg.norm(before[1], axis=1) * np.linalg.norm(after[1], axis=1), 1e-300)
-    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-
-
-def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a closed curve has corners (C,) and their exact places (C, 3).
-
-    The direction before and after each place comes from curves fitted to its two arms; a corner is where they differ most, by more
-    than `corner_angle`. Quadratics tell a corner from a bend, lines are not misled by a ragged rim: both must turn. The place of
-    the corner is where the two arms meet.
-    """
-    if len(curve) < 2 * round(ARM[1] / STEP) + 2:
-        return np.zeros(0, np.int64), np.zeros((0, 3))
-    before, after = _arm(curve, -1, 2), _arm(curve, 1, 2)
-    bent, straight = _turn(before, after), _turn(_arm(curve, -1, 1), _arm(curve, 1, 1))
-    turn = np.minimum(1.25 * bent, straight)
-    half = round(0.5 / STEP)
-    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
-    at: list[int] = []
-    places: list[np.ndarray] = []
-    for i in np.flatnonzero((turn >= highest) & (turn > settings.corner_angle)).tolist():
-        place, centre = curve[i], i
-        for _ in range(3):
-            place = _meeting(_best_arm(curve, centre, -1), _best_arm(curve, centre, 1))
-            window = np.arange(i - half, i + half + 1) % len(curve)
-            away = ((curve[window] - place) ** 2).sum(axis=1)
-            centre = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
-        if np.linalg.norm(place - curve[i]) < 0.5 * settings.length and (not at or i - at[-1] > half):
-            at.append(i)
-            places.append(place)
-    if len(at) > 1 and at[0] + len(curve) - at[-1] <= half:
-        at, places = at[:-1], places[:-1]
-    return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
-
-
-def _best_arm(curve: np.ndarray, at: int, sign: int) -> list[np.ndarray]:
-    """Coefficients of one arm as in `_arm`: a line, unless a quadratic lies clearly nearer; it carries on with less noise."""
-    offsets = sign * np.arange(round(NEAR_CORNER / STEP), round(ARM[1] / STEP) + 1)
-    places = curve[(at + offsets) % len(curve)]
-    fits = []
-    for degree in (1, 2):
-        terms = np.vander(offsets.astype(float), degree + 1, increasing=True)
-        found = np.linalg.lstsq(terms, places, rcond=None)[0]
-        fits.append((float(((terms @ found - places) ** 2).sum()), found))
-    (error, line), (least, quadratic) = fits
-    if error < 2.0 * least + 1e-6 * ((places[-1] - places[0]) ** 2).sum():
-        return [line[0], line[1], np.zeros(3)]
-    return list(quadratic)
-
-
-def _meeting(before: list[np.ndarray], after: list[np.ndarray]) -> np.ndarray:
-    """Place where two quadratic curves come nearest to each other, near their parameter 0 (Gauss-Newton)."""
-    s = t = 0.0
-    for _ in range(6):
-        p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
-        slopes = np.stack([before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])], axis=1)
-        change = np.linalg.lstsq(slopes, q - p, rcond=None)[0]
-        s, t = np.clip([s + change[0], t + change[1]], -0.6 / STEP, 0.6 / STEP)
-    return 0.5 * (before[0] + s * before[1] + s * s * before[2] + after[0] + t * after[1] + t * t * after[2])
 
 
 def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,130 @@
+"""Corners of a boundary curve: where they are, found from the curve at both sides (Sec. 3.6)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .settings import Settings
+
+STEP = 0.05  # distance of the points of a boundary curve, in member lengths
+ROUND = (
+    0.15,
+    0.4,
+)  # what lies nearer to a corner is rounded off by the scan and the disc, in member lengths; a sharp one by more
+REACH = 1.4  # part of the curve at each side that tells the place of a corner, in member lengths
+SHORTEST = 0.6  # the same where another corner is near
+SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
+APART = 0.5  # corners nearer to each other are one, in member lengths
+STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
+SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
+SHARP = 70.0  # or by this angle [degree]
+
+
+def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a closed curve has corners and their exact places.
+
+    A corner may be where lines fitted to the curve before and after a place differ most in direction. It is one if quadratics do so
+    too: they tell a corner from a bend, lines are not misled by a ragged rim. On a loop that turns everywhere, as a ragged one
+    does, a corner must turn more than the rest. Its place is where the two sides meet.
+
+    Parameters
+    ----------
+    curve : (M, 3) closed curve of steps `STEP * length`
+    settings : Settings
+        `corner_angle`, `length`.
+
+    Returns
+    -------
+    at : (C,) int64 points of the curve next to the corners
+    places : (C, 3) the corners
+    """
+    least, most = round(SHORTEST / STEP), round(REACH / STEP)
+    none = np.zeros(0, np.int64), np.zeros((0, 3))
+    if len(curve) < 2 * round(SIGHT[1] / STEP) + 2:
+        return none
+    turn = _turns(curve)
+    half = round(APART / STEP)
+    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
+    usual = min(SHARPER * float(np.median(turn)), SHARP)
+    peaks = np.flatnonzero((turn >= highest) & (turn > max(settings.corner_angle, usual)))
+    peaks = peaks[np.diff(peaks, append=peaks[:1] + len(curve)) > half]
+    at, places = [], []
+    for k, i in enumerate(peaks.tolist()):
+        reaches = []
+        for to in (i - int(peaks[k - 1]), int(peaks[(k + 1) % len(peaks)]) - i):
+            room = to % len(curve) if len(peaks) > 1 else len(curve)
+            reaches.append(min(max(room - round(ROUND[0] / STEP), least), most, len(curve) // 2))
+        for rounded in ROUND if turn[i] > SHARP else ROUND[:1]:
+            place, angle = _corner(curve, i, reaches, round(rounded / STEP))
+            if angle > max(settings.corner_angle, usual) and np.linalg.norm(place - curve[i]) < APART * settings.length:
+                at.append(i)
+                places.append(place)
+                break
+    return (np.array(at, np.int64), np.array(places)) if at else none
+
+
+def _turns(curve: np.ndarray) -> np.ndarray:
+    """Angle (M,) between lines fitted to the curve before and after each place [degree]."""
+    offsets = np.arange(round(SIGHT[0] / STEP), round(SIGHT[1] / STEP) + 1)
+    slope = (offsets - offsets.mean()) / ((offsets - offsets.mean()) ** 2).sum()
+    after = sum(s * np.roll(curve, -o, axis=0) for s, o in zip(slope, offsets.tolist(), strict=True))
+    before = -sum(s * np.roll(curve, o, axis=0) for s, o in zip(slope, offsets.tolist(), strict=True))
+    cosine = (before * after).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-300)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _corner(curve: np.ndarray, at: int, reaches: list[int], rounded: int) -> tuple[np.ndarray, float]:
+    """Place where the two sides meet near a point of the curve, and the angle between them there [degree].
+
+    The place comes from lines where a side is straight, the angle always from quadratics.
+    """
+    half = round(APART / STEP)
+    centre = at
+    for _ in range(3):
+        sides = [
+            _side(curve, centre, sign * np.arange(rounded, reach + 1))
+            for sign, reach in zip((-1, 1), reaches, strict=True)
+        ]
+        place = _meeting(sides[0][0], sides[1][0])
+        window = np.arange(at - half, at + half + 1) % len(curve)
+        away = ((curve[window] - place) ** 2).sum(axis=1)
+        centre = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
+    cosines = [_cosine(sides[0][k][1], sides[1][k][1]) for k in (0, 1)]
+    straight, bent = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).tolist()
+    return place, min(straight, 1.3 * bent)
+
+
+def _cosine(a: np.ndarray, b: np.ndarray) -> float:
+    """Cosine of the angle between two vectors."""
+    return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+
+
+def _side(curve: np.ndarray, at: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The curve at some steps before or after a place: the better of line and quadratic, and the quadratic.
+
+    Returns
+    -------
+    better, quadratic : (3, 3) coefficients of 1, s, s^2 [steps]
+    """
+    places = curve[(at + offsets) % len(curve)]
+    terms = np.vander(offsets.astype(float), 3, increasing=True)
+    quadratic = np.linalg.lstsq(terms, places, rcond=None)[0]
+    line = np.zeros((3, 3))
+    line[:2] = np.linalg.lstsq(terms[:, :2], places, rcond=None)[0]
+    error, least = (float(((terms @ found - places) ** 2).sum()) for found in (line, quadratic))
+    straight = error < STRAIGHT * least + 1e-6 * float(((places[-1] - places[0]) ** 2).sum())
+    return line if straight else quadratic, quadratic
+
+
+def _meeting(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Place where two quadratic curves come nearest to each other, near their parameter 0 (Gauss-Newton)."""
+    s = t = 0.0
+    for _ in range(6):
+        p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
+        slopes = np.stack([before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])], axis=1)
+        change = np.linalg.lstsq(slopes, q - p, rcond=None)[0]
+        s, t = np.clip([s + change[0], t + change[1]], -0.6 / STEP, 0.6 / STEP)
+    p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
+    middle: np.ndarray = 0.5 * (p + q)
+    return middle
