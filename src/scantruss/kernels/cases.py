@@ -179,7 +179,7 @@ def merge_neighbors(
     for i in range(near):
         if found[i] == lose:
             found[i] = keep
-    if not clear_of_front(front, s, keep, place, found, near, 0.0):
+    if not clear_of_front(front, s, keep, place, found, near, 0.0, numbers[LENGTH]):
         return False
     _merge(front, keep, lose, place)
     x, y = front.previous[before], front.next[after]

@@ -18,9 +18,9 @@ from .triangles import (
     angle_from,
     distance_to_segment,
     inside_triangle,
+    lines_cross,
     on_unmeshed_side,
     onto_tangent_plane,
-    segments_cross,
 )
 from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
@@ -28,6 +28,7 @@ GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
 LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(9)  # places in `numbers`
+SHEET = 0.45  # what is farther from a triangle than this is another sheet, in lengths
 NEAR = 400  # most front nodes looked at in one step
 
 
@@ -319,13 +320,15 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
             passage = passage_of(front, s, p)
             if passage < 0:
                 return False, -1
-    if not clear_of_front(front, s, p, pp, found, near, 0.25 * strict * length):
+    if not clear_of_front(front, s, p, pp, found, near, 0.25 * strict * length, length):
         return False, -1
     return True, passage
 
 
 @kernel
-def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, room: float) -> bool:
+def clear_of_front(
+    front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, room: float, length: float
+) -> bool:
     """Whether the triangle of segment s and place pp (node p, or -1) crosses no front segment, holds no front node, and keeps room."""
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
@@ -336,9 +339,10 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
     for i in range(near + 2):
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
-        q2 = onto_tangent_plane(pq, pa, u, v)
         if i < near and q != p and q != a and q != b:
-            if inside_triangle(q2, a2, b2, p2):
+            if abs(dot(subtract(pq, pa), normal)) < SHEET * length and inside_triangle(
+                onto_tangent_plane(pq, pa, u, v), a2, b2, p2
+            ):
                 return False
             if (
                 room > 0.0
@@ -352,10 +356,10 @@ def clear_of_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
         while t >= 0:
             e = front.head[t]
             if t != s:
-                e2 = onto_tangent_plane(row(front.nodes, e), pa, u, v)
-                if q != a and e != a and q != p and e != p and segments_cross(a2, p2, q2, e2):
+                pe = row(front.nodes, e)
+                if q != a and e != a and q != p and e != p and lines_cross(pa, pp, pq, pe, SHEET * length):
                     return False
-                if q != b and e != b and q != p and e != p and segments_cross(b2, p2, q2, e2):
+                if q != b and e != b and q != p and e != p and lines_cross(pb, pp, pq, pe, SHEET * length):
                     return False
             t = front.out_next[t]
     return True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .compile import kernel
-from .vectors import Vector, across, cross, dot, norm, subtract
+from .vectors import Vector, across, cross, dot, norm, subtract, unit
 
 
 @kernel
@@ -64,6 +64,27 @@ def segments_cross(
 ) -> bool:
     """Eqs. 8 and 9: whether the segments ab and cd cross in the plane (touching does not count)."""
     return _side(c, a, b) * _side(d, a, b) < 0.0 and _side(a, c, d) * _side(b, c, d) < 0.0
+
+
+@kernel
+def lines_cross(a: Vector, b: Vector, c: Vector, d: Vector, near: float) -> bool:
+    """Eqs. 8 and 9 in space: whether ab and cd cross in the tangent plane that lies between them by least squares.
+
+    That plane is parallel to both and half way. Lines that pass each other farther than `near` lie on different sheets.
+    """
+    ab, cd = subtract(b, a), subtract(d, c)
+    normal = cross(ab, cd)
+    size = norm(normal)
+    if size <= 1e-9 * norm(ab) * norm(cd) or abs(dot(subtract(c, a), normal)) > near * size:
+        return False
+    u = unit(ab)
+    v = unit(cross(normal, u))
+    return segments_cross(
+        onto_tangent_plane(a, a, u, v),
+        onto_tangent_plane(b, a, u, v),
+        onto_tangent_plane(c, a, u, v),
+        onto_tangent_plane(d, a, u, v),
+    )
 
 
 @kernel
