@@ -125,9 +125,7 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
-                search.try_move(
-                    net, relief.patches, relief.rim, scratch, search.FLIP, v, u, relief.length, WEIGHT, 0.0
-                )
+                search.try_move(net, relief.patches, relief.rim, scratch, search.FLIP, v, u, relief.length, WEIGHT, 0.0)
                 after = search.total_energy(net, scratch, relief.length, WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after

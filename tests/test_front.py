@@ -61,6 +61,15 @@ def test_the_grid_is_manifold_and_its_topology_that_of_the_cloud(name, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("tube", [0.55, 0.7])
+def test_a_thin_tube_stays_open(tube, method):
+    """Three or four members round: what faces a triangle from across the tube does not stop it."""
+    grid, _ = advanced(tire(5.0, tube, 0.15), method=method)
+    assert naive.faults(grid.triangles) == []
+    assert naive.topology(grid.triangles) == (1, 0, 0)
+
+
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
 def test_the_whole_cloud_is_covered_once(name, method):
     """No point is farther from the nearest node than 1.2 members, and the areas of the triangles add up to that of the cloud."""

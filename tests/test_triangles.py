@@ -101,6 +101,17 @@ def test_touching_is_no_crossing_and_the_order_does_not_matter(a, b, c, d):
     assert not t.segments_cross(a, b, middle, d)
 
 
+@given(flat, flat, flat, flat, st.floats(-2, 2), st.integers(0, 50))
+def test_crossing_in_space_is_that_in_the_plane_between_the_lines_where_they_pass_near(a, b, c, d, gap, seed):
+    sides = [np.cross([*np.subtract(q, p), 0], [*np.subtract(r, p), 0])[2] for p, q, r in
+             ((a, b, c), (a, b, d), (c, d, a), (c, d, b))]  # fmt: skip
+    assume(min(abs(s) for s in sides) > 1e-3 and abs(abs(gap) - 1.0) > 1e-6)
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    places = [tuple(turn @ [*place, height]) for place, height in ((a, 0.0), (b, 0.0), (c, gap), (d, gap))]
+    assume(np.linalg.norm(np.cross(np.subtract(*places[:2]), np.subtract(*places[2:]))) > 1e-3)
+    assert t.lines_cross(*places, 1.0) == (naive.cross_inside(a, b, c, d) and abs(gap) < 1.0)
+
+
 @given(whole, whole, whole, whole)
 def test_inside_a_triangle_counts_its_sides(p, a, b, c):
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

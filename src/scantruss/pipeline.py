@@ -14,6 +14,7 @@ from .errors import FrontError, InputError
 from .settings import Settings
 
 if TYPE_CHECKING:
+    from .boundary import Boundary
     from .grid.grid import Grid
     from .scan.cloud import PointCloud
     from .scan.sites import Sites
@@ -25,6 +26,7 @@ GAPS = 2.2  #: ... and where points lie at random, this many distances to the si
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
 LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+ATTEMPTS = (1.0, 0.97, 1.04)  #: desired lengths of the front, one after the other until a grid passes all checks
 COVER = 1.2  #: members from the nearest node at which a part of the scan counts as left out
 LEFT_OUT = 0.2  #: share of the scan that a grid may leave out
 SAMPLE = 200  #: points at which the gap is measured
@@ -88,11 +90,21 @@ def grid_from_cloud(
     checked = perf_counter()
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
-    front = advance_front(cloud, boundary, settings, progress=progress)
-    advanced = perf_counter()
-    grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
-    check_grid(grid)
-    check_cover(grid, boundary.sites, settings.length)
+    fault: FrontError | None = None
+    for share in ATTEMPTS:
+        try:
+            front = advance_front(cloud, boundary, settings.replace(length=share * settings.length), progress=progress)
+            advanced = perf_counter()
+            grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
+            check_grid(grid)
+            check_boundary(grid, boundary)
+            check_cover(grid, boundary.sites, settings.length)
+            break
+        except FrontError as error:
+            fault = fault or error
+    else:
+        assert fault is not None
+        raise fault
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -120,6 +132,27 @@ def check_grid(grid: Grid) -> None:
         raise FrontError(
             f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
         )
+
+
+def check_boundary(grid: Grid, boundary: Boundary) -> None:
+    """Refuse a grid that does not bound as the scan does.
+
+    Raises
+    ------
+    FrontError
+        The grid has other boundary loops or components than were found in the scan.
+    """
+    found = grid.topology
+    for what, of_grid, of_scan in (
+        ("components", found.components, len(boundary.sites.pieces)),
+        ("boundary loops", found.boundary_loops, len(boundary.loops)),
+    ):
+        if of_grid != of_scan:
+            raise FrontError(
+                f"the grid came out with {of_grid} {what} where the scan has {of_scan}, so it is not written;"
+                " try a smaller length, or clean the scan",
+                grid,
+            )
 
 
 def check_cover(grid: Grid, sites: Sites, length: float) -> None:
