@@ -48,7 +48,7 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     usual = min(SHARPER * float(np.median(turn)), SHARP)
     peaks = np.flatnonzero((turn >= highest) & (turn > max(settings.corner_angle, usual)))
     peaks = peaks[np.diff(peaks, append=peaks[:1] + len(curve)) > half]
-    at, places = [], []
+    found: list[tuple[float, int, np.ndarray]] = []
     for k, i in enumerate(peaks.tolist()):
         reaches = []
         for to in (i - int(peaks[k - 1]), int(peaks[(k + 1) % len(peaks)]) - i):
@@ -57,10 +57,14 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
         for rounded in ROUND if turn[i] > SHARP else ROUND[:1]:
             place, angle = _corner(curve, i, reaches, round(rounded / STEP))
             if angle > max(settings.corner_angle, usual) and np.linalg.norm(place - curve[i]) < APART * settings.length:
-                at.append(i)
-                places.append(place)
+                found.append((angle, i, place))
                 break
-    return (np.array(at, np.int64), np.array(places)) if at else none
+    kept: list[tuple[int, np.ndarray]] = []
+    for _, i, place in sorted(found, key=lambda corner: (-corner[0], corner[1])):
+        if all(np.linalg.norm(place - other) > APART * settings.length for _, other in kept):
+            kept.append((i, place))
+    kept.sort(key=lambda corner: corner[0])
+    return (np.array([i for i, _ in kept], np.int64), np.array([place for _, place in kept])) if kept else none
 
 
 def _turns(curve: np.ndarray) -> np.ndarray:
