@@ -28,6 +28,8 @@ USUAL = 25.0  #: members along the longest side of a scan, where nobody said a l
 LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
 ATTEMPTS = (1.0, 0.97, 1.04)  #: desired lengths of the front, one after the other until a grid passes all checks
 COVER = 1.2  #: members from the nearest node at which a part of the scan counts as left out
+UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
+ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
 LEFT_OUT = 0.2  #: share of the scan that a grid may leave out
 SAMPLE = 200  #: points at which the gap is measured
 
@@ -98,7 +100,7 @@ def grid_from_cloud(
             grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
             check_grid(grid)
             check_boundary(grid, boundary)
-            check_cover(grid, boundary.sites, settings.length)
+            check_cover(grid, boundary.sites, settings)
             break
         except FrontError as error:
             fault = fault or error
@@ -122,7 +124,7 @@ def check_grid(grid: Grid) -> None:
     Raises
     ------
     FrontError
-        No triangles, or the grid is not manifold, or not orientable.
+        No triangles, or the grid is not manifold, not orientable, or its members differ wildly.
     """
     if len(grid.triangles) == 0:
         raise FrontError("no triangle could be made; use another length, or check the scan", grid)
@@ -132,52 +134,73 @@ def check_grid(grid: Grid) -> None:
         raise FrontError(
             f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
         )
+    uneven = grid.quality.length_cv
+    if uneven > UNEVEN:
+        raise FrontError(
+            f"the lengths of the members came out {uneven:.0%} apart, so the grid is not written;"
+            " try a smaller length, or clean the scan",
+            grid,
+        )
 
 
 def check_boundary(grid: Grid, boundary: Boundary) -> None:
-    """Refuse a grid that does not bound as the scan does.
+    """Refuse a grid that has come apart or has openings that the scan has not.
 
     Raises
     ------
     FrontError
-        The grid has other boundary loops or components than were found in the scan.
+        The grid has other components than the scan, or more boundary loops.
     """
-    found = grid.topology
-    for what, of_grid, of_scan in (
-        ("components", found.components, len(boundary.sites.pieces)),
-        ("boundary loops", found.boundary_loops, len(boundary.loops)),
-    ):
-        if of_grid != of_scan:
-            raise FrontError(
-                f"the grid came out with {of_grid} {what} where the scan has {of_scan}, so it is not written;"
-                " try a smaller length, or clean the scan",
-                grid,
-            )
-
-
-def check_cover(grid: Grid, sites: Sites, length: float) -> None:
-    """Refuse a grid that has left out a good part of the scan.
-
-    Raises
-    ------
-    FrontError
-        More than a fifth of the scan is farther than 1.2 members from every node; names a place there.
-    """
-    from .kernels.boxes import new_boxes
-    from .kernels.cover import find_uncovered
-
-    places = np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
-    uncovered = np.empty(len(places), np.bool_)
-    boxes = new_boxes(grid.nodes.min(axis=0), grid.nodes.max(axis=0), length, len(grid.nodes), len(grid.nodes))
-    count = find_uncovered(grid.nodes, boxes, places, COVER * length, uncovered)
-    if count > LEFT_OUT * len(places):
-        x, y, z = (places[np.argmax(uncovered)] + grid.origin).tolist()
+    found, pieces, loops = grid.topology, len(boundary.sites.pieces), len(boundary.loops)
+    fault = ""
+    if found.components != pieces:
+        fault = f"in {found.components} pieces where the scan has {pieces}"
+    elif found.boundary_loops > loops:
+        fault = f"with {found.boundary_loops} boundary loops where the scan has {loops}"
+    if fault:
         raise FrontError(
-            f"the grid leaves out {count / len(places):.0%} of the scan, for example near ({x:.6g}, {y:.6g}, {z:.6g}),"
-            " so it is not written; try another length, or clean the scan of what is not surface",
-            grid,
-            (x, y, z),
+            f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
         )
+
+
+def check_cover(grid: Grid, sites: Sites, settings: Settings) -> None:
+    """Refuse a grid that has left out a good part of the scan, or covers what the scan does not.
+
+    Raises
+    ------
+    FrontError
+        More than a fifth of the scan is farther than 1.2 members from every node; or the middle of a triangle is farther from the
+        scan than the holes that are closed are wide. Names a place there.
+    """
+    places = np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
+    far = np.empty(len(places), np.bool_)
+    count = _find_far(places, grid.nodes, COVER * settings.length, far)
+    if count > LEFT_OUT * len(places):
+        raise _stray(grid, places[np.argmax(far)], f"leaves out {count / len(places):.0%} of the scan, for example")
+    middles = np.ascontiguousarray(grid.nodes[grid.triangles].mean(axis=1))
+    far = np.empty(len(middles), np.bool_)
+    if _find_far(middles, places, (ASTRAY + settings.smallest_hole / (2 * math.pi)) * settings.length, far):
+        raise _stray(grid, middles[np.argmax(far)], "leaves the scan")
+
+
+def _find_far(places: np.ndarray, others: np.ndarray, reach: float, far: np.ndarray) -> int:
+    """Mark the places that have none of the others within reach; returns their number."""
+    from .kernels.boxes import new_boxes
+    from .kernels.cover import mark_far
+
+    boxes = new_boxes(others.min(axis=0), others.max(axis=0), reach, len(others), len(others))
+    return mark_far(places, others, boxes, reach, far)
+
+
+def _stray(grid: Grid, place: np.ndarray, what: str) -> FrontError:
+    """The refusal of a grid that does not lie where the scan does."""
+    x, y, z = (place + grid.origin).tolist()
+    return FrontError(
+        f"the grid {what} near ({x:.6g}, {y:.6g}, {z:.6g}), so it is not written;"
+        " try another length, or clean the scan of what is not surface",
+        grid,
+        (x, y, z),
+    )
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:

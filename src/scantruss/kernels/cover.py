@@ -1,4 +1,4 @@
-"""How much of a scan a grid covers."""
+"""How much of a scan a grid covers, and of a grid the scan."""
 
 from __future__ import annotations
 
@@ -9,23 +9,16 @@ from .compile import kernel
 
 
 @kernel
-def find_uncovered(
-    nodes: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, uncovered: np.ndarray
-) -> int:
-    """Mark the places that have no node within `reach`; returns their number.
+def mark_far(places: np.ndarray, others: np.ndarray, boxes: SearchBoxes, reach: float, far: np.ndarray) -> int:
+    """Mark the places (P, 3) that have none of the others (Q, 3) within `reach`; returns their number.
 
-    Parameters
-    ----------
-    nodes : (V, 3)
-    boxes : SearchBoxes with room for V items, empty
-    places : (S, 3)
-    uncovered : (S,) bool, filled
+    boxes : empty, with room for Q items. far : (P,) bool, filled.
     """
-    for n in range(len(nodes)):
-        put(boxes, n, nodes[n, 0], nodes[n, 1], nodes[n, 2])
+    for n in range(len(others)):
+        put(boxes, n, others[n, 0], others[n, 1], others[n, 2])
     found = np.empty(1, np.int64)
     count = 0
     for s in range(len(places)):
-        uncovered[s] = search(boxes, nodes, places[s, 0], places[s, 1], places[s, 2], reach, found) == 0
-        count += uncovered[s]
+        far[s] = search(boxes, others, places[s, 0], places[s, 1], places[s, 2], reach, found) == 0
+        count += far[s]
     return count
