@@ -11,6 +11,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("settings",),
     ("scan",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
+    ("corners",),
     ("boundary",),
     ("front",),
     ("grid",),

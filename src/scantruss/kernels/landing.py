@@ -10,19 +10,26 @@ from .surface import Surface, fit_patch, onto_patch, patch_normal
 from .vectors import Vector, along, dot, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
+LINED = 0.75  # spread of points across their main direction, 1 in a disc and 0 on a line, below which they lie on few lines
 
 
 @kernel
 def _fit_widest(fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
-    """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off."""
+    """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off.
+
+    Points along one scan line tell nothing of the surface beside it: such a patch is too narrow, however near they lie.
+    """
     taken = fit_patch(fine, patch, site, place)
     least = patch[17]
     kept = patch.copy()
     for turn in range(2):
         more = fit_patch(middle if turn == 0 else broad, patch, site, place)
-        if more < 4 or patch[17] > LIKE * least:
+        lined = kept[18] < LINED
+        if more < 4 or (patch[17] > LIKE * least and not lined):
             patch[:] = kept
             break
+        if lined:
+            least = patch[17]
         taken = more
         kept[:] = patch
     return taken

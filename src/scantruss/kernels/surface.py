@@ -172,6 +172,7 @@ def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray)
         total += w
         cx, cy, cz = cx + w * buffer[i, 0], cy + w * buffer[i, 1], cz + w * buffer[i, 2]
     normal = facing
+    patch[18] = 0.0
     if taken >= 4 and total > 0.0:
         cx, cy, cz = cx / total, cy / total, cz / total
         xx = xy = xz = yy = yz = zz = 0.0
@@ -181,6 +182,10 @@ def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray)
             xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
             yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
         normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+        trace = xx + yy + zz
+        if trace > 0.0:
+            minors = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz
+            patch[18] = 4.0 * minors / (trace * trace)
         side = dot(normal, facing)
         if side < 0.0:
             normal = (-normal[0], -normal[1], -normal[2])
