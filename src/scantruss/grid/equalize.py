@@ -13,6 +13,7 @@ import numpy as np
 
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
+from ..kernels.glide import Journal, glide
 from ..kernels.search import Scratch, search, suit_nodes, total_energy
 from .flips import FOLD, ROUNDS
 from .relief import NEAR, Relief
@@ -52,6 +53,23 @@ def search_once(relief: Relief, scratch: Scratch) -> int:
     return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
 
 
+LINKS = 4  # most flips of a chain
+CHAIN = 0.2  # energy above the old one at which a chain is given up
+GLIDES = 1  # rounds of chains
+
+
+def new_journal(relief: Relief) -> Journal:
+    """Return room for what a chain of flips touches."""
+    capacity, width = relief.net.ring.shape
+    return Journal(
+        mark=np.zeros(capacity, np.int64),
+        around=np.zeros(capacity, np.int64),
+        nodes=np.zeros((capacity, 4)),
+        ring=np.zeros((capacity, width + 1), np.int64),
+        counter=np.zeros(3, np.int64),
+    )
+
+
 def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle, search while it pays, settle: the default way to improve a grid."""
     flip_by_angle(relief.net, FOLD, ROUNDS)
@@ -64,6 +82,16 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
             break
         relief.renew(FAR)
         settle(relief, WEIGHT, 1e-4, 8)
+    journal = new_journal(relief)
+    for _ in range(GLIDES):
+        kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, LINKS, CHAIN)
+        relief.renew(FAR)
+        settle(relief, WEIGHT, 1e-4, 8)
+        search_once(relief, scratch)
+        relief.renew(FAR)
+        settle(relief, WEIGHT, 1e-4, 8)
+        if kept == 0:
+            break
 
 
 def finish(relief: Relief) -> None:

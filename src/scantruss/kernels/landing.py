@@ -10,7 +10,10 @@ from .surface import Surface, fit_patch, onto_patch, patch_normal
 from .vectors import Vector, along, dot, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
-LINED = 0.75  # spread of points across their main direction, 1 in a disc and 0 on a line, below which they lie on few lines
+SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
+LINED = (
+    0.75  # spread of points across their main direction, 1 in a disc and 0 on a line, below which they lie on few lines
+)
 
 
 @kernel
@@ -58,14 +61,9 @@ def land_nodes(
     for v in range(net.free[-1]):
         if net.state[v, DEGREE] == 0:
             continue
-        for turn in range(3):
+        for _ in range(2):
             place = row(net.nodes, v)
-            site = int(patches[v, 15])
-            first = turn == 0
-            patch = patches[v]
-            taken = (
-                fit_patch(broad, patch, site, place) if first else _fit_widest(fine, middle, broad, patch, site, place)
-            )
+            taken = _fit_widest(fine, middle, broad, patches[v], int(patches[v, 15]), place)
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)
@@ -75,5 +73,7 @@ def land_nodes(
             if fixed[v] or norm(subtract(foot, place)) > 0.6 * broad.scale[0]:
                 break
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
+            if norm(subtract(foot, place)) < SETTLED * broad.scale[0]:
+                break
         place = row(net.nodes, v)
         deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))

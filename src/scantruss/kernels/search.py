@@ -32,8 +32,14 @@ FLIP, COLLAPSE, SPLIT = 0, 1, 2
 MARK, TRIED = 0, 1  # columns of `Scratch.note`
 TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
 SWEEPS = 2
-HOPE = 0.06  # energy above the old one after one sweep that the next may still make good
+EARLY = (
+    0.35,
+    1.2,
+    2.0,
+)  # energy above the old one, once the nodes of the quadrangle have settled, that may still turn out well
+HOPE = (0.06, 0.3, 0.5)
 STRAINED = 0.15  # a member that is longer or shorter by this asks for a move
+SHORT, LONG = 1.05, 1.1  # members shorter are not split, longer are not collapsed, in lengths
 STILL = 0.005  # shorter steps are not made in trials, in lengths
 TIDIED = 6  # growth beyond that which flips around may take back
 FLIPS = 4  # most of these flips
@@ -301,11 +307,13 @@ def try_move(
                 return False
             continue
         break
-    for _ in range(SWEEPS):
-        for i in range(scratch.counter[1]):
+    for turn in range(1 + SWEEPS):
+        for i in range(min(4, scratch.counter[1]) if turn == 0 else scratch.counter[1]):
             settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length)
+        if turn == 0 and added >= 0:
+            settle_node(net, patches, rim, added, length, weight, STILL * length)
         after = local_energy(net, scratch, length, weight)
-        if after > before + HOPE:
+        if after > before + (EARLY[move] if turn == 0 else HOPE[move]):
             break
     if after < before - 1e-4:
         for i in range(scratch.counter[1]):
@@ -380,6 +388,9 @@ def search(
                     continue  # both would come to the middle
                 a, b = u, v
             if not is_allowed(net, move, a, b):
+                continue
+            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / length
+            if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
                 continue
             half = 0.5 if move == SPLIT else -0.5
             worth = share + price * (strain - 0.5 * (free - net.free[-2] + half) / count)
