@@ -13,9 +13,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numba
+
+from .linking import compiled
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -80,8 +82,8 @@ def kernel(function: F) -> F:
     kept = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(FOLDER or "")
     try:
-        return numba.njit(cache=FOLDER is not None, nogil=True)(function)
+        return cast(F, compiled(function, cache=FOLDER is not None))
     except RuntimeError:  # numba: "cannot cache function"
-        return numba.njit(nogil=True)(function)
+        return cast(F, compiled(function, cache=False))
     finally:
         numba.config.CACHE_DIR = kept
