@@ -5,7 +5,6 @@ Outputs and settings are checked before anything is read; everything heavy is im
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -47,7 +46,7 @@ def info(values: Namespace) -> None:
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))
         check_length(cloud, settings)
-
+        note_compiling(bars, settings.method, "boundary")
         from .boundary import find_boundary
 
         boundary = find_boundary(cloud, settings, progress=bars)
@@ -92,8 +91,7 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
-        cloud = read_scan(values.scan, settings, bars)
-        result = make_grid(cloud, settings, bars)
+        cloud, result = make_grid(values.scan, settings, bars)
     from .export.formats import write
 
     with SaveTogether() as save:
@@ -129,7 +127,7 @@ def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
 
 
 def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan, and say so where points were left out or kernels must be compiled."""
+    """Read a scan, and say so where points were left out."""
     from .scan.readers import read_points
 
     bars("read", 0.0)
@@ -137,18 +135,27 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     bars("read", 1.0)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
-    from .kernels.compile import is_compiled
-
-    if not is_compiled() and os.environ.get("NUMBA_DISABLE_JIT", "0") == "0":
-        bars.note("compiling kernels, once on this machine")
     return cloud
 
 
-def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
-    """Run the chain."""
-    from .pipeline import grid_from_cloud
+def make_grid(path: str, settings: Settings, bars: Bars) -> tuple[PointCloud, Grid]:
+    """Read a scan and run the chain."""
+    from .ahead import CompileAhead
+    from .pipeline import check_length, grid_from_cloud
 
-    return grid_from_cloud(cloud, settings, progress=bars)
+    with CompileAhead(settings.method, bars) as progress:
+        cloud = read_scan(path, settings, bars)
+        check_length(cloud, settings)
+        note_compiling(bars, settings.method, "boundary", "front", "optimize")
+        return cloud, grid_from_cloud(cloud, settings, progress=progress)
+
+
+def note_compiling(bars: Bars, method: str, *stages: str) -> None:
+    """Say so where the kernels of some stages must be compiled, which takes long."""
+    from .ahead import are_compiled, can_be_stored
+
+    if not are_compiled(method, *stages):
+        bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
@@ -224,8 +231,7 @@ def demo(values: Namespace) -> None:
     if folder.exists() and not folder.is_dir():
         raise FormatError(f"{folder} is a file; name a folder for the demo")
     with Bars() as bars:
-        cloud = read_scan(str(SCAN), demo_settings(), bars)
-        result = make_grid(cloud, demo_settings(), bars)
+        cloud, result = make_grid(str(SCAN), demo_settings(), bars)
         bars("picture, solid", 0.0)
         written = save_demo(folder, result, cloud)
     show_grid(result, len(cloud.points), written)

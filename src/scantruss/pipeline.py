@@ -90,6 +90,8 @@ def grid_from_cloud(
     found = perf_counter()
     front = advance_front(cloud, boundary, settings, progress=progress)
     advanced = perf_counter()
+    if progress:
+        progress("optimize", 0.0)
     grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
     check_grid(grid)
     check_cover(grid, boundary.sites, settings.length)

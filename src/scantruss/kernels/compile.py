@@ -61,9 +61,12 @@ def _folder() -> Path | None:
 FOLDER = _folder()
 
 
-def is_compiled() -> bool:
-    """Whether machine code of these kernels is on disk already (False: the next call compiles)."""
-    return FOLDER is not None and any(FOLDER.rglob("*.nbc"))
+def is_compiled(*kernels: Callable[..., object]) -> bool:
+    """Whether machine code of these kernels is on disk already (False: their next call compiles)."""
+    if numba.config.DISABLE_JIT:
+        return True
+    names = (f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}-*.nbc" for kernel in kernels)
+    return FOLDER is not None and all(any(FOLDER.rglob(name)) for name in names)
 
 
 def kernel(function: F) -> F:

@@ -58,7 +58,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
 
     def compile(self, sig: Any) -> Any:
         """Make the part for a kernel that calls this one with arguments of these types."""
-        arguments, _ = sigutils.normalize_signature(sig)
+        arguments = tuple(numba.types.unliteral(argument) for argument in sigutils.normalize_signature(sig)[0])
         if arguments not in self.overloads:
             flags = compiler.Flags()
             self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
