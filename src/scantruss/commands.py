@@ -91,7 +91,8 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
-        cloud, result = make_grid(values.scan, settings, bars)
+        cloud = read_scan(values.scan, settings, bars)
+        result = make_grid(cloud, settings, bars)
     from .export.formats import write
 
     with SaveTogether() as save:
@@ -138,16 +139,15 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def make_grid(path: str, settings: Settings, bars: Bars) -> tuple[PointCloud, Grid]:
-    """Read a scan and run the chain."""
+def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
+    """Run the chain, and say so where kernels must be compiled."""
     from .ahead import CompileAhead
     from .pipeline import check_length, grid_from_cloud
 
+    check_length(cloud, settings)
+    note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
-        cloud = read_scan(path, settings, bars)
-        check_length(cloud, settings)
-        note_compiling(bars, settings.method, "boundary", "front", "optimize")
-        return cloud, grid_from_cloud(cloud, settings, progress=progress)
+        return grid_from_cloud(cloud, settings, progress=progress)
 
 
 def note_compiling(bars: Bars, method: str, *stages: str) -> None:
@@ -231,7 +231,8 @@ def demo(values: Namespace) -> None:
     if folder.exists() and not folder.is_dir():
         raise FormatError(f"{folder} is a file; name a folder for the demo")
     with Bars() as bars:
-        cloud, result = make_grid(str(SCAN), demo_settings(), bars)
+        cloud = read_scan(str(SCAN), demo_settings(), bars)
+        result = make_grid(cloud, demo_settings(), bars)
         bars("picture, solid", 0.0)
         written = save_demo(folder, result, cloud)
     show_grid(result, len(cloud.points), written)
