@@ -1,5 +1,6 @@
 """On the first run a second process compiles for the optimization; it changes nothing and is never left over."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -69,6 +70,12 @@ def test_it_ends_where_the_run_is_refused_or_interrupted(started):
     with pytest.raises(KeyboardInterrupt), ahead.CompileAhead("default", print):
         raise KeyboardInterrupt
     assert started[0][1].calls == ["kill", "communicate"]
+
+
+def test_garbage_is_collected_again_afterwards(started):
+    with ahead.CompileAhead("default", print):
+        assert not gc.isenabled()
+    assert gc.isenabled()
 
 
 def test_patience_has_an_end(started):

@@ -6,6 +6,7 @@ finds; where the second cannot start, or fails, this one compiles all by itself.
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -33,6 +34,7 @@ class CompileAhead(AbstractContextManager["CompileAhead"]):
         self._method = method
         self._progress = progress
         self._process: subprocess.Popen[bytes] | None = None
+        self._collects = False
 
     def __enter__(self) -> CompileAhead:
         """Start the second process, if it is of use."""
@@ -47,7 +49,9 @@ class CompileAhead(AbstractContextManager["CompileAhead"]):
                 stderr=subprocess.DEVNULL,
             )
         except OSError:
-            self._process = None
+            return self
+        self._collects = gc.isenabled()
+        gc.disable()  # compiling makes much that stays, and looking through it again and again takes a tenth of the time
         return self
 
     def __call__(self, stage: str, share: float) -> None:
@@ -63,6 +67,8 @@ class CompileAhead(AbstractContextManager["CompileAhead"]):
     ) -> None:
         """End the second process."""
         self._end()
+        if self._collects:
+            gc.enable()
 
     def _end(self) -> None:
         if self._process is not None:
@@ -139,6 +145,7 @@ def compile_optimization(settings: Settings) -> None:
 
 def main(method: str) -> None:
     """Compile for a method, but no longer than the process lives that has started this one."""
+    gc.disable()
     threading.Thread(target=_leave_at_end_of_input, daemon=True).start()
     from .settings import Settings
 
