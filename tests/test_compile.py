@@ -1,15 +1,21 @@
 """Machine code is kept under the contents of all kernel files, and nothing fails for want of a folder."""
 
+import importlib
+import inspect
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 from scantruss.kernels import compile as compiling
+from scantruss.kernels import linking
 
 KERNELS = Path(compiling.__file__).parent
 
@@ -116,7 +122,7 @@ def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch):
         return 2.0 * x
 
     assert twice(21.0) == 42.0
-    assert not compiling.is_compiled()
+    assert compiling.is_compiled(twice) == bool(numba.config.DISABLE_JIT)
 
 
 def test_the_decorator_leaves_the_settings_of_numba_alone():
@@ -134,7 +140,7 @@ CODE = """
 import scantruss.kernels.vectors as v
 from scantruss.kernels import compile as c
 assert v.norm((3.0, 4.0, 0.0)) == 5.0
-print(c.FOLDER, c.is_compiled())
+print(c.FOLDER, c.is_compiled(v.norm))
 """
 
 
@@ -165,3 +171,70 @@ def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path):
     file.write_text("")
     folder, _ = run(XDG_CACHE_HOME=str(file), HOME=str(file), TMPDIR=str(file), TEMP=str(file), TMP=str(file))
     assert not Path(folder).is_relative_to(file)
+
+
+@compiling.kernel
+def add(a: float, b: float) -> float:
+    return a + b
+
+
+@compiling.kernel
+def share(values: np.ndarray, i: int, among: float) -> float:
+    return float(values[i]) / among
+
+
+@compiling.kernel
+def add_shares(values: np.ndarray, among: float) -> float:
+    total = 0.0
+    for i in range(len(values)):
+        total = add(total, share(values, i, among))
+    return total
+
+
+@pytest.mark.kernels
+def test_a_kernel_serves_python_and_other_kernels():
+    values = np.array([1.0, 2.0, 6.0])
+    assert add_shares(values, 3.0) == 3.0
+    assert add(1.0, 2.0) == 3.0 and share(values, 2, 3.0) == 2.0
+    with pytest.raises(ZeroDivisionError):  # what goes wrong in a part comes out of the whole
+        add_shares(values, 0.0)
+
+
+@pytest.mark.skipif(not linking.HANDS_OVER or bool(numba.config.DISABLE_JIT), reason="every kernel compiles by itself")
+def test_a_part_of_a_kernel_is_no_machine_code_of_its_own():
+    @compiling.kernel
+    def part(x: float) -> float:
+        return 2.0 * x
+
+    @compiling.kernel
+    def whole(x: float) -> float:
+        return part(x) + 1.0
+
+    assert whole(1.0) == 3.0
+    assert not part.alone.signatures and isinstance(next(iter(part.overloads.values())).library, linking.Part)
+    assert part(2.0) == 4.0 and len(part.alone.signatures) == 1
+
+
+def test_every_kernel_compiles_by_itself_where_numba_does_not_let_us(monkeypatch):
+    monkeypatch.setattr(linking, "HANDS_OVER", False)
+
+    @compiling.kernel
+    def part(values: np.ndarray) -> float:
+        return values[0]
+
+    @compiling.kernel
+    def whole(values: np.ndarray) -> float:
+        return part(values) + np.zeros(1)[0]
+
+    assert not isinstance(part, linking.Kernel)
+    assert whole(np.ones(1)) == 1.0
+
+
+def test_no_kernel_returns_an_array():
+    """Those without arrays of their own do not count who uses one, so they must not hand one on."""
+    for path in KERNELS.glob("*.py"):
+        module = importlib.import_module(f"scantruss.kernels.{path.stem}")
+        for function in vars(module).values():
+            if isinstance(function, linking.Kernel):
+                returned = inspect.signature(function.py_func).return_annotation
+                assert not re.search("ndarray|Surface|Net|Front|Rim|Boxes|Scratch", str(returned)), function.__name__

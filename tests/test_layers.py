@@ -16,6 +16,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("front",),
     ("grid",),
     ("pipeline",),
+    ("ahead",),
     ("structure",),
     ("export",),
     ("report", "demo"),

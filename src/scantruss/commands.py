@@ -5,7 +5,6 @@ Outputs and settings are checked before anything is read; everything heavy is im
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -47,7 +46,7 @@ def info(values: Namespace) -> None:
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))
         check_length(cloud, settings)
-
+        note_compiling(bars, settings.method, "boundary")
         from .boundary import find_boundary
 
         boundary = find_boundary(cloud, settings, progress=bars)
@@ -129,7 +128,7 @@ def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
 
 
 def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan, and say so where points were left out or kernels must be compiled."""
+    """Read a scan, and say so where points were left out."""
     from .scan.readers import read_points
 
     bars("read", 0.0)
@@ -137,18 +136,26 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     bars("read", 1.0)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
-    from .kernels.compile import is_compiled
-
-    if not is_compiled() and os.environ.get("NUMBA_DISABLE_JIT", "0") == "0":
-        bars.note("compiling kernels, once on this machine")
     return cloud
 
 
 def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
-    """Run the chain."""
-    from .pipeline import grid_from_cloud
+    """Run the chain, and say so where kernels must be compiled."""
+    from .ahead import CompileAhead
+    from .pipeline import check_length, grid_from_cloud
 
-    return grid_from_cloud(cloud, settings, progress=bars)
+    check_length(cloud, settings)
+    note_compiling(bars, settings.method, "boundary", "front", "optimize")
+    with CompileAhead(settings.method, bars) as progress:
+        return grid_from_cloud(cloud, settings, progress=progress)
+
+
+def note_compiling(bars: Bars, method: str, *stages: str) -> None:
+    """Say so where the kernels of some stages must be compiled, which takes long."""
+    from .ahead import are_compiled, can_be_stored
+
+    if not are_compiled(method, *stages):
+        bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:

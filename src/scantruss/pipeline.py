@@ -97,6 +97,8 @@ def grid_from_cloud(
         try:
             front = advance_front(cloud, boundary, settings.replace(length=share * settings.length), progress=progress)
             advanced = perf_counter()
+            if progress:
+                progress("optimize", 0.0)
             grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
             check_grid(grid)
             check_boundary(grid, boundary)

@@ -18,6 +18,7 @@ from .smoothing import smooth
 if TYPE_CHECKING:
     from ..boundary import Boundary
     from ..scan.cloud import PointCloud
+    from ..scan.sites import Sites
     from ..settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -60,7 +61,7 @@ def optimize_grid(
         A fixed position is farther than half a member from the scan or closer than that to another.
     """
     from ..boundary import find_boundary
-    from ..scan.sites import narrow_surface, prepare_sites, surface_of
+    from ..scan.sites import prepare_sites, surface_of
 
     surface = surface_of(cloud, settings)
     positions = check_positions(settings.fixed if fixed is None else fixed, cloud, surface, settings.length)
@@ -73,6 +74,22 @@ def optimize_grid(
     report = (lambda share: progress("optimize", share)) if progress else None
     if report:
         report(0.1)
+    improve(relief, prepare_sites(cloud, settings), positions, settings, report)
+    if report:
+        report(1.0)
+    return relief.to_grid(grid).replace(settings=settings, before=before)
+
+
+def improve(
+    relief: Relief,
+    sites: Sites,
+    positions: np.ndarray,
+    settings: Settings,
+    report: Callable[[float], None] | None = None,
+) -> None:
+    """Improve an opened grid by the method of the settings, make nodes at the positions (K, 3) and land on the scan."""
+    from ..scan.sites import narrow_surface
+
     if settings.method == "paper":
         flip_by_angle(relief.net, FOLD, ROUNDS)
         if len(positions):
@@ -83,8 +100,4 @@ def optimize_grid(
         equalize(relief, report)
         fix_nodes(relief, positions)
         finish(relief)
-    sites = prepare_sites(cloud, settings)
     relief.land(narrow_surface(sites, 40.0), narrow_surface(sites, 120.0))
-    if report:
-        report(1.0)
-    return relief.to_grid(grid).replace(settings=settings, before=before)

@@ -13,9 +13,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numba
+
+from .linking import compiled
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -59,9 +61,12 @@ def _folder() -> Path | None:
 FOLDER = _folder()
 
 
-def is_compiled() -> bool:
-    """Whether machine code of these kernels is on disk already (False: the next call compiles)."""
-    return FOLDER is not None and any(FOLDER.rglob("*.nbc"))
+def is_compiled(*kernels: Callable[..., object]) -> bool:
+    """Whether machine code of these kernels is on disk already (False: their next call compiles)."""
+    if numba.config.DISABLE_JIT:
+        return True
+    names = (f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}-*.nbc" for kernel in kernels)
+    return FOLDER is not None and all(any(FOLDER.rglob(name)) for name in names)
 
 
 def kernel(function: F) -> F:
@@ -80,8 +85,8 @@ def kernel(function: F) -> F:
     kept = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(FOLDER or "")
     try:
-        return numba.njit(cache=FOLDER is not None, nogil=True)(function)
+        return cast(F, compiled(function, cache=FOLDER is not None))
     except RuntimeError:  # numba: "cannot cache function"
-        return numba.njit(nogil=True)(function)
+        return cast(F, compiled(function, cache=False))
     finally:
         numba.config.CACHE_DIR = kept

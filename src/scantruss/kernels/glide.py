@@ -35,8 +35,10 @@ def note_down(journal: Journal, scratch: Scratch) -> None:
             journal.mark[v] = journal.counter[0]
             at = journal.counter[1]
             journal.around[at] = v
-            journal.nodes[at] = scratch.nodes[i]
-            journal.ring[at] = scratch.ring[i]
+            for c in range(4):
+                journal.nodes[at, c] = scratch.nodes[i, c]
+            for c in range(journal.ring.shape[1]):
+                journal.ring[at, c] = scratch.ring[i, c]
             journal.counter[1] += 1
 
 

@@ -1,0 +1,193 @@
+"""On the first run a second process compiles for the optimization; it changes nothing and is never left over."""
+
+import gc
+import os
+import subprocess
+import sys
+import time
+
+import numba
+import numpy as np
+import pytest
+from shapes import make
+
+from scantruss import ahead
+from scantruss.commands import note_compiling
+from scantruss.kernels import compile as compiling
+
+needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+
+
+class Process:
+    """Stands for the second process."""
+
+    def __init__(self, patient=True):
+        self.calls, self.patient = [], patient
+
+    def wait(self, timeout):
+        self.calls.append("wait")
+        if not self.patient:
+            raise subprocess.TimeoutExpired("python", timeout)
+
+    def kill(self):
+        self.calls.append("kill")
+
+    def communicate(self):
+        self.calls.append("communicate")
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What was started, where nothing is compiled yet and two processors are there."""
+    processes = []
+    monkeypatch.setattr(ahead, "are_compiled", lambda method, *stages: False)
+    monkeypatch.setattr(ahead, "can_be_stored", lambda: True)
+    monkeypatch.setattr(ahead, "processors", lambda: 2)
+
+    def popen(words, **_):
+        processes.append((words, Process()))
+        return processes[-1][1]
+
+    monkeypatch.setattr(subprocess, "Popen", popen)
+    return processes
+
+
+def test_it_is_waited_for_before_the_optimization_and_ended(started):
+    seen = []
+    with ahead.CompileAhead("paper", lambda *stage: seen.append(stage)) as progress:
+        ((words, process),) = started
+        assert words[-1] == "paper"
+        progress("front", 0.5)
+        assert not process.calls
+        progress("optimize", 0.0)
+        progress("optimize", 0.5)
+        assert process.calls == ["wait", "kill", "communicate"]
+    assert process.calls == ["wait", "kill", "communicate"]
+    assert seen == [("front", 0.5), ("optimize", 0.0), ("optimize", 0.5)]
+
+
+def test_it_ends_where_the_run_is_refused_or_interrupted(started):
+    with pytest.raises(KeyboardInterrupt), ahead.CompileAhead("default", print):
+        raise KeyboardInterrupt
+    assert started[0][1].calls == ["kill", "communicate"]
+
+
+def test_garbage_is_collected_again_afterwards(started):
+    with ahead.CompileAhead("default", print):
+        assert not gc.isenabled()
+    assert gc.isenabled()
+
+
+def test_patience_has_an_end(started):
+    with ahead.CompileAhead("default", lambda *_: None) as progress:
+        started[0][1].patient = False
+        progress("optimize", 0.0)
+    assert started[0][1].calls == ["wait", "kill", "communicate"]
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("are_compiled", lambda method, *stages: True),
+        ("can_be_stored", lambda: False),
+        ("processors", lambda: 1),
+    ],
+)
+def test_it_starts_only_where_it_is_of_use(started, monkeypatch, name, value):
+    monkeypatch.setattr(ahead, name, value)
+    with ahead.CompileAhead("default", lambda *_: None) as progress:
+        progress("optimize", 0.0)
+    assert not started
+
+
+def test_where_it_cannot_start_this_process_does_all(started, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError("no process")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    seen = []
+    with ahead.CompileAhead("default", lambda *stage: seen.append(stage)) as progress:
+        progress("optimize", 0.0)
+    assert seen == [("optimize", 0.0)]
+
+
+def test_it_leaves_when_the_process_that_started_it_is_no_more():
+    code = "import time; from scantruss import ahead; ahead.compile_optimization = lambda _: time.sleep(600)\n"
+    words = [sys.executable, "-c", code + "ahead.main('default')"]
+    with subprocess.Popen(words, stdin=subprocess.PIPE) as process:
+        time.sleep(0.1)
+        process.stdin.close()
+        assert process.wait(60) == 1
+
+
+COMPILED = """
+import sys
+from scantruss.ahead import compile_optimization
+from scantruss.kernels.linking import Kernel
+from scantruss.settings import Settings
+import numpy as np
+import scantruss as st
+
+def kernels():
+    modules = [module for name, module in sys.modules.items() if name.startswith("scantruss.kernels.")]
+    return {v.__name__: v for module in modules for v in vars(module).values() if isinstance(v, Kernel)}
+
+compile_optimization(Settings(length=1.0, method=sys.argv[1]))
+ahead = {name for name, kernel in kernels().items() if kernel.alone.signatures}
+points = np.load(sys.argv[2])
+st.grid_from_points(points, Settings(length=float(sys.argv[3]), method=sys.argv[1]))
+assert {"land_nodes", "fill_rings", "mark_far"} < ahead
+for name, kernel in kernels().items():
+    assert len(kernel.alone.signatures) <= 1, name  # neither compiled for other types by the example ...
+    assert len(kernel.overloads) <= 1, name  # ... nor twice by kernels
+"""
+
+
+@needs_jit
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_the_example_compiles_for_the_types_of_a_run(method, tmp_path):
+    np.save(tmp_path / "points.npy", make("scallop", 5_000).points)
+    words = [sys.executable, "-c", COMPILED, method, str(tmp_path / "points.npy"), "12"]
+    done = subprocess.run(words, capture_output=True, text=True, env=os.environ)
+    assert done.returncode == 0, done.stderr
+
+
+class Notes:
+    """Stands for the bars."""
+
+    def __init__(self):
+        self.lines = []
+
+    def note(self, line):
+        self.lines.append(line)
+
+
+@needs_jit
+def test_a_line_says_that_a_long_compile_is_about_to_come_and_only_then(tmp_path, monkeypatch):
+    """After `info` only the kernels of the boundary are stored; a `grid` still compiles for long."""
+    monkeypatch.setattr(compiling, "FOLDER", tmp_path)
+    stages = ("boundary", "front", "optimize")
+    for stored, compiles in (
+        ((), stages),
+        (("boundary.free_directions-86.py311.1.nbc",), stages[1:]),
+        (("advance.advance-150.py311.1.nbc",), stages[2:]),
+        (("search.search-300.py311.1.nbc", "landing.land_nodes-33.py311.1.nbc"), ()),
+    ):
+        for name in stored:
+            (tmp_path / name).write_bytes(b"")
+        for stage in stages:
+            bars = Notes()
+            note_compiling(bars, "default", stage)
+            assert bool(bars.lines) == (stage in compiles)
+        bars = Notes()
+        note_compiling(bars, "default", *stages)
+        assert bool(bars.lines) == bool(compiles)
+    assert not ahead.are_compiled("paper", "front") and not ahead.are_compiled("paper", "optimize")
+
+
+@needs_jit
+def test_where_nothing_can_be_stored_every_run_compiles(monkeypatch):
+    monkeypatch.setattr(compiling, "FOLDER", None)
+    bars = Notes()
+    note_compiling(bars, "default", "boundary")
+    assert bars.lines == ["compiling kernels"] and not ahead.can_be_stored()
