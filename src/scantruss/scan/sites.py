@@ -133,14 +133,14 @@ def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, Se
     lower, upper = points.min(axis=0), points.max(axis=0)
     capacity, begin, count = 1 << 14, 0, 0
     chosen = np.full(capacity, -1, np.int64)
-    boxes = new_boxes(lower, upper, 2.0 * radius, capacity, capacity)
+    boxes = new_boxes(lower, upper, 4.0 * radius, capacity, capacity)
     while True:
         begin, count = kernels.thin_points(points, radius, boxes, owner, chosen, begin, count)
         if begin == len(points):
             return owner, chosen[:count].copy(), boxes
         capacity *= 4
         chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
-        boxes = new_boxes(lower, upper, 2.0 * radius, capacity, capacity)
+        boxes = new_boxes(lower, upper, 4.0 * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
 
 
