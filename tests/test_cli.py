@@ -15,7 +15,7 @@ from scantruss import commands, pipeline
 from scantruss.cli import main
 from scantruss.errors import FrontError
 from scantruss.grid.grid import Grid
-from scantruss.scan.cloud import PointCloud, measure_spacing
+from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 
 LENGTH = "4"
 
@@ -218,8 +218,8 @@ def test_a_length_of_less_than_three_spacings_is_refused_with_one_that_does(plac
 def test_the_gap_is_that_of_a_known_pattern():
     x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
     triangular = np.stack([(x + 0.5 * (y % 2)).ravel(), (y * np.sqrt(0.75)).ravel(), 0 * x.ravel()], axis=1)
-    assert pipeline.measure_gap(7 * triangular) == pytest.approx(7)
-    assert 2 < pipeline.measure_gap(plate()) / measure_spacing(plate()) < 3.5
+    assert measure_gap(7 * triangular) == pytest.approx(7)
+    assert 2 < measure_gap(plate()) / measure_spacing(plate()) < 3.5
 
 
 @pytest.mark.parametrize("value", [1e-7, 0.0123, 0.99, 1.0, 9.99, 12345.6, 8e9])

@@ -31,7 +31,6 @@ COVER = 1.2  #: members from the nearest node at which a part of the scan counts
 UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
 ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
 LEFT_OUT = 0.2  #: share of the scan that a grid may leave out
-SAMPLE = 200  #: points at which the gap is measured
 
 
 def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progress | None = None) -> Grid:
@@ -235,37 +234,19 @@ def extent_of(cloud: PointCloud) -> float:
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
+    from .scan.cloud import measure_gap
+
     low = max(SPACINGS * cloud.spacing, GAPS * measure_gap(cloud.points))
     return round_length(low, "up"), round_length(extent_of(cloud) / LARGEST, "down")
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
+    from .scan.cloud import measure_gap
+
     low, high = length_range(cloud)
     wished = max(extent_of(cloud) / USUAL, USUAL_GAPS * measure_gap(cloud.points))
     return max(round_length(min(wished, high), "nearest"), low)
-
-
-def measure_gap(points: np.ndarray) -> float:
-    """Return the median distance to the sixth neighbour, which tells the density however evenly the points lie.
-
-    Parameters
-    ----------
-    points : (N, 3) array [scan unit]
-
-    Returns
-    -------
-    float
-        About one spacing for points in a triangular pattern, 2.7 times the distance to the nearest for random ones.
-    """
-    sixth = min(6, len(points) - 1)
-    gaps = []
-    for place in points[np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)]:
-        squared = np.zeros(len(points))
-        for axis in range(3):
-            squared += (points[:, axis] - place[axis]) ** 2
-        gaps.append(np.partition(squared, sixth)[sixth])
-    return float(np.sqrt(np.median(gaps)))
 
 
 def round_length(value: float, way: Literal["up", "down", "nearest"]) -> float:

@@ -73,7 +73,12 @@ class Settings:
     case3: str = _setting(
         "merge", "case 3: merge the free nodes, or Foucault's quadrangle", source="Table 1, [30]", choices=CASE3
     )
-    box_size: float = _setting(0.2, "size of a search box, in lengths", symbol="d_B", source="Eq. 1")
+    box_size: float = _setting(
+        0.2, "distance of the sites to which the scan is thinned, in lengths; search boxes are larger", source="Eq. 1"
+    )
+    stray_distance: float = _setting(
+        3.0, "points so many times farther from others than their neighbours are left out; 0 keeps all", source="Sec. 2"
+    )
     boundary_radius: float = _setting(
         0.4, "radius of the disc rolled along the boundary, in lengths", source="Sec. 3.3"
     )
@@ -99,6 +104,7 @@ class Settings:
         for name, low, high in (
             ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
             ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
+            ("stray_distance", 0, math.inf),
             ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
             ("corner_angle", 10, 180), ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip

@@ -13,6 +13,7 @@ from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import Surface
 from ..settings import Settings
 from .cloud import PointCloud
+from .strays import find_strays, has_strays
 
 NEIGHBORS = 12  # links of a site
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
@@ -29,9 +30,10 @@ class Sites:
     spacing: float  #: typical distance between neighbouring points [scan unit]
     area: float  #: rough area of the scanned surface [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
+    strays: int = 0  #: stray points that were left out
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float], Sites]] = weakref.WeakKeyDictionary()
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float], Sites]] = weakref.WeakKeyDictionary()
 
 
 def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
@@ -41,9 +43,9 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are.
+        `length` and `box_size` decide how far apart sites are, `stray_distance` which points are left out.
     """
-    key = (settings.length, settings.box_size)
+    key = (settings.length, settings.box_size, settings.stray_distance)
     kept = _KEPT.setdefault(cloud, {})
     if key not in kept:
         kept.clear()
@@ -75,12 +77,21 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float) -> Sites:
+def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float, stray_distance: float) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
-    owner, chosen, boxes = _thin(points, radius)
-    grouped, start, mean = _group(points, owner, len(chosen))
-    place = points[chosen]
-    neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
+    strays = 0
+    while True:
+        owner, chosen, boxes = _thin(points, radius)
+        grouped, start, mean = _group(points, owner, len(chosen))
+        place = points[chosen]
+        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
+        if strays or not stray_distance or not has_strays(neighbors):
+            break
+        stray = find_strays(points, stray_distance)
+        strays = int(stray.sum())
+        if not strays:
+            break
+        points = np.ascontiguousarray(points[~stray])
     rough = ROUGH * length
     if (thickness > rough).mean() > 0.002:
         settled = np.empty_like(mean)
@@ -103,7 +114,9 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float)
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
     piece = _number(piece)
     area = _site_areas(surface)
-    return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), _large_pieces(piece, area, length))
+    return Sites(
+        surface, boxes, piece, thickness, spacing, float(area.sum()), _large_pieces(piece, area, length), strays
+    )
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,52 @@
+"""Stray points: measured points that belong to no surface, left out before all else (Sec. 2 leaves that to the scanner)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels import sites as kernels
+from ..kernels.boxes import new_boxes
+from .cloud import measure_gap
+
+AROUND = 8  # a point's reach is the distance to this neighbour
+FAR = 6.0  # reach, in typical reaches, at which a point is a stray whatever is near it
+ROUNDS = 3  # strays near each other hide each other: after a round some more stand out
+LONE = 3e-4  # share of sites without neighbours from which on strays are looked for
+
+
+def has_strays(neighbors: np.ndarray) -> bool:
+    """Whether so many sites stand alone that it is worth looking for strays; neighbors (S, K) as `kernels.nearest_sites`."""
+    return bool((neighbors[:, 5] < 0).mean() > LONE)
+
+
+def find_strays(points: np.ndarray, distance: float) -> np.ndarray:
+    """Return which points are strays (N,) bool: their reach is more than `distance` times that of their neighbours.
+
+    Parameters
+    ----------
+    points : (N, 3) [scan unit]
+    distance : as `Settings.stray_distance`
+    """
+    stray = np.zeros(len(points), np.bool_)
+    for _ in range(ROUNDS):
+        kept = np.flatnonzero(~stray)
+        if len(kept) <= AROUND:
+            return stray
+        found = _look(np.ascontiguousarray(points[kept]), distance)
+        stray[kept[found]] = True
+        if not found.any():
+            break
+    return stray
+
+
+def _look(points: np.ndarray, distance: float) -> np.ndarray:
+    """One round of `find_strays`."""
+    gap = max(measure_gap(points), 1e-12 * float(np.ptp(points, axis=0).max()))
+    boxes = new_boxes(points.min(axis=0), points.max(axis=0), 2.0 * gap, len(points), len(points))
+    kernels.put_all(boxes, points, np.arange(len(points)))
+    neighbors = np.full((len(points), AROUND), -1, np.int64)
+    kernels.nearest_sites(points, boxes, 1.5 * gap, 0.5 * FAR * gap, neighbors)
+    last = neighbors[:, -1]
+    reach = np.where(last >= 0, np.linalg.norm(points[last] - points, axis=1), np.inf)
+    usual = np.median(np.where(neighbors >= 0, reach[neighbors], np.inf), axis=1)
+    return (reach > distance * usual) | (reach > FAR * gap)
