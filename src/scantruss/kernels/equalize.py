@@ -17,6 +17,7 @@ from .surface import onto_patch
 
 ROOT = 4.0 * math.sqrt(3.0)
 STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes move together
+LEASH = 0.8  # farther from its middle a patch says nothing of the surface, in lengths
 
 
 @kernel
@@ -98,6 +99,10 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
             arc, px, py, pz = slide(rim, net.state[v, CURVE], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
+            dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
+            if dx * dx + dy * dy + dz * dz > LEASH * LEASH * length * length:
+                step *= 0.3
+                continue
         after = star_energy(net, patches, v, px, py, pz, length, weight)[0]
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
