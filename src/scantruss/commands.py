@@ -50,6 +50,7 @@ def info(values: Namespace) -> None:
         from .boundary import find_boundary
 
         boundary = find_boundary(cloud, settings, progress=bars)
+        note_strays(bars, cloud, settings)
     print_lines([f"boundaries for members of {settings.length:g} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:
         print_table(("boundary", "length", "corners"), loop_rows(boundary))
@@ -147,7 +148,18 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
     check_length(cloud, settings)
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
-        return grid_from_cloud(cloud, settings, progress=progress)
+        grid = grid_from_cloud(cloud, settings, progress=progress)
+    note_strays(bars, cloud, settings)
+    return grid
+
+
+def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Say so where stray points were left out."""
+    from .scan.sites import prepare_sites
+
+    strays = prepare_sites(cloud, settings).strays
+    if strays:
+        bars.note(f"{strays} stray points are left out; --stray-distance 0 keeps them")
 
 
 def note_compiling(bars: Bars, method: str, *stages: str) -> None:

@@ -108,8 +108,13 @@ def fix_nearest_nodes(relief: Relief, positions: np.ndarray) -> None:
         nodes = _candidates(relief, place)
         if v < 0 and len(nodes):
             v = int(nodes[0])
-        if v >= 0:
-            _put_node(relief, v, place)
+        if v < 0:
+            raise _no_node(place)
+        _put_node(relief, v, place)
+
+
+def _no_node(place: np.ndarray) -> InputError:
+    return InputError(f"the grid has no node that could be moved to {_text(place)}; use a smaller length")
 
 
 def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
@@ -134,7 +139,7 @@ def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
             if energy < least:
                 best, least = _copy(relief), energy
         if best is None:
-            raise InputError(f"the grid has no node that could be moved to {_text(place)}; use a smaller length")
+            raise _no_node(place)
         _restore(relief, best)
 
 

@@ -103,8 +103,8 @@ def close_quadrangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarra
 
 
 @kernel
-def _fan_holds(front: Front, node: int, place: Vector, a: int, b: int) -> bool:
-    """Whether the finished triangles at a node stay sound when it moves; those with a or b too."""
+def _fan_holds(front: Front, node: int, place: Vector) -> bool:
+    """Whether the finished triangles at a node stay sound when it moves."""
     at = front.corner[node]
     while at >= 0:
         t, k = at // 3, at % 3
@@ -138,9 +138,7 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 
 
 @kernel
-def merge_neighbors(
-    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray
-) -> bool:
+def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
     """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
     Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
@@ -174,7 +172,7 @@ def merge_neighbors(
     face = unit(cross(subtract(pb, pa), subtract(place, pa)))
     if dot(face, row(front.normals, a)) < 0.5 or shape_quality(pa, pb, place) < 0.4:
         return False
-    if not (_fan_holds(front, c, place, a, b) and _fan_holds(front, d, place, a, b)):
+    if not (_fan_holds(front, c, place) and _fan_holds(front, d, place)):
         return False
     for i in range(near):
         if found[i] == lose:
@@ -197,10 +195,14 @@ def merge_neighbors(
 
 @kernel
 def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
-    """Let one node take over the triangles and segments of another, and move it."""
+    """Let one node take over the triangles and segments of another, and move it; its normal becomes their mean."""
     take(front.boxes, keep, front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2])
     take(front.boxes, lose, front.nodes[lose, 0], front.nodes[lose, 1], front.nodes[lose, 2])
     front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2] = place
+    n, m = row(front.normals, keep), row(front.normals, lose)
+    front.normals[keep, 0], front.normals[keep, 1], front.normals[keep, 2] = unit(
+        (n[0] + m[0], n[1] + m[1], n[2] + m[2])
+    )
     put(front.boxes, keep, place[0], place[1], place[2])
     at = front.corner[lose]
     while at >= 0:
@@ -355,7 +357,7 @@ def choose_by_case(
     if case == BOTH:
         if numbers[QUADRANGLE] > 0.0:
             return divide_quadrangle(front, s, numbers, found, near)
-        if merge_neighbors(surface, front, s, numbers, found, near, patch):
+        if merge_neighbors(surface, front, s, numbers, found, near):
             return True
         return close_quadrangle(front, s, numbers, found, near)
     if case == RIGHT:

@@ -148,7 +148,7 @@ def _check_not_on_a_line(points: np.ndarray, extent: float, said: str) -> None:
 def measure_spacing(points: np.ndarray) -> float:
     """Return the typical distance between neighbouring points.
 
-    The median of the distance to the nearest other point that does not coincide, at up to 2000 points taken evenly
+    The median of the distance to the nearest other point that does not coincide, at up to 600 points taken evenly
     from the file order; always the same for the same points.
 
     Parameters
