@@ -15,6 +15,8 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("boundary",),
     ("front",),
     ("grid",),
+    ("machine",),
+    ("several",),
     ("pipeline",),
     ("ahead",),
     ("structure",),

@@ -17,6 +17,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from .machine import processors
+
 if TYPE_CHECKING:
     from .settings import Settings
 
@@ -75,13 +77,6 @@ class CompileAhead(AbstractContextManager["CompileAhead"]):
             process, self._process = self._process, None
             process.kill()
             process.communicate()
-
-
-def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def can_be_stored() -> bool:

@@ -85,29 +85,23 @@ def grid_from_cloud(
     started = perf_counter()
     check_length(cloud, settings)
     from .boundary import find_boundary
-    from .front import advance_front
-    from .grid.optimize import optimize_grid
 
     checked = perf_counter()
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
-    fault: FrontError | None = None
-    for share in ATTEMPTS:
-        try:
-            front = advance_front(cloud, boundary, settings.replace(length=share * settings.length), progress=progress)
-            advanced = perf_counter()
-            if progress:
-                progress("optimize", 0.0)
-            grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
-            check_grid(grid)
-            check_boundary(grid, boundary)
-            check_cover(grid, boundary.sites, settings)
-            break
-        except FrontError as error:
-            fault = fault or error
+
+    def check(grid: Grid) -> None:
+        check_grid(grid)
+        check_boundary(grid, boundary)
+        check_cover(grid, boundary.sites, settings)
+
+    if settings.effort == "best" and settings.method == "default":
+        from .several import several_grids
+
+        front, grid = several_grids(cloud, boundary, settings, check, progress)
+        advanced = found
     else:
-        assert fault is not None
-        raise fault
+        front, grid, advanced = _first_grid(cloud, boundary, settings, check, progress)
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -117,6 +111,32 @@ def grid_from_cloud(
         "total": read_seconds + ended - started,
     }
     return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
+
+
+def _first_grid(
+    cloud: PointCloud,
+    boundary: Boundary,
+    settings: Settings,
+    check: Callable[[Grid], None],
+    progress: Progress | None,
+) -> tuple[Grid, Grid, float]:
+    """Return the front and the grid of the first attempt that passes, and when its front was done."""
+    from .front import advance_front
+    from .grid.optimize import optimize_grid
+
+    faults = []
+    for share in ATTEMPTS:
+        try:
+            front = advance_front(cloud, boundary, settings.replace(length=share * settings.length), progress=progress)
+            advanced = perf_counter()
+            if progress:
+                progress("optimize", 0.0)
+            grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
+            check(grid)
+            return front, grid, advanced
+        except FrontError as error:
+            faults.append(error)
+    raise faults[0]
 
 
 def check_grid(grid: Grid) -> None:

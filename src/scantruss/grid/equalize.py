@@ -16,6 +16,8 @@ from ..kernels.flips import flip_by_angle
 from ..kernels.glide import Journal, glide
 from ..kernels.search import Scratch, search, suit_nodes, total_energy
 from .flips import FOLD, ROUNDS
+from .grid import Grid
+from .quality import shape_qualities
 from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
@@ -23,6 +25,8 @@ EVEN = 2.0  # the same in the last sweeps, which no longer change the topology
 PRICE = 12.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
+GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}  # rounds, most flips of a chain, and the
+# energy above the old one at which a chain is given up
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
@@ -53,11 +57,6 @@ def search_once(relief: Relief, scratch: Scratch) -> int:
     return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
 
 
-LINKS = 4  # most flips of a chain
-CHAIN = 0.2  # energy above the old one at which a chain is given up
-GLIDES = 1  # rounds of chains
-
-
 def new_journal(relief: Relief) -> Journal:
     """Return room for what a chain of flips touches."""
     capacity, width = relief.net.ring.shape
@@ -70,24 +69,36 @@ def new_journal(relief: Relief) -> Journal:
     )
 
 
-def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
-    """Flip, settle, search while it pays, settle: the default way to improve a grid."""
+def grid_energy(grid: Grid, length: float) -> float:
+    """The energy that falls, of a whole grid; folded members left out."""
+    stretch = grid.lengths / length - 1.0
+    shapes = shape_qualities(grid.nodes, grid.triangles)
+    price = PRICE * len(grid.nodes) * float(stretch.mean()) ** 2
+    return WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
+
+
+def equalize(relief: Relief, progress: Callable[[float], None] | None = None, effort: str = "normal") -> None:
+    """Flip, settle, search while it pays, move pairs of irregular nodes: the default way to improve a grid."""
     flip_by_angle(relief.net, FOLD, ROUNDS)
     settle(relief, WEIGHT, 1e-3, 60)
     scratch = new_scratch(relief)
+    rounds, links, hope = GLIDES[effort]
     for done in range(SEARCHES):
         if progress:
-            progress(0.2 + 0.6 * done / SEARCHES)
+            progress(0.2 + 0.6 * done / (SEARCHES + rounds))
         if search_once(relief, scratch) == 0:
             break
         relief.renew(FAR)
         settle(relief, WEIGHT, 1e-4, 8)
     journal = new_journal(relief)
-    for _ in range(GLIDES):
-        kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, LINKS, CHAIN)
-        relief.renew(FAR)
-        settle(relief, WEIGHT, 1e-4, 8)
-        search_once(relief, scratch)
+    for done in range(rounds):
+        if progress:
+            progress(0.2 + 0.6 * (SEARCHES + done) / (SEARCHES + rounds))
+        kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, links, hope)
+        for _ in range(2):
+            relief.renew(FAR)
+            settle(relief, WEIGHT, 1e-4, 8)
+            kept += search_once(relief, scratch)
         relief.renew(FAR)
         settle(relief, WEIGHT, 1e-4, 8)
         if kept == 0:

@@ -61,9 +61,10 @@ def optimize_grid(
         A fixed position is farther than half a member from the scan or closer than that to another.
     """
     from ..boundary import find_boundary
-    from ..scan.sites import prepare_sites, surface_of
+    from ..scan.sites import prepare_sites
 
-    surface = surface_of(cloud, settings)
+    sites = prepare_sites(cloud, settings) if boundary is None else boundary.sites
+    surface = sites.surface
     positions = check_positions(settings.fixed if fixed is None else fixed, cloud, surface, settings.length)
     if len(grid.triangles) == 0:
         return grid.replace(settings=settings, before=grid.quality)
@@ -74,7 +75,7 @@ def optimize_grid(
     report = (lambda share: progress("optimize", share)) if progress else None
     if report:
         report(0.1)
-    improve(relief, prepare_sites(cloud, settings), positions, settings, report)
+    improve(relief, sites, positions, settings, report)
     if report:
         report(1.0)
     return relief.to_grid(grid).replace(settings=settings, before=before)
@@ -97,7 +98,7 @@ def improve(
             flip_by_angle(relief.net, FOLD, ROUNDS)
         smooth(relief, settings)
     else:
-        equalize(relief, report)
+        equalize(relief, report, settings.effort)
         fix_nodes(relief, positions)
         finish(relief)
     relief.land(narrow_surface(sites, 40.0), narrow_surface(sites, 120.0))
