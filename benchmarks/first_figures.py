@@ -27,17 +27,18 @@ def command(*arguments: str, cache: Path | None = None) -> None:
     subprocess.run(run, check=True, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def warm_run(rounds: int) -> Ratio:
-    """Return the whole run on points in memory against a search of 16 neighbours of each point."""
+def warm_run(rounds: int, workers: int) -> Ratio:
+    """Return the whole run on points in memory against a search of 16 neighbours of each point by so many threads."""
     from scipy.spatial import cKDTree
 
     points = make("scallop", POINTS).points
     settings = st.Settings(length=LENGTH)
     grid = st.grid_from_points(points, settings)  # compiles, or loads what was compiled
     return in_turn(
-        f"grid of {POINTS:,} points, {len(grid.nodes):,} nodes, warm / scipy cKDTree, {NEIGHBOURS} neighbours of each",
+        f"grid of {POINTS:,} points, {len(grid.nodes):,} nodes, warm / scipy cKDTree, {NEIGHBOURS} neighbours of each,"
+        f" {workers} thread{'s' * (workers > 1)}",
         lambda: st.grid_from_points(points, settings),
-        lambda: cKDTree(points).query(points, k=NEIGHBOURS, workers=2),
+        lambda: cKDTree(points).query(points, k=NEIGHBOURS, workers=workers),
         rounds=rounds,
         aim=1.0,
     )
@@ -74,8 +75,12 @@ def help_text(rounds: int) -> Ratio:
 
 
 def first_figures(rounds: int = 7) -> list[Ratio]:
-    """Return the three ratios."""
-    return [warm_run(2 * rounds + 1), first_run(max(rounds // 2, 3)), help_text(rounds)]
+    """Return the ratios."""
+    return [
+        *(warm_run(2 * rounds + 1, workers) for workers in (1, 2)),
+        first_run(max(rounds // 2, 3)),
+        help_text(rounds),
+    ]
 
 
 if __name__ == "__main__":
