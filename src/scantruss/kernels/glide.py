@@ -10,7 +10,7 @@ from .compile import kernel
 from .equalize import settle_node
 from .grid import DEGREE, IDEAL, OPEN, Net, flip, may_flip, wings
 from .rim import Rim
-from .search import FLIP, STILL, SWEEPS, TRIED, Scratch, disorder, gather, local_energy, put_back
+from .search import FLIP, STILL, SWEEPS, TRIED, Scratch, disorder, gather, local_energy, put_back, restore
 
 NO_WORSE = 2  # growth of the disorder by a flip of a chain
 CHOICES = 32  # most flips looked at for the next link of a chain
@@ -40,22 +40,6 @@ def note_down(journal: Journal, scratch: Scratch) -> None:
             for c in range(journal.ring.shape[1]):
                 journal.ring[at, c] = scratch.ring[i, c]
             journal.counter[1] += 1
-
-
-@kernel
-def roll_back(net: Net, journal: Journal) -> None:
-    """Undo a chain."""
-    for i in range(journal.counter[1]):
-        v = journal.around[i]
-        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = (
-            journal.nodes[i, 0],
-            journal.nodes[i, 1],
-            journal.nodes[i, 2],
-        )
-        net.arc[v] = journal.nodes[i, 3]
-        net.state[v, DEGREE] = journal.ring[i, -1]
-        for j in range(journal.ring[i, -1]):
-            net.ring[v, j] = journal.ring[i, j]
 
 
 @kernel
@@ -144,7 +128,7 @@ def try_chain(
                 scratch.note[journal.around[i], TRIED] = 0
             journal.counter[2] += 1
             return True
-    roll_back(net, journal)
+    restore(net, journal.around, journal.nodes, journal.ring, journal.counter[1])
     return False
 
 

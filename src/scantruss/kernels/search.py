@@ -92,19 +92,22 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
 
 
 @kernel
+def restore(net: Net, around: np.ndarray, nodes: np.ndarray, ring: np.ndarray, count: int) -> None:
+    """Put back the first `count` nodes of a list as they were written down."""
+    for i in range(count):
+        v = around[i]
+        for c in range(3):
+            net.nodes[v, c] = nodes[i, c]
+        net.arc[v] = nodes[i, 3]
+        net.state[v, DEGREE] = ring[i, -1]
+        for j in range(ring[i, -1]):
+            net.ring[v, j] = ring[i, j]
+
+
+@kernel
 def put_back(net: Net, scratch: Scratch) -> None:
     """Undo a trial: all around as it was."""
-    for i in range(scratch.counter[1]):
-        v = scratch.around[i]
-        net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = (
-            scratch.nodes[i, 0],
-            scratch.nodes[i, 1],
-            scratch.nodes[i, 2],
-        )
-        net.arc[v] = scratch.nodes[i, 3]
-        net.state[v, DEGREE] = scratch.ring[i, -1]
-        for j in range(scratch.ring[i, -1]):
-            net.ring[v, j] = scratch.ring[i, j]
+    restore(net, scratch.around, scratch.nodes, scratch.ring, scratch.counter[1])
 
 
 @kernel
