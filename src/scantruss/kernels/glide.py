@@ -10,7 +10,7 @@ from .compile import kernel
 from .equalize import settle_node
 from .grid import DEGREE, IDEAL, OPEN, Net, flip, may_flip, wings
 from .rim import Rim
-from .search import FLIP, STILL, SWEEPS, TRIED, Scratch, disorder, gather, local_energy, put_back, restore
+from .search import EARLY, FLIP, STILL, SWEEPS, TRIED, Scratch, disorder, gather, local_energy, put_back, restore
 
 NO_WORSE = 2  # growth of the disorder by a flip of a chain
 CHOICES = 32  # most flips looked at for the next link of a chain
@@ -44,16 +44,29 @@ def note_down(journal: Journal, scratch: Scratch) -> None:
 
 @kernel
 def flip_and_settle(
-    net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, a: int, b: int, length: float, weight: float
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    scratch: Scratch,
+    a: int,
+    b: int,
+    length: float,
+    weight: float,
+    most: float,
 ) -> float:
-    """Flip the edge a-b, settle the nodes around; returns by how much the energy has grown."""
+    """Flip the edge a-b, settle the nodes around; returns by how much the energy has grown, if that may come below `most`."""
     gather(net, scratch, a, b)
     before = local_energy(net, scratch, length, weight)
     flip(net, a, b)
-    for _ in range(SWEEPS):
-        for i in range(scratch.counter[1]):
+    change = 0.0
+    for turn in range(1 + SWEEPS):
+        for i in range(min(4, scratch.counter[1]) if turn == 0 else scratch.counter[1]):
             settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length)
-    return local_energy(net, scratch, length, weight) - before
+        if turn != 1:
+            change = local_energy(net, scratch, length, weight) - before
+        if turn == 0 and change > most + EARLY[FLIP]:
+            break
+    return change
 
 
 @kernel
@@ -112,7 +125,9 @@ def try_chain(
             count = list_flips(net, corners, flips)
             least = 1e300
             for k in range(count):
-                change = flip_and_settle(net, patches, rim, scratch, flips[k, 0], flips[k, 1], length, weight)
+                change = flip_and_settle(
+                    net, patches, rim, scratch, flips[k, 0], flips[k, 1], length, weight, min(least, hope - total)
+                )
                 put_back(net, scratch)
                 if change < least:
                     best, least = k, change
@@ -121,8 +136,10 @@ def try_chain(
         p, q = flips[best, 0], flips[best, 1]
         corners[0], corners[1] = wings(net, p, q)
         corners[2], corners[3] = p, q
-        total += flip_and_settle(net, patches, rim, scratch, p, q, length, weight)
+        total += flip_and_settle(net, patches, rim, scratch, p, q, length, weight, hope - total)
         note_down(journal, scratch)
+        if total > hope:
+            break
         if total < -1e-4:
             for i in range(journal.counter[1]):
                 scratch.note[journal.around[i], TRIED] = 0

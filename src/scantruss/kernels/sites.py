@@ -343,3 +343,21 @@ def put_all(boxes: SearchBoxes, points: np.ndarray, chosen: np.ndarray) -> None:
     """Put the chosen points into boxes, in their order."""
     for s in range(len(chosen)):
         put(boxes, s, points[chosen[s], 0], points[chosen[s], 1], points[chosen[s], 2])
+
+
+@kernel
+def head_on_links(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, smooth: float
+) -> int:
+    """Number of links between sites thinner than `smooth` that lie side by side and yet face opposite sides."""
+    count = 0
+    for s in range(len(mean)):
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0 or dot(row(normals, s), row(normals, n)) >= -0.9 or max(thickness[s], thickness[n]) >= smooth:
+                continue
+            d = subtract(row(mean, n), row(mean, s))
+            rise = max(abs(dot(d, row(normals, s))), abs(dot(d, row(normals, n))))
+            if rise < 0.3 * math.sqrt(max(dot(d, d), 1e-300)):
+                count += 1
+    return count

@@ -133,7 +133,7 @@ def _link(
     """Return the neighbours of each site, its normal (either sign) and the thickness of the points there."""
     neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
-    kernels.nearest_sites(place, boxes, max(2.1 * radius, 1.5 * spacing), far, neighbors)
+    kernels.nearest_sites(place, boxes, max(2.9 * radius, 1.5 * spacing), far, neighbors)
     kernels.link_back(place, neighbors)
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     kernels.site_normals(mean, neighbors, normals, thickness)
@@ -208,17 +208,12 @@ def check_two_sided(sites: Sites) -> None:
     or overgrown that happens by chance.
     """
     surface = sites.surface
-    site, k = np.nonzero(surface.neighbors >= 0)
-    other = surface.neighbors[site, k]
-    against = (surface.normals[site] * surface.normals[other]).sum(axis=1) < -0.9
-    site, other = site[against], other[against]
-    step = surface.mean[other] - surface.mean[site]
-    far = np.maximum(np.linalg.norm(step, axis=1), 1e-300)
-    rise = np.maximum(
-        np.abs((step * surface.normals[site]).sum(axis=1)), np.abs((step * surface.normals[other]).sum(axis=1))
-    )
-    smooth = np.maximum(sites.thickness[site], sites.thickness[other]) < 0.15 * surface.scale[4]
-    if (smooth & (rise < 0.3 * far)).sum() >= 40:
+    if (
+        kernels.head_on_links(
+            surface.mean, surface.normals, surface.neighbors, sites.thickness, 0.15 * surface.scale[4]
+        )
+        >= 40
+    ):
         raise InputError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
         )
