@@ -123,7 +123,7 @@ def test_nearest_sites_are_the_nearest(seed, count, far):
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
     put_all(boxes, places, np.arange(count))
     found = np.full((count, 6), -1, np.int64)
-    nearest_sites(places, boxes, 0.1, far, found)
+    nearest_sites(places, boxes, 0.1, far, found, 0, len(places))
     for s in range(count):
         own = [n for n in found[s].tolist() if n >= 0]
         full = naive.nearest(places, s, 6, far)

@@ -7,13 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from .errors import FrontError
 from .front import advance_front
 from .grid.equalize import grid_energy
 from .grid.optimize import optimize_grid
 from .machine import processors
+from .scan.sites import with_own_scratch
 
 if TYPE_CHECKING:
     from .boundary import Boundary
@@ -101,15 +100,6 @@ def _badness(grid: Grid, length: float) -> float:
 
 
 def _own_scratch(boundary: Boundary) -> Boundary:
-    """The same boundary on a scan with room of its own for look-ups, so that threads do not meet."""
+    """The same boundary on a scan with room of its own for look-ups."""
     sites = boundary.sites
-    old = sites.surface
-    return replace(
-        boundary,
-        sites=replace(
-            sites,
-            surface=old._replace(
-                stamp=np.zeros_like(old.stamp), queue=old.queue.copy(), counter=np.zeros_like(old.counter)
-            ),
-        ),
-    )
+    return replace(boundary, sites=replace(sites, surface=with_own_scratch(sites.surface)))

@@ -12,9 +12,12 @@ from ..kernels.grid import LOCKED, REST, RIM, Net
 from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
+from ..machine import in_parts
+from ..scan.sites import with_own_scratch
 from .grid import Grid
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
+PART = 300  # fewest nodes for a thread of their own
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
 
 
@@ -124,17 +127,34 @@ class Relief:
         patches = np.zeros((len(net.degree), PATCH))
         queue, seated = np.zeros((2, len(net.degree)), np.int64)
         seat.seat_nodes(net, surface, patches, length, queue, seated)
-        seat.renew_patches(net, surface, patches, 0.0)
-        return cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan))
+        relief = cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan))
+        relief.renew(0.0)
+        return relief
 
     def land(self, fine: Surface, middle: Surface) -> None:
         """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes stay."""
         self.landed[:] = 0.0
-        land_nodes(self.net, fine, middle, self.surface, self.patches, self.fixed, self.landed)
 
-    def renew(self, near: float) -> int:
-        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; returns how many."""
-        return seat.renew_patches(self.net, self.surface, self.patches, near * self.length)
+        def land_part(part: int, begin: int, end: int) -> None:
+            own = self._scratch(part)
+            narrow, wider = (
+                each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle)
+            )
+            land_nodes(self.net, narrow, wider, own, self.patches, self.fixed, self.landed, begin, end)
+
+        in_parts(self.net.used, PART, land_part)
+
+    def _scratch(self, part: int) -> Surface:
+        """The scan for one of several threads."""
+        return self.surface if part == 0 else with_own_scratch(self.surface)
+
+    def renew(self, near: float) -> None:
+        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch."""
+
+        def renew_part(part: int, begin: int, end: int) -> None:
+            seat.renew_patches(self.net, self._scratch(part), self.patches, near * self.length, begin, end)
+
+        in_parts(self.net.used, PART, renew_part)
 
     def return_to_scan(self, near: float) -> None:
         """Bring the nodes back onto the scan and the boundary curves; patches no farther than `near` lengths."""

@@ -47,6 +47,8 @@ def land_nodes(
     patches: np.ndarray,
     fixed: np.ndarray,
     deviation: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
     """Move each node to its foot on the surface of the nearest points; nodes of a boundary only along the normal.
 
@@ -57,8 +59,9 @@ def land_nodes(
     patches : (C, PATCH), scratch; column 15 is the site near each node
     fixed : (C,) bool, nodes that stay where they are
     deviation : (C,), filled with the distance of each node from the surface [scan unit]
+    begin, end : the nodes from `begin` to `end` - 1
     """
-    for v in range(net.free[-1]):
+    for v in range(begin, end):
         if net.state[v, DEGREE] == 0:
             continue
         for _ in range(2):

@@ -56,10 +56,13 @@ def seat_nodes(
 
 
 @kernel
-def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float) -> int:
-    """Fit the local surface anew under each node that is not within `near` of the middle of its patch; returns how many."""
+def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, begin: int, end: int) -> int:
+    """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
+
+    Returns how many.
+    """
     count = 0
-    for v in range(net.free[-1]):
+    for v in range(begin, end):
         if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near:

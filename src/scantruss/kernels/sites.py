@@ -86,15 +86,17 @@ def group_points(
 
 
 @kernel
-def nearest_sites(positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray) -> None:
-    """The K nearest sites of each site, nearest first, -1 where there are fewer within `far`; the search starts with `near`.
+def nearest_sites(
+    positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
+) -> None:
+    """The K nearest sites of each site from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
 
-    Where there are not even six, the scan is sparse: the search goes on to twice as far.
+    The search starts with `near`. Where there are not even six, the scan is sparse: the search goes on to twice as far.
     """
     k = neighbors.shape[1]
     found = np.empty(4096, np.int64)
     distance = np.empty(k)
-    for s in range(len(positions)):
+    for s in range(begin, end):
         x, y, z = row(positions, s)
         reach = near
         count = search(boxes, positions, x, y, z, reach, found)

@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import Surface
+from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud
 from .strays import find_strays, has_strays
@@ -60,6 +61,13 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     scale = surface.scale.copy()
     scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
     return surface._replace(scale=scale)
+
+
+def with_own_scratch(surface: Surface) -> Surface:
+    """Return the same surface with room of its own for look-ups, so that threads do not meet."""
+    return surface._replace(
+        stamp=np.zeros_like(surface.stamp), queue=surface.queue.copy(), counter=np.zeros_like(surface.counter)
+    )
 
 
 def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
@@ -133,7 +141,10 @@ def _link(
     """Return the neighbours of each site, its normal (either sign) and the thickness of the points there."""
     neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
-    kernels.nearest_sites(place, boxes, max(2.9 * radius, 1.5 * spacing), far, neighbors)
+    near = max(2.9 * radius, 1.5 * spacing)
+    in_parts(
+        len(place), 3000, lambda _, begin, end: kernels.nearest_sites(place, boxes, near, far, neighbors, begin, end)
+    )
     kernels.link_back(place, neighbors)
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     kernels.site_normals(mean, neighbors, normals, thickness)

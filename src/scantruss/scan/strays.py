@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kernels import sites as kernels
 from ..kernels.boxes import new_boxes
+from ..machine import in_parts
 from .cloud import measure_gap
 
 AROUND = 8  # a point's reach is the distance to this neighbour
@@ -45,7 +46,10 @@ def _look(points: np.ndarray, distance: float) -> np.ndarray:
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 2.0 * gap, len(points), len(points))
     kernels.put_all(boxes, points, np.arange(len(points)))
     neighbors = np.full((len(points), AROUND), -1, np.int64)
-    kernels.nearest_sites(points, boxes, 1.5 * gap, 0.5 * FAR * gap, neighbors)
+    near, far = 1.5 * gap, 0.5 * FAR * gap
+    in_parts(
+        len(points), 3000, lambda _, begin, end: kernels.nearest_sites(points, boxes, near, far, neighbors, begin, end)
+    )
     last = neighbors[:, -1]
     reach = np.where(last >= 0, np.linalg.norm(points[last] - points, axis=1), np.inf)
     usual = np.median(np.where(neighbors >= 0, reach[neighbors], np.inf), axis=1)
