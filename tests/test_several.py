@@ -24,6 +24,15 @@ def test_more_effort_leaves_less_energy(shape):
     assert energies[0] > energies[1] > energies[2]
 
 
+def test_lengths_or_shapes_can_be_preferred(shape):
+    quality = {
+        prefer: st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, prefer=prefer)).quality
+        for prefer in ("lengths", "balance", "shapes")
+    }
+    assert quality["lengths"].length_cv < quality["balance"].length_cv < quality["shapes"].length_cv
+    assert quality["lengths"].shape_mean < quality["balance"].shape_mean < quality["shapes"].shape_mean
+
+
 def test_the_number_of_processors_makes_no_difference(shape, monkeypatch):
     grids = []
     for count in (1, 2, 5):

@@ -15,6 +15,7 @@ from .errors import InputError
 
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
+PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # metres
@@ -45,6 +46,9 @@ class Settings:
     method: str = _setting("default", "the paper to the letter, or what we found better", choices=METHODS)
     effort: str = _setting(
         "normal", "time for regularity, in the default method; best tries several fronts", choices=EFFORTS
+    )
+    prefer: str = _setting(
+        "balance", "members of one length, or regular triangles, where not both can be had", choices=PREFER
     )
     unit: str = _setting("", "unit of the scan's coordinates", choices=tuple(u for u in UNITS if u))
     advance_from: str = _setting(

@@ -21,8 +21,12 @@ from .quality import shape_qualities
 from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
-EVEN = 2.0  # the same in the last sweeps, which no longer change the topology
-PRICE = 12.0  # of a mean length that is not the desired one
+EVEN = {
+    "balance": 2.0,
+    "lengths": 8.0,
+    "shapes": 0.5,
+}  # the same in the last sweeps, which no longer change the topology
+PRICE = 20.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}  # rounds, most flips of a chain, and the
@@ -105,9 +109,9 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None, ef
             break
 
 
-def finish(relief: Relief) -> None:
-    """Settle for good: each node on the surface that is fitted to the scan around it, members a little more even."""
+def finish(relief: Relief, prefer: str = "balance") -> None:
+    """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
     for sweeps in (20, 20):
         relief.renew(NEAR)
-        settle(relief, EVEN, 1e-5, sweeps)
+        settle(relief, EVEN[prefer], 1e-5, sweeps)
     relief.return_to_scan(NEAR)

@@ -100,5 +100,5 @@ def improve(
     else:
         equalize(relief, report, settings.effort)
         fix_nodes(relief, positions)
-        finish(relief)
+        finish(relief, settings.prefer)
     relief.land(narrow_surface(sites, 40.0), narrow_surface(sites, 120.0))
