@@ -26,7 +26,7 @@ EVEN = {
     "lengths": 8.0,
     "shapes": 0.5,
 }  # the same in the last sweeps, which no longer change the topology
-PRICE = 20.0  # of a mean length that is not the desired one
+PRICE = 18.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}  # rounds, most flips of a chain, and the

@@ -163,6 +163,8 @@ class Relief:
 
     def deviation(self) -> np.ndarray:
         """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
+        if not np.isnan(self.landed).any():
+            return self.landed
         values = np.zeros(len(self.net.degree))
         self.renew(0.05)
         seat.distances_from_scan(self.net, self.patches, values)

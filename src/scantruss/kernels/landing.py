@@ -58,7 +58,7 @@ def land_nodes(
         The same scan with narrow patches, which follow it, and with wider ones, which average its noise.
     patches : (C, PATCH), scratch; column 15 is the site near each node
     fixed : (C,) bool, nodes that stay where they are
-    deviation : (C,), filled with the distance of each node from the surface [scan unit]
+    deviation : (C,), filled with the distance of each node from the narrow patch at its place [scan unit]
     begin, end : the nodes from `begin` to `end` - 1
     """
     for v in range(begin, end):
@@ -79,4 +79,5 @@ def land_nodes(
             if norm(subtract(foot, place)) < SETTLED * broad.scale[0]:
                 break
         place = row(net.nodes, v)
+        fit_patch(fine, patches[v], int(patches[v, 15]), place)
         deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))
