@@ -120,7 +120,7 @@ def compile_optimization(settings: Settings) -> None:
     neighbors = np.where(np.take_along_axis(apart, nearest, axis=1) < 0.15, nearest, -1)
     normals, scratch = np.zeros((count, 3)), np.zeros(count, np.int64)
     normals[:, 2] = 1.0
-    scale = np.array([settings.length, 0.2, 0.65, 24.0, 0.26])
+    scale = np.array([settings.length, 0.2, 0.65, 8.0, 0.26])
     surface = Surface(
         places, np.arange(count + 1), places, normals, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64)
     )

@@ -101,4 +101,4 @@ def improve(
         equalize(relief, report, settings.effort)
         fix_nodes(relief, positions)
         finish(relief, settings.prefer)
-    relief.land(narrow_surface(sites, 40.0), narrow_surface(sites, 120.0))
+    relief.land(*(narrow_surface(sites, points) for points in (40.0, 120.0, np.inf)))

@@ -131,16 +131,16 @@ class Relief:
         relief.renew(0.0)
         return relief
 
-    def land(self, fine: Surface, middle: Surface) -> None:
+    def land(self, fine: Surface, middle: Surface, broad: Surface) -> None:
         """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes stay."""
         self.landed[:] = 0.0
 
         def land_part(part: int, begin: int, end: int) -> None:
             own = self._scratch(part)
-            narrow, wider = (
-                each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle)
+            narrow, wider, widest = (
+                each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle, broad)
             )
-            land_nodes(self.net, narrow, wider, own, self.patches, self.fixed, self.landed, begin, end)
+            land_nodes(self.net, narrow, wider, widest, self.patches, self.fixed, self.landed, begin, end)
 
         in_parts(self.net.used, PART, land_part)
 

@@ -17,6 +17,7 @@ from .cloud import PointCloud
 from .strays import find_strays, has_strays
 
 NEIGHBORS = 12  # links of a site
+SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
 
 
@@ -55,11 +56,15 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
-    """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan."""
+    """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
+
+    More points of each site count than while nodes are still on their way.
+    """
     surface = sites.surface
     radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
     scale = surface.scale.copy()
     scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
+    scale[3] = ALL
     return surface._replace(scale=scale)
 
 
@@ -117,7 +122,7 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float,
     smoothed = np.empty_like(normals)
     kernels.smooth_normals(normals, neighbors, 0.7, smoothed)
     _face_outside(mean, smoothed, piece)
-    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), 24.0, max(radius, 1.3 * spacing)])
+    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
     piece = _number(piece)
