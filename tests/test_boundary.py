@@ -6,6 +6,7 @@ from shapes import make
 from small_clouds import ball, cap, ring, sheet, tire, turn_of
 
 import scantruss as st
+from scantruss.boundary import _onwards as onwards
 from scantruss.boundary import boundary_nodes
 
 
@@ -210,6 +211,18 @@ def test_corners_of_known_shapes(name):
         for corner in shape.corners:
             assert np.linalg.norm(boundary.corners + origin - corner, axis=1).min() < 0.1 * shape.length
         assert len(boundary.external[0].corners) == len(shape.corners)
+
+
+def test_boundary_points_do_not_go_back_and_forth():
+    a, b, c, d = np.eye(4)[:, :3]
+    assert onwards(np.array([a, b, c, d])) == [0, 1, 2, 3]
+    assert onwards(np.array([a, b, a, c, d, c])) == [0, 3]
+    assert onwards(np.array([a, b, a, b, d])) == [0, 3, 4]
+    assert onwards(np.array([a, a, a, b])) == [0, 3]
+    many = np.random.default_rng(0).normal(size=(300, 3))
+    order = np.array([k + step for k in range(299) for step in (0, 1, 0)])
+    kept = order[onwards(many[order])]
+    assert (np.diff(kept) > 0).all()
 
 
 def test_the_rim_for_the_kernels_is_made_of_the_loops():

@@ -21,6 +21,7 @@ SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member length
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
+BACK = 16  # steps within which a boundary point that is touched again was never left
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
 
@@ -210,8 +211,22 @@ def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: flo
         ahead = np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
         kernels.touch_points(surface, places, ahead, near, radius, touched)
         places = _smooth_turns(touched)
+    touched = touched[_onwards(touched)]
     forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
     return touched[forward]
+
+
+def _onwards(touched: np.ndarray) -> list[int]:
+    """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
+    _, number = np.unique(touched, axis=0, return_inverse=True)
+    number, ahead = number.ravel(), np.zeros(len(touched), np.int64)
+    for k in range(1, BACK + 1):
+        ahead[:-k][number[:-k] == number[k:]] = k
+    kept, at = [], 0
+    while at < len(touched):
+        kept.append(at)
+        at += int(ahead[at]) + 1
+    return kept
 
 
 def _around(turns: np.ndarray) -> float:
