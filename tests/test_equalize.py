@@ -12,6 +12,7 @@ from scantruss.kernels import equalize as kernels
 from scantruss.kernels import rim as curves
 from scantruss.kernels import search
 from scantruss.kernels.grid import INTERIOR, REST, may_collapse, may_flip, may_split
+from scantruss.kernels.trial import total_energy
 
 MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
 
@@ -38,7 +39,7 @@ def test_the_slope_of_the_energy_agrees_with_differences():
 def test_the_energy_agrees_with_plain_loops(rough):
     relief = rough.relief()
     scratch = new_scratch(relief)
-    energy, mean, count = search.total_energy(relief.net, scratch, rough.settings.length, 1.7)
+    energy, mean, count = total_energy(relief.net, scratch, rough.settings.length, 1.7)
     assert energy == pytest.approx(naive.energy(rough.grid, rough.settings.length, 1.7))
     assert mean == pytest.approx(rough.grid.lengths.mean()) and count == len(rough.grid.nodes)
 
@@ -49,7 +50,7 @@ def test_a_fold_counts(rough):
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
     net.nodes[v] += 3.0 * (net.nodes[net.ring[v, 0]] - net.nodes[v])
     grid = rough.grid.replace(nodes=net.nodes[: len(rough.grid.nodes)].copy())
-    energy = search.total_energy(net, new_scratch(relief), length, WEIGHT)[0]
+    energy = total_energy(net, new_scratch(relief), length, WEIGHT)[0]
     assert energy == pytest.approx(naive.energy(grid, length, WEIGHT))
     settle(relief, WEIGHT, 1e-6, 60)
     healed = relief.to_grid(rough.grid)
@@ -60,10 +61,10 @@ def test_settling_never_raises_the_energy(rough):
     relief = rough.relief()
     scratch, length = new_scratch(relief), rough.settings.length
     at_rest = relief.net.nodes[relief.net.kind >= REST].copy()
-    before = search.total_energy(relief.net, scratch, length, WEIGHT)[0]
+    before = total_energy(relief.net, scratch, length, WEIGHT)[0]
     for _ in range(4):
         settle(relief, WEIGHT, 0.0, 3)
-        after = search.total_energy(relief.net, scratch, length, WEIGHT)[0]
+        after = total_energy(relief.net, scratch, length, WEIGHT)[0]
         assert after <= before + 1e-9
         before = after
     assert np.array_equal(at_rest, relief.net.nodes[relief.net.kind >= REST])
@@ -99,7 +100,7 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
 
 def stated_energy(relief, scratch):
     """The energy that the search lowers, but for the share of each node."""
-    energy, mean, count = search.total_energy(relief.net, scratch, relief.length, WEIGHT)
+    energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
     return energy + PRICE * count * (mean / relief.length - 1) ** 2 - 0.1 * count
 
 
@@ -121,12 +122,12 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     net, rng = relief.net, np.random.default_rng(seed)
     net.nodes[: net.used] += 0.6 * relief.length * rng.uniform(-1, 1, (net.used, 3))
     scratch = new_scratch(relief)
-    before = search.total_energy(net, scratch, relief.length, WEIGHT)[0]
+    before = total_energy(net, scratch, relief.length, WEIGHT)[0]
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
                 search.try_move(net, relief.patches, relief.rim, scratch, search.FLIP, v, u, relief.length, WEIGHT, 0.0)
-                after = search.total_energy(net, scratch, relief.length, WEIGHT)[0]
+                after = total_energy(net, scratch, relief.length, WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after
     assert scratch.counter[2] > 10

@@ -7,7 +7,8 @@ from rough import rough_disc, rough_sphere, same_topology
 from scantruss.grid.equalize import WEIGHT, new_journal, new_scratch, settle
 from scantruss.kernels import glide as kernels
 from scantruss.kernels.grid import may_flip, wings
-from scantruss.kernels.search import FLIP, disorder, total_energy
+from scantruss.kernels.search import FLIP, disorder
+from scantruss.kernels.trial import total_energy
 
 pytestmark = pytest.mark.kernels
 

@@ -14,23 +14,20 @@ import numpy as np
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
 from ..kernels.glide import Journal, glide
-from ..kernels.search import Scratch, search, suit_nodes, total_energy
+from ..kernels.search import search, suit_nodes
+from ..kernels.trial import Scratch, total_energy
 from .flips import FOLD, ROUNDS
 from .grid import Grid
 from .quality import shape_qualities
 from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
-EVEN = {
-    "balance": 2.0,
-    "lengths": 8.0,
-    "shapes": 0.5,
-}  # the same in the last sweeps, which no longer change the topology
+EVEN = {"balance": 2.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
 PRICE = 18.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
-GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}  # rounds, most flips of a chain, and the
-# energy above the old one at which a chain is given up
+# rounds of chains, most flips of a chain, growth of the energy at which a chain is given up
+GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
@@ -51,6 +48,12 @@ def settle(relief: Relief, weight: float, enough: float, sweeps: int) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made."""
     awake = np.ones(len(relief.net.degree), np.int64)
     return settle_all(relief.net, relief.patches, relief.rim, awake, relief.length, weight, enough, sweeps)
+
+
+def settle_again(relief: Relief) -> None:
+    """Settle after a round of moves: the nodes have left the middles of their patches."""
+    relief.renew(FAR)
+    settle(relief, WEIGHT, 1e-4, 8)
 
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
@@ -92,26 +95,23 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None, ef
             progress(0.2 + 0.6 * done / (SEARCHES + rounds))
         if search_once(relief, scratch) == 0:
             break
-        relief.renew(FAR)
-        settle(relief, WEIGHT, 1e-4, 8)
+        settle_again(relief)
     journal = new_journal(relief)
     for done in range(rounds):
         if progress:
             progress(0.2 + 0.6 * (SEARCHES + done) / (SEARCHES + rounds))
         kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, links, hope)
         for _ in range(2):
-            relief.renew(FAR)
-            settle(relief, WEIGHT, 1e-4, 8)
+            settle_again(relief)
             kept += search_once(relief, scratch)
-        relief.renew(FAR)
-        settle(relief, WEIGHT, 1e-4, 8)
+        settle_again(relief)
         if kept == 0:
             break
 
 
 def finish(relief: Relief, prefer: str = "balance") -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
-    for sweeps in (20, 20):
+    for _ in range(2):
         relief.renew(NEAR)
-        settle(relief, EVEN[prefer], 1e-5, sweeps)
+        settle(relief, EVEN[prefer], 1e-5, 20)
     relief.return_to_scan(NEAR)

@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import InputError
 from ..kernels.grid import REST, RIM, may_split, split
 from ..kernels.rim import nearest_on_rim
-from ..kernels.search import TRIED, Scratch, total_energy
 from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
+from ..kernels.trial import TRIED, Scratch, total_energy
 from ..scan.cloud import PointCloud
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief

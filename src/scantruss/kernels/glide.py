@@ -10,7 +10,8 @@ from .compile import kernel
 from .equalize import settle_node
 from .grid import DEGREE, IDEAL, OPEN, Net, flip, may_flip, wings
 from .rim import Rim
-from .search import EARLY, FLIP, STILL, SWEEPS, TRIED, Scratch, disorder, gather, local_energy, put_back, restore
+from .search import EARLY, FLIP, STILL, SWEEPS, disorder
+from .trial import TRIED, Scratch, gather, local_energy, put_back, restore
 
 NO_WORSE = 2  # growth of the disorder by a flip of a chain
 CHOICES = 32  # most flips looked at for the next link of a chain

@@ -11,9 +11,7 @@ from .vectors import Vector, along, dot, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
-LINED = (
-    0.75  # spread of points across their main direction, 1 in a disc and 0 on a line, below which they lie on few lines
-)
+LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
 
 
 @kernel

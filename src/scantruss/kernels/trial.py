@@ -1,0 +1,157 @@
+"""Trials: the nodes around an edge, what they were before, and the energy that a trial changes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .compile import kernel
+from .equalize import ROOT
+from .grid import DEGREE, OPEN, Net, wings
+from .vectors import Vector, cross, dot, norm, row, subtract
+
+MARK, TRIED = 0, 1  # columns of `Scratch.note`
+
+
+class Scratch(NamedTuple):
+    """Room for one trial: what is around, and how it was before."""
+
+    note: np.ndarray  #: (C, 2) int64 trial that holds the node; 1 where nothing has changed since it was tried
+    around: np.ndarray  #: (C,) int64 nodes that may move
+    nodes: np.ndarray  #: (C, 4) their places and arcs before
+    ring: np.ndarray  #: (C, W + 1) int64 their rings before; last the number of neighbours
+    counter: np.ndarray  #: (3,) int64 trials made; nodes around; trials that paid
+
+
+@kernel
+def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
+    """List the nodes around the edge a-b: its quadrangle and all their neighbours, as they are now."""
+    scratch.counter[0] += 1
+    stamp = scratch.counter[0]
+    right, left = wings(net, a, b)
+    count = 0
+    for v in (a, b, right, left):
+        if v >= 0 and scratch.note[v, MARK] != stamp:
+            scratch.note[v, MARK] = stamp
+            scratch.around[count] = v
+            count += 1
+    for i in range(count):
+        v = scratch.around[i]
+        for j in range(net.state[v, DEGREE]):
+            u = net.ring[v, j]
+            if scratch.note[u, MARK] != stamp:
+                scratch.note[u, MARK] = stamp
+                scratch.around[count] = u
+                count += 1
+    for i in range(count):
+        v = scratch.around[i]
+        scratch.nodes[i, 0], scratch.nodes[i, 1], scratch.nodes[i, 2] = (
+            net.nodes[v, 0],
+            net.nodes[v, 1],
+            net.nodes[v, 2],
+        )
+        scratch.nodes[i, 3] = net.arc[v]
+        scratch.ring[i, -1] = net.state[v, DEGREE]
+        for j in range(net.state[v, DEGREE]):
+            scratch.ring[i, j] = net.ring[v, j]
+    scratch.counter[1] = count
+
+
+@kernel
+def restore(net: Net, around: np.ndarray, nodes: np.ndarray, ring: np.ndarray, count: int) -> None:
+    """Put back the first `count` nodes of a list as they were written down."""
+    for i in range(count):
+        v = around[i]
+        for c in range(3):
+            net.nodes[v, c] = nodes[i, c]
+        net.arc[v] = nodes[i, 3]
+        net.state[v, DEGREE] = ring[i, -1]
+        for j in range(ring[i, -1]):
+            net.ring[v, j] = ring[i, j]
+
+
+@kernel
+def put_back(net: Net, scratch: Scratch) -> None:
+    """Undo a trial: all around as it was."""
+    restore(net, scratch.around, scratch.nodes, scratch.ring, scratch.counter[1])
+
+
+@kernel
+def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
+    """Whether triangle (v, a, b) of this normal is folded over a-b, a member with no end in the neighbourhood that v is of."""
+    beyond = wings(net, a, b)[0]
+    if beyond < 0 or (beyond < v and scratch.note[beyond, MARK] == scratch.counter[0]):
+        return False  # the rim, or counted from the other side
+    p = row(net.nodes, a)
+    other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
+    return dot(normal, other) < 0.0
+
+
+@kernel
+def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> float:
+    """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
+
+    A member is folded where its two triangles meet at less than 90 degrees; those with only a triangle in the neighbourhood count
+    too, or trials beside each other could lower the energy of both in turn for ever.
+    """
+    nodes, note, stamp = net.nodes, scratch.note, scratch.counter[0]
+    energy = 0.0
+    for k in range(scratch.counter[1]):
+        v = scratch.around[k]
+        d = net.state[v, DEGREE]
+        if d == 0:
+            continue
+        closed = net.state[v, OPEN] == 0
+        w = net.ring[v, d - 2 if closed else d - 1]
+        cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
+        cc = cx * cx + cy * cy + cz * cz
+        inside = note[w, MARK] == stamp
+        ux = uy = uz = 0.0
+        for at in range(-1 if closed else 0, d):
+            bx, by, bz, bb, before, was_inside = cx, cy, cz, cc, w, inside
+            tx, ty, tz = ux, uy, uz  # the triangle before
+            w = net.ring[v, at if at >= 0 else d - 1]
+            inside = note[w, MARK] == stamp
+            skipped, counted = was_inside and before < v, inside and w < v
+            cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
+            cc = cx * cx + cy * cy + cz * cz
+            if at >= 0 and not counted:
+                stretch = math.sqrt(cc) / length - 1.0
+                energy += weight * stretch * stretch
+            if at == 0 and not closed:
+                continue
+            ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+            if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
+                energy += 1.0
+            if skipped or counted or at < 0:
+                continue
+            ex, ey, ez = cx - bx, cy - by, cz - bz
+            squares = bb + cc + ex * ex + ey * ey + ez * ez
+            energy += 1.0
+            if squares > 0.0:
+                energy -= 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
+            if not inside and not was_inside and folds_outwards(net, scratch, v, before, w, (ux, uy, uz)):
+                energy += 1.0
+    return energy
+
+
+@kernel
+def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
+    """Energy of the whole grid, mean length of its members, and its nodes."""
+    scratch.counter[0] += 1
+    count = members = 0
+    total = 0.0
+    for v in range(net.free[-1]):
+        if net.state[v, DEGREE] > 0:
+            scratch.note[v, MARK] = scratch.counter[0]
+            scratch.around[count] = v
+            count += 1
+            for i in range(net.state[v, DEGREE]):
+                u = net.ring[v, i]
+                if v < u:
+                    members += 1
+                    total += norm(subtract(row(net.nodes, u), row(net.nodes, v)))
+    scratch.counter[1] = count
+    return local_energy(net, scratch, length, weight), total / max(members, 1), count
