@@ -7,15 +7,14 @@ import numpy as np
 from .settings import Settings
 
 STEP = 0.05  # distance of the points of a boundary curve, in member lengths
-ROUND = (
-    0.15,
-    0.4,
-)  # what lies nearer to a corner is rounded off by the scan and the disc, in member lengths; a sharp one by more
+ROUND = 0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
+CUT = 0.4  # the same where the disc has cut off a sharp re-entrant corner
 REACH = 1.4  # part of the curve at each side that tells the place of a corner, in member lengths
 SHORTEST = 0.6  # the same where another corner is near
 SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
 APART = 0.5  # corners nearer to each other are one, in member lengths
 STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
+BENT = 1.3  # a corner turns at most so many times more between the sides as they seem than between quadratics
 SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
 SHARP = 70.0  # or by this angle [degree]
 
@@ -38,33 +37,53 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     at : (C,) int64 points of the curve next to the corners
     places : (C, 3) the corners
     """
-    least, most = round(SHORTEST / STEP), round(REACH / STEP)
-    none = np.zeros(0, np.int64), np.zeros((0, 3))
     if len(curve) < 2 * round(SIGHT[1] / STEP) + 2:
-        return none
+        return np.zeros(0, np.int64), np.zeros((0, 3))
     turn = _turns(curve)
-    half = round(APART / STEP)
-    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
-    usual = min(SHARPER * float(np.median(turn)), SHARP)
-    peaks = np.flatnonzero((turn >= highest) & (turn > max(settings.corner_angle, usual)))
-    peaks = peaks[np.diff(peaks, append=peaks[:1] + len(curve)) > half]
+    enough = max(settings.corner_angle, min(SHARPER * float(np.median(turn)), SHARP))
     found: list[tuple[float, int, np.ndarray]] = []
-    for k, i in enumerate(peaks.tolist()):
-        reaches = []
-        for to in (i - int(peaks[k - 1]), int(peaks[(k + 1) % len(peaks)]) - i):
-            room = to % len(curve) if len(peaks) > 1 else len(curve)
-            reaches.append(min(max(room - round(ROUND[0] / STEP), least), most, len(curve) // 2))
-        for rounded in ROUND if turn[i] > SHARP else ROUND[:1]:
+    peaks = _peaks(turn, enough)
+    for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve)), strict=True):
+        for rounded in (ROUND, CUT) if turn[i] > SHARP else (ROUND,):
             place, angle = _corner(curve, i, reaches, round(rounded / STEP))
-            if angle > max(settings.corner_angle, usual) and np.linalg.norm(place - curve[i]) < APART * settings.length:
+            if angle > enough and np.linalg.norm(place - curve[i]) < APART * settings.length:
                 found.append((angle, i, place))
                 break
+    return _apart(found, APART * settings.length)
+
+
+def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
+    """Places (P,) of a closed curve that turn most within `APART` to both sides, and by more than enough."""
+    half = round(APART / STEP)
+    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
+    peaks = np.flatnonzero((turn >= highest) & (turn > enough))
+    return peaks[np.diff(peaks, append=peaks[:1] + len(turn)) > half]
+
+
+def _reaches(peaks: np.ndarray, count: int) -> list[tuple[int, int]]:
+    """Steps of the curve before and after each peak that tell its place: up to the next one."""
+    reaches = []
+    for k in range(len(peaks)):
+        rooms = (peaks[k] - peaks[k - 1], peaks[(k + 1) % len(peaks)] - peaks[k])
+        before, after = (int(room) % count if len(peaks) > 1 else count for room in rooms)
+        reaches.append((_reach(before, count), _reach(after, count)))
+    return reaches
+
+
+def _reach(room: int, count: int) -> int:
+    """Steps of one side with so much room to the next corner, on a curve of so many steps."""
+    return min(max(room - round(ROUND / STEP), round(SHORTEST / STEP)), round(REACH / STEP), count // 2)
+
+
+def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of corners (angle, point of the curve, place) nearer to each other than a distance the sharpest, in order."""
     kept: list[tuple[int, np.ndarray]] = []
     for _, i, place in sorted(found, key=lambda corner: (-corner[0], corner[1])):
-        if all(np.linalg.norm(place - other) > APART * settings.length for _, other in kept):
+        if all(np.linalg.norm(place - other) > distance for _, other in kept):
             kept.append((i, place))
     kept.sort(key=lambda corner: corner[0])
-    return (np.array([i for i, _ in kept], np.int64), np.array([place for _, place in kept])) if kept else none
+    at, places = [i for i, _ in kept], [place for _, place in kept]
+    return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
 
 
 def _turns(curve: np.ndarray) -> np.ndarray:
@@ -78,10 +97,10 @@ def _turns(curve: np.ndarray) -> np.ndarray:
     return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def _corner(curve: np.ndarray, at: int, reaches: list[int], rounded: int) -> tuple[np.ndarray, float]:
+def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) -> tuple[np.ndarray, float]:
     """Place where the two sides meet near a point of the curve, and the angle between them there [degree].
 
-    The place comes from lines where a side is straight, the angle always from quadratics.
+    Both come from lines where a side is straight; the angle is at most `BENT` times that between quadratics, which tell a bend.
     """
     half = round(APART / STEP)
     centre = at
@@ -96,7 +115,7 @@ def _corner(curve: np.ndarray, at: int, reaches: list[int], rounded: int) -> tup
         centre = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
     cosines = [_cosine(sides[0][k][1], sides[1][k][1]) for k in (0, 1)]
     straight, bent = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).tolist()
-    return place, min(straight, 1.3 * bent)
+    return place, min(straight, BENT * bent)
 
 
 def _cosine(a: np.ndarray, b: np.ndarray) -> float:
