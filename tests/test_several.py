@@ -70,7 +70,7 @@ def test_fronts_that_fail_are_left_out_and_the_fault_of_the_first_is_told(shape,
             raise FrontError(f"fault {len(refused)}")
 
     monkeypatch.setattr(several, "processors", lambda: 1)
-    _, grid = several.several_grids(cloud, boundary, settings, check)
+    _, grid, _ = several.several_grids(cloud, boundary, settings, check)
     assert len(refused) == 3 and grid.topology.manifold
 
     def never(grid):

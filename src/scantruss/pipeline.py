@@ -98,10 +98,10 @@ def grid_from_cloud(
     if settings.effort == "best" and settings.method == "default":
         from .several import several_grids
 
-        front, grid = several_grids(cloud, boundary, settings, check, progress)
-        advanced = found
+        make = several_grids
     else:
-        front, grid, advanced = _first_grid(cloud, boundary, settings, check, progress)
+        make = _first_grid
+    front, grid, advanced = make(cloud, boundary, settings, check, progress)
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -118,7 +118,7 @@ def _first_grid(
     boundary: Boundary,
     settings: Settings,
     check: Callable[[Grid], None],
-    progress: Progress | None,
+    progress: Progress | None = None,
 ) -> tuple[Grid, Grid, float]:
     """Return the front and the grid of the first attempt that passes, and when its front was done."""
     from .front import advance_front
@@ -197,11 +197,11 @@ def check_cover(grid: Grid, sites: Sites, settings: Settings) -> None:
     far = np.empty(len(places), np.bool_)
     count = _find_far(places, grid.nodes, COVER * settings.length, far)
     if count > LEFT_OUT * len(places):
-        raise _stray(grid, places[np.argmax(far)], f"leaves out {count / len(places):.0%} of the scan, for example")
+        raise _astray(grid, places[np.argmax(far)], f"leaves out {count / len(places):.0%} of the scan")
     middles = np.ascontiguousarray(grid.nodes[grid.triangles].mean(axis=1))
     far = np.empty(len(middles), np.bool_)
     if _find_far(middles, places, (ASTRAY + settings.smallest_hole / (2 * math.pi)) * settings.length, far):
-        raise _stray(grid, middles[np.argmax(far)], "leaves the scan")
+        raise _astray(grid, middles[np.argmax(far)], "covers what the scan does not")
 
 
 def _find_far(places: np.ndarray, others: np.ndarray, reach: float, far: np.ndarray) -> int:
@@ -213,12 +213,11 @@ def _find_far(places: np.ndarray, others: np.ndarray, reach: float, far: np.ndar
     return mark_far(places, others, boxes, reach, far)
 
 
-def _stray(grid: Grid, place: np.ndarray, what: str) -> FrontError:
+def _astray(grid: Grid, place: np.ndarray, what: str) -> FrontError:
     """The refusal of a grid that does not lie where the scan does."""
     x, y, z = (place + grid.origin).tolist()
     return FrontError(
-        f"the grid {what} near ({x:.6g}, {y:.6g}, {z:.6g}), so it is not written;"
-        " try another length, or clean the scan of what is not surface",
+        f"the grid {what}, so it is not written; try another length, or clean the scan of what is not surface",
         grid,
         (x, y, z),
     )
@@ -254,18 +253,14 @@ def extent_of(cloud: PointCloud) -> float:
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
-    from .scan.cloud import measure_gap
-
-    low = max(SPACINGS * cloud.spacing, GAPS * measure_gap(cloud.points))
+    low = max(SPACINGS * cloud.spacing, GAPS * cloud.gap)
     return round_length(low, "up"), round_length(extent_of(cloud) / LARGEST, "down")
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
-    from .scan.cloud import measure_gap
-
     low, high = length_range(cloud)
-    wished = max(extent_of(cloud) / USUAL, USUAL_GAPS * measure_gap(cloud.points))
+    wished = max(extent_of(cloud) / USUAL, USUAL_GAPS * cloud.gap)
     return max(round_length(min(wished, high), "nearest"), low)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 from .errors import FrontError
@@ -34,8 +35,10 @@ def several_grids(
     settings: Settings,
     check: Callable[[Grid], None],
     progress: Progress | None = None,
-) -> tuple[Grid, Grid]:
-    """Return the front and the grid of least energy a node out of several; the same for any number of processors.
+) -> tuple[Grid, Grid, float]:
+    """Return the front and the grid of least energy a node out of several, and when the fronts were done.
+
+    The same for any number of processors.
 
     Parameters
     ----------
@@ -48,55 +51,63 @@ def several_grids(
         No front has led to a grid that passes; the fault of the first.
     """
     normal = settings.replace(effort="normal")
-    todo, done = len(FRONTS) + FINALISTS, 0
+    faults: dict[int, FrontError] = {}
 
-    def tick() -> None:
-        nonlocal done
-        done += 1
-        if progress:
-            progress("optimize", done / todo)
+    def advance(number: int) -> Grid | None:
+        method, share = FRONTS[number]
+        own = normal.replace(method=method, length=share * settings.length)
+        return _passed(faults, number, lambda: advance_front(cloud, _own_scratch(boundary), own))
 
-    def first(place: tuple[str, float]) -> tuple[Grid, Grid] | FrontError:
-        own = _own_scratch(boundary)
-        method, share = place
-        try:
-            front = advance_front(cloud, own, normal.replace(method=method, length=share * settings.length))
-            grid = optimize_grid(front, cloud, normal, boundary=own)
-            check(grid)
-        except FrontError as error:
-            return error
-        return front, grid
-
-    def last(pair: tuple[Grid, Grid]) -> tuple[Grid, Grid] | FrontError:
-        front, grid = pair
-        better = optimize_grid(grid, cloud, settings, boundary=_own_scratch(boundary))
-        try:
+    def improve(number: int, grid: Grid, own: Settings) -> Grid | None:
+        def work() -> Grid:
+            better = optimize_grid(grid, cloud, own, boundary=_own_scratch(boundary))
             check(better)
-        except FrontError:
-            return pair
-        return front, better.replace(before=grid.before)
+            return better
 
-    def run(work: Callable[..., object], jobs: Sequence[object]) -> list[tuple[Grid, Grid] | FrontError]:
-        futures = [pool.submit(work, job) for job in jobs]
-        results = []
-        for future in futures:
-            results.append(future.result())
-            tick()
-        return results  # type: ignore[return-value]
+        return _passed(faults, number, work)
 
+    def badness(number: int) -> float:
+        return grid_energy(grids[number], settings.length) / len(grids[number].nodes)
+
+    fronts = _side_by_side(advance, {number: (number,) for number in range(len(FRONTS))}, progress, "front")
+    advanced = perf_counter()
+    if progress:
+        progress("optimize", 0.0)
+    half = (lambda _, share: progress("optimize", 0.5 * share)) if progress else None
+    rest = (lambda _, share: progress("optimize", 0.5 + 0.5 * share)) if progress else None
+    grids = _side_by_side(improve, {n: (n, front, normal) for n, front in fronts.items()}, half, "optimize")
+    if not grids:
+        raise faults[min(faults)]
+    best = sorted(grids, key=badness)[:FINALISTS]
+    for number, better in _side_by_side(improve, {n: (n, grids[n], settings) for n in best}, rest, "optimize").items():
+        grids[number] = better.replace(before=grids[number].before)
+    chosen = min(best, key=badness)
+    return fronts[chosen], grids[chosen], advanced
+
+
+def _passed(faults: dict[int, FrontError], number: int, work: Callable[[], Grid]) -> Grid | None:
+    """What the work returns; None, and its fault written down, where it refuses."""
+    try:
+        return work()
+    except FrontError as error:
+        faults[number] = error
+        return None
+
+
+def _side_by_side(
+    work: Callable[..., Grid | None], jobs: dict[int, tuple[object, ...]], progress: Progress | None, stage: str
+) -> dict[int, Grid]:
+    """Do the work for each job on all processors; return the grids that came out, in the order of the jobs."""
+    done: dict[int, Grid] = {}
     with ThreadPoolExecutor(processors()) as pool:
-        found = run(first, FRONTS)
-        pairs = [pair for pair in found if not isinstance(pair, FrontError)]
-        if not pairs:
-            assert isinstance(found[0], FrontError)
-            raise found[0]
-        pairs.sort(key=lambda pair: _badness(pair[1], settings.length))
-        finals = [pair for pair in run(last, pairs[:FINALISTS]) if not isinstance(pair, FrontError)]
-    return min(finals, key=lambda pair: _badness(pair[1], settings.length))
-
-
-def _badness(grid: Grid, length: float) -> float:
-    return grid_energy(grid, length) / len(grid.nodes)
+        futures = {number: pool.submit(work, *arguments) for number, arguments in jobs.items()}
+        for count, (number, future) in enumerate(futures.items(), 1):
+            grid = future.result()
+            if grid is not None:
+                done[number] = grid
+            if progress:
+                progress(stage, count / len(jobs))
+    return done
 
 
 def _own_scratch(boundary: Boundary) -> Boundary:

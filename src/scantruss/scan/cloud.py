@@ -32,6 +32,11 @@ class PointCloud:
         """Typical distance between neighbouring points [scan unit]; measured once."""
         return measure_spacing(self.points)
 
+    @cached_property
+    def gap(self) -> float:
+        """Typical distance to the sixth neighbour [scan unit]; measured once."""
+        return measure_gap(self.points)
+
     @classmethod
     def from_array(cls, points: np.ndarray, unit: str = "", name: str = "") -> PointCloud:
         """Return a cloud from an (N, 3) array; checks shape and values, moves to a local origin.

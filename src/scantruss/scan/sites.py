@@ -18,6 +18,7 @@ from .strays import find_strays, has_strays
 
 NEIGHBORS = 12  # links of a site
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
+HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
 
 
@@ -224,12 +225,8 @@ def check_two_sided(sites: Sites) -> None:
     or overgrown that happens by chance.
     """
     surface = sites.surface
-    if (
-        kernels.head_on_links(
-            surface.mean, surface.normals, surface.neighbors, sites.thickness, 0.15 * surface.scale[4]
-        )
-        >= 40
-    ):
+    smooth = 0.15 * surface.scale[4]
+    if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, sites.thickness, smooth) >= HEAD_ON:
         raise InputError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
         )
