@@ -46,11 +46,11 @@ def _look(points: np.ndarray, distance: float) -> np.ndarray:
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 2.0 * gap, len(points), len(points))
     kernels.put_all(boxes, points, np.arange(len(points)))
     neighbors = np.full((len(points), AROUND), -1, np.int64)
-    near, far = 1.5 * gap, 0.5 * FAR * gap
+    near, far = 1.5 * gap, FAR * gap
     in_parts(
         len(points), 3000, lambda _, begin, end: kernels.nearest_sites(points, boxes, near, far, neighbors, begin, end)
     )
     last = neighbors[:, -1]
     reach = np.where(last >= 0, np.linalg.norm(points[last] - points, axis=1), np.inf)
     usual = np.median(np.where(neighbors >= 0, reach[neighbors], np.inf), axis=1)
-    return (reach > distance * usual) | (reach > FAR * gap)
+    return (reach > distance * usual) | (reach > far)
