@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from .kernels import front as lists
 from .kernels import gaps
 from .kernels.boxes import new_boxes
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from .kernels.triangles import quality
+from .rows import STRAIGHT, Rows, lay_rows
 from .scan.cloud import PointCloud
 from .scan.sites import Sites
 from .settings import Settings
@@ -23,16 +26,33 @@ Progress = Callable[[str, float], None]
 
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
 GAP = 60  # gaps with more segments stay open
+CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 
 def advance_front(
-    cloud: PointCloud, boundary: Boundary, settings: Settings, *, progress: Progress | None = None
+    cloud: PointCloud,
+    boundary: Boundary,
+    settings: Settings,
+    *,
+    rows: Rows | None = STRAIGHT,
+    progress: Progress | None = None,
 ) -> Grid:
-    """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4)."""
+    """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4).
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    boundary : Boundary
+    settings : Settings
+    rows : Rows, optional
+        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does.
+    progress : callable, optional
+        Called with ("front", share); may raise to stop.
+    """
     sites = boundary.sites
     front = new_front(sites, settings)
-    front = start_front(front, boundary, settings)
+    start_front(front, boundary, settings, None if settings.method == "paper" else rows)
     numbers = np.array(
         [
             settings.length,
@@ -117,24 +137,27 @@ def grown(front: lists.Front) -> lists.Front:
     larger.count[:] = front.count
     larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
     for n in range(int(front.count[lists.NODES])):
-        if front.corner[n] >= 0 or front.out[n] >= 0:  # the others were merged away
+        if front.site[n] >= 0:  # the others were merged away
             boxing.put(boxes, n, *larger.nodes[n])
     return larger
 
 
-def start_front(front: lists.Front, boundary: Boundary, settings: Settings) -> lists.Front:
-    """Put the initial front into the lists: the boundary loops, and a seed triangle on every closed piece."""
+def start_front(front: lists.Front, boundary: Boundary, settings: Settings, rows: Rows | None = None) -> None:
+    """Put the initial front into the lists: the boundary loops, the nodes of rows, a seed triangle on every closed piece."""
     surface = boundary.sites.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
+    if rows is not None:
+        lists.offer_nodes(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
     piece = boundary.sites.piece
     for number in boundary.sites.pieces:
         if number not in bounded:
-            add_seed(front, surface, int(np.flatnonzero(piece == number)[0]), settings.length)
-    return front
+            site = int(np.flatnonzero(piece == number)[0])
+            ids = seed_of_rows(front, surface, site, settings.length)
+            add_seed(front, ids or new_seed(front, surface, site, settings.length))
 
 
 def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarray, state: int) -> None:
@@ -155,8 +178,33 @@ def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarr
         lists.link(front, s, segments[(i + 1) % len(ids)])
 
 
-def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> None:
-    """Add a seed triangle on a closed piece, and the front around it."""
+def add_seed(front: lists.Front, ids: list[int]) -> None:
+    """Add a seed triangle of three nodes, and the front around it."""
+    lists.add_triangle(front, *ids)
+    segments = [lists.add_segment(front, ids[j], ids[i], lists.ACTIVE) for i, j in ((0, 1), (2, 0), (1, 2))]
+    for i, s in enumerate(segments):
+        lists.link(front, s, segments[(i + 1) % 3])
+
+
+def seed_of_rows(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+    """Return three nodes of the rows near a site that make a good triangle; none where the rows do not offer them."""
+    count = int(front.count[lists.NODES])
+    free = np.flatnonzero(front.out[:count] < 0)
+    away = np.linalg.norm(front.nodes[free] - surface.mean[site], axis=1)
+    near = free[np.argsort(away, kind="stable")[:12]]
+    near = near[(front.normals[near] @ surface.normals[site] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
+    best, ids = 0.8, []
+    for a, b, c in combinations(near.tolist(), 3):
+        pa, pb, pc = (tuple(front.nodes[q].tolist()) for q in (a, b, c))
+        value = quality(pa, pb, pc, length, 0.5, 0.5)
+        if value > best:
+            turned = np.dot(np.cross(np.subtract(pb, pa), np.subtract(pc, pa)), surface.normals[site]) < 0
+            best, ids = value, [a, c, b] if turned else [a, b, c]
+    return ids
+
+
+def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+    """Add three nodes of a regular triangle around a site."""
     patch = np.zeros(PATCH)
     centre = surface.mean[site]
     fit_patch(surface, patch, site, tuple(centre))
@@ -174,10 +222,7 @@ def add_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
         near = walk(surface, int(own[15]), foot)
         ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
         lists.add_node(front)
-    lists.add_triangle(front, *ids)
-    segments = [lists.add_segment(front, ids[j], ids[i], lists.ACTIVE) for i, j in ((0, 1), (2, 0), (1, 2))]
-    for i, s in enumerate(segments):
-        lists.link(front, s, segments[(i + 1) % 3])
+    return ids
 
 
 def run(

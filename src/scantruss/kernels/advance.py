@@ -41,6 +41,9 @@ from .triangles import quality, turned
 from .vectors import Vector, along, norm, row, subtract
 
 
+NEW = 1.0
+
+
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
     """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
@@ -92,7 +95,7 @@ def choose_by_quality(
     score = np.full(near + 1, -1.0)
     for i in range(near):
         q = found[i]
-        if front.out[q] < 0:
+        if front.out[q] < 0 and front.corner[q] >= 0:
             continue
         pq = row(front.nodes, q)
         value = quality(pa, pb, pq, side, numbers[SHAPE], numbers[SIZE])
@@ -100,11 +103,12 @@ def choose_by_quality(
             if (q == c and alpha < widest) or (q == d and beta < widest):
                 score[i] = value
         elif norm(subtract(pq, place)) < around:
-            score[i] = 0.9 * value
+            if front.out[q] >= 0 or far_from_front(front, s, q, pq, found, near, 0.5 * numbers[NEARNESS] * length, length):
+                score[i] = 0.9 * value if front.out[q] >= 0 else 0.95 * value
     if propose_on_surface(surface, front, s, place, patch):
         pp = row(front.nodes, front.count[NODES])
-        if far_from_front(front, s, pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1, length):
-            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
+        if far_from_front(front, s, front.count[NODES], pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1, length):
+            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE]) * NEW
     for _ in range(near + 1):
         best = -1
         for i in range(near + 1):

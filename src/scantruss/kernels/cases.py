@@ -211,7 +211,7 @@ def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
         front.corner_next[at] = front.corner[keep]
         front.corner[keep] = at
         at = following
-    front.corner[lose] = -1
+    front.corner[lose] = front.site[lose] = -1
     s = front.out[lose]
     while s >= 0:
         following = front.out_next[s]
@@ -332,7 +332,7 @@ def new_node(
         return False
     p = front.count[NODES]
     pp = row(front.nodes, p)
-    if far_from_front(front, s, pp, found, near, numbers[NEARNESS] * numbers[LENGTH], numbers[LENGTH]):
+    if far_from_front(front, s, p, pp, found, near, numbers[NEARNESS] * numbers[LENGTH], numbers[LENGTH]):
         good, passage = fits(front, s, p, found, near, numbers[LENGTH], 0.7)
         if good:
             add_node(front)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .boxes import SearchBoxes, put, search
 from .compile import kernel
-from .surface import Surface, linked
+from .surface import Surface, linked, walk
 from .triangles import (
     angle_from,
     distance_to_segment,
@@ -54,6 +54,15 @@ class Front(NamedTuple):
     boxes: SearchBoxes  #: the nodes by box
 
 
+class RowNodes(NamedTuple):
+    """Nodes of the rows that the scan is laid out in, for the front to come to."""
+
+    places: np.ndarray  #: (K, 3)
+    normals: np.ndarray  #: (K, 3) outer normals of the surface there
+    sites: np.ndarray  #: (K,) int64 a site near each
+    length: float
+
+
 @kernel
 def propose_node(front: Front, place: Vector, normal: Vector, site: int, on_boundary: bool) -> int:
     """Write down the node that may come next, without adding it; returns its number."""
@@ -74,6 +83,30 @@ def add_node(front: Front) -> None:
     n = front.count[NODES]
     front.count[NODES] += 1
     put(front.boxes, n, front.nodes[n, 0], front.nodes[n, 1], front.nodes[n, 2])
+
+
+@kernel
+def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) -> None:
+    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
+    found = np.empty(NEAR, np.int64)
+    begun = front.count[NODES]
+    for i in range(len(rows.places)):
+        if front.count[NODES] + 2 > len(front.nodes):
+            break
+        place, normal = row(rows.places, i), row(rows.normals, i)
+        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
+        room = True
+        for k in range(near):
+            q = found[k]
+            if q < begun and front.out[q] >= 0 and dot(normal, row(front.normals, q)) > 0.0:
+                s = front.out[q]
+                while s >= 0:
+                    away = distance_to_segment(place, row(front.nodes, q), row(front.nodes, front.head[s]))
+                    room = room and away > clear
+                    s = front.out_next[s]
+        if room:
+            propose_node(front, place, normal, walk(surface, rows.sites[i], place), False)
+            add_node(front)
 
 
 @kernel
@@ -316,7 +349,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
         if _sector(front, front.next[after], a) >= 9.0:
             return False, -1
     else:
-        if p < front.count[NODES]:
+        if p < front.count[NODES] and front.out[p] >= 0:
             passage = passage_of(front, s, p)
             if passage < 0:
                 return False, -1
@@ -366,7 +399,7 @@ def clear_of_front(
 
 
 @kernel
-def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float) -> bool:
+def far_from_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float) -> bool:
     """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
@@ -375,7 +408,7 @@ def far_from_front(front: Front, s: int, pp: Vector, found: np.ndarray, near: in
             if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
                 return False
             t = front.out_next[t]
-        if i < near and norm(subtract(pp, row(front.nodes, q))) < (
+        if i < near and q != p and norm(subtract(pp, row(front.nodes, q))) < (
             least if front.out[q] >= 0 else max(least, 0.45 * length)
         ):
             return False

@@ -1,0 +1,123 @@
+"""Rows for the front to advance in: nodes of a lattice that follows a smooth direction field of the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .boundary import Boundary, Loop, boundary_nodes
+from .kernels import rows as kernels
+from .kernels.front import RowNodes
+from .kernels.rows import Posts
+from .kernels.surface import Surface
+
+APART = 0.4  # distance of the posts, in member lengths
+COARSER = 2.0  # how much farther apart the posts of the next level are
+FEWEST = 12  # posts of the coarsest level
+LINKS = 12  # links of a post
+PASSES = 6  # of smoothing, on each level
+WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
+DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How rows are laid."""
+
+    turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
+
+
+STRAIGHT = Rows()
+
+
+def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
+    """Return the nodes of rows of a length [scan unit], for a front to come to."""
+    levels, owners = make_levels(boundary.sites.surface, length)
+    start, direction, node = first_row(boundary, length, rows.turn)
+    for owner in owners:
+        start = int(owner[start])
+    kernels.lay_first(levels[-1], start, direction, node, length, np.empty(len(levels[-1].mean), np.int64))
+    for smooth in (_smooth_directions, kernels.smooth_lattice):
+        for k in range(len(levels) - 1, -1, -1):
+            if k < len(levels) - 1:
+                kernels.hand_down(levels[k + 1], owners[k + 1], levels[k], length)
+            smooth(levels[k], length, PASSES)
+    return _chosen(levels[0], owners[0], length)
+
+
+def _smooth_directions(posts: Posts, _: float, passes: int) -> None:
+    kernels.smooth_directions(posts, passes)
+
+
+def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
+    """Nodes of the finest posts, each once: those nearest to their posts first."""
+    away = ((posts.node - posts.mean) ** 2).sum(axis=1)
+    order = np.argsort(away, kind="stable")
+    order = order[away[order] < (WITHIN * length) ** 2]
+    chosen, scratch = np.empty(len(away), np.int64), np.full((3, len(away)), -1, np.int64)
+    scratch[0] = 0
+    chosen = chosen[: kernels.list_nodes(posts, order, length, DISTANCE * length, chosen, scratch)]
+    first = np.empty(len(away), np.int64)
+    first[owner[::-1]] = np.arange(len(owner) - 1, -1, -1)
+    return RowNodes(posts.node[chosen], posts.normals[chosen], first[chosen], length)
+
+
+def make_levels(surface: Surface, length: float) -> tuple[list[Posts], list[np.ndarray]]:
+    """Return posts from fine to coarse, and for each level the post of each place of the level below (sites at first)."""
+    mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
+    levels: list[Posts] = []
+    owners: list[np.ndarray] = []
+    radius = APART * length
+    while True:
+        owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
+        count = kernels.choose_posts(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
+        if levels and (count < FEWEST or count > 0.8 * len(mean)):
+            return levels, owners
+        posts = Posts(
+            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS), -1, np.int64),
+            np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
+        )  # fmt: skip
+        kernels.link_posts(mean, normals, neighbors, owner, posts)
+        levels.append(posts)
+        owners.append(owner)
+        mean, normals, neighbors = posts.mean, posts.normals, posts.neighbors
+        radius *= COARSER
+
+
+def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, tuple, tuple]:
+    """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
+
+    On a closed surface they start anywhere.
+    """
+    surface = boundary.sites.surface
+    if not boundary.loops:
+        site = int(np.flatnonzero(boundary.sites.piece == boundary.sites.pieces[0])[0])
+        ahead, place = surface.mean[max(surface.neighbors[site, 0], 0)] - surface.mean[site], surface.mean[site]
+    else:
+        loop, at = longest_side(boundary.loops)
+        count = len(loop.points)
+        nodes, _ = boundary_nodes(loop, length)
+        middle = loop.points[at]
+        place = nodes[((nodes - middle) ** 2).sum(axis=1).argmin()]
+        half = min(round(length / np.linalg.norm(loop.points[(at + 1) % count] - middle)), count // 4)
+        ahead = loop.points[(at + half) % count] - loop.points[at - half]
+        site = int(((surface.mean - place) ** 2).sum(axis=1).argmin())
+    normal = surface.normals[site]
+    ahead = ahead - normal * (ahead @ normal)
+    angle = np.radians(turn)
+    ahead = np.cos(angle) * ahead + np.sin(angle) * np.cross(normal, ahead)
+    return site, tuple(ahead.tolist()), tuple(place.tolist())
+
+
+def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
+    """Return the loop that has the longest side between two corners, and the point in the middle of that side."""
+    best, found = -1.0, (loops[0], 0)
+    for loop in loops:
+        ends = loop.corner_at if len(loop.corner_at) else np.zeros(1, np.int64)
+        sides = np.diff(ends, append=ends[:1] + len(loop.points))
+        longest = int(sides.argmax())
+        share = loop.length * sides[longest] / len(loop.points)
+        if share > best:
+            best, found = share, (loop, int(ends[longest] + sides[longest] // 2) % len(loop.points))
+    return found
