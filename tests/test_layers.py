@@ -13,6 +13,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
     ("corners",),
     ("boundary",),
+    ("rows",),
     ("front",),
     ("grid",),
     ("several",),

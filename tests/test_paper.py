@@ -211,7 +211,7 @@ def test_section_3_4_step_2_half_a_length_is_the_limit(height, far):
     hand = HandFront(square(5))
     near = hand.near(AB)
     place = three(1.5, height)
-    assert lists.far_from_front(hand.front, AB, place, hand.found, near, 0.5 * 1.0, 1.0) == far
+    assert lists.far_from_front(hand.front, AB, -1, place, hand.found, near, 0.5 * 1.0, 1.0) == far
 
 
 @pytest.mark.kernels

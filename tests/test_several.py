@@ -59,7 +59,7 @@ def test_progress_grows_to_the_end(shape):
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
-def test_fronts_that_fail_are_left_out_and_the_fault_of_the_first_is_told(shape, monkeypatch):
+def test_fronts_that_fail_are_left_out_and_the_fault_of_the_best_is_told(shape, monkeypatch):
     cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length, effort="best")
     boundary = st.find_boundary(cloud, settings)
     refused = []

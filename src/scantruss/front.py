@@ -17,7 +17,7 @@ from .kernels import gaps
 from .kernels.boxes import new_boxes
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
-from .rows import STRAIGHT, Rows, lay_rows
+from .rows import STRAIGHT, Rows, lay_rows, nodes_at
 from .scan.cloud import PointCloud
 from .scan.sites import Sites
 from .settings import Settings
@@ -27,6 +27,7 @@ Progress = Callable[[str, float], None]
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
 GAP = 60  # gaps with more segments stay open
 CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
+NEARER = 0.35  # the same for an appointed position
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 
@@ -52,7 +53,11 @@ def advance_front(
     """
     sites = boundary.sites
     front = new_front(sites, settings)
-    start_front(front, boundary, settings, None if settings.method == "paper" else rows)
+    if settings.method == "paper":
+        front = start_front(front, boundary, settings)
+    else:
+        positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
+        front = start_front(front, boundary, settings, rows, positions)
     numbers = np.array(
         [
             settings.length,
@@ -142,15 +147,26 @@ def grown(front: lists.Front) -> lists.Front:
     return larger
 
 
-def start_front(front: lists.Front, boundary: Boundary, settings: Settings, rows: Rows | None = None) -> None:
-    """Put the initial front into the lists: the boundary loops, the nodes of rows, a seed triangle on every closed piece."""
+def start_front(
+    front: lists.Front,
+    boundary: Boundary,
+    settings: Settings,
+    rows: Rows | None = None,
+    positions: np.ndarray | None = None,
+) -> lists.Front:
+    """Put the initial front into the lists: the boundary loops, nodes that it may come to, a seed triangle on every closed piece.
+
+    Those nodes are the appointed positions (K, 3) and the nodes of rows.
+    """
     surface = boundary.sites.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
+    if positions is not None:
+        front = offer(front, surface, nodes_at(positions, surface, settings.length), NEARER * settings.length)
     if rows is not None:
-        lists.offer_nodes(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
+        front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
     piece = boundary.sites.piece
     for number in boundary.sites.pieces:
@@ -158,6 +174,15 @@ def start_front(front: lists.Front, boundary: Boundary, settings: Settings, rows
             site = int(np.flatnonzero(piece == number)[0])
             ids = seed_of_rows(front, surface, site, settings.length)
             add_seed(front, ids or new_seed(front, surface, site, settings.length))
+    return front
+
+
+def offer(front: lists.Front, surface: Surface, nodes: lists.RowNodes, clear: float) -> lists.Front:
+    """Offer nodes to a front, which grows until there is room for them."""
+    while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
+        front = grown(front)
+    lists.offer_nodes(front, surface, nodes, clear)
+    return front
 
 
 def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarray, state: int) -> None:

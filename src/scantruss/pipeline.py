@@ -95,13 +95,7 @@ def grid_from_cloud(
         check_boundary(grid, boundary)
         check_cover(grid, boundary.sites, settings)
 
-    if settings.effort == "best" and settings.method == "default":
-        from .several import several_grids
-
-        make = several_grids
-    else:
-        make = _first_grid
-    front, grid, advanced = make(cloud, boundary, settings, check, progress)
+    front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -113,21 +107,31 @@ def grid_from_cloud(
     return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
 
 
-def _first_grid(
+def _checked_grid(
     cloud: PointCloud,
     boundary: Boundary,
     settings: Settings,
     check: Callable[[Grid], None],
     progress: Progress | None = None,
 ) -> tuple[Grid, Grid, float]:
-    """Return the front and the grid of the first attempt that passes, and when its front was done."""
+    """Return the front and the grid of the first attempt that passes, and when its front was done.
+
+    Method "default" begins with fronts that come to rows, several of them for an effort above quick.
+    """
     from .front import advance_front
     from .grid.optimize import optimize_grid
+    from .several import several_grids
 
     faults = []
+    if settings.method == "default":
+        try:
+            return several_grids(cloud, boundary, settings, check, progress)
+        except FrontError as error:
+            faults.append(error)
     for share in ATTEMPTS:
         try:
-            front = advance_front(cloud, boundary, settings.replace(length=share * settings.length), progress=progress)
+            own = settings.replace(length=share * settings.length)
+            front = advance_front(cloud, boundary, own, rows=None, progress=progress)
             advanced = perf_counter()
             if progress:
                 progress("optimize", 0.0)

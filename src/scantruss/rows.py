@@ -11,6 +11,7 @@ from .kernels import rows as kernels
 from .kernels.front import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
+from .kernels.vectors import Vector
 
 APART = 0.4  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
@@ -18,6 +19,7 @@ FEWEST = 12  # posts of the coarsest level
 LINKS = 12  # links of a post
 PASSES = 6  # of smoothing, on each level
 WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
+CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
 DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
 
 
@@ -26,6 +28,7 @@ class Rows:
     """How rows are laid."""
 
     turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
+    scale: float = 1.0  #: length of their members, in desired lengths
 
 
 STRAIGHT = Rows()
@@ -33,6 +36,7 @@ STRAIGHT = Rows()
 
 def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
     """Return the nodes of rows of a length [scan unit], for a front to come to."""
+    length *= rows.scale * (1.0 if boundary.loops else CLOSED)
     levels, owners = make_levels(boundary.sites.surface, length)
     start, direction, node = first_row(boundary, length, rows.turn)
     for owner in owners:
@@ -85,7 +89,7 @@ def make_levels(surface: Surface, length: float) -> tuple[list[Posts], list[np.n
         radius *= COARSER
 
 
-def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, tuple, tuple]:
+def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:
     """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
 
     On a closed surface they start anywhere.
@@ -107,7 +111,7 @@ def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, tupl
     ahead = ahead - normal * (ahead @ normal)
     angle = np.radians(turn)
     ahead = np.cos(angle) * ahead + np.sin(angle) * np.cross(normal, ahead)
-    return site, tuple(ahead.tolist()), tuple(place.tolist())
+    return site, (*ahead.tolist(),), (*place.tolist(),)
 
 
 def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
@@ -121,3 +125,10 @@ def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
         if share > best:
             best, found = share, (loop, int(ends[longest] + sides[longest] // 2) % len(loop.points))
     return found
+
+
+def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> RowNodes:
+    """Return nodes at appointed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
+    sites = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
+    near = np.linalg.norm(surface.mean[sites] - positions, axis=1) < length
+    return RowNodes(np.ascontiguousarray(positions[near]), surface.normals[sites[near]], sites[near], length)

@@ -1,18 +1,21 @@
-"""Several fronts, the best of their grids kept (`effort` best): what a front leaves decides how regular a grid can become."""
+"""Several fronts, the best of their grids kept: rows laid in other directions meet the boundary better or worse."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from .errors import FrontError
 from .front import advance_front
-from .grid.equalize import grid_energy
-from .grid.optimize import optimize_grid
+from .grid.equalize import energy_of_node, equalize
+from .grid.fixed import check_positions, hold_nodes
+from .grid.optimize import improve_further
+from .grid.relief import Relief
 from .machine import processors
+from .rows import Rows
 from .scan.sites import with_own_scratch
 
 if TYPE_CHECKING:
@@ -22,11 +25,14 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 Progress = Callable[[str, float], None]
+Result = TypeVar("Result")
 
-FRONTS = (  # how the front chooses its triangles, and its length in desired lengths
-    ("default", 1.0), ("paper", 1.0), ("default", 0.97), ("paper", 1.07), ("default", 1.03), ("paper", 0.95),
-)  # fmt: skip
-FINALISTS = 2  # grids that are improved to the end
+WAYS = {  # rows that are tried
+    "quick": (Rows(),),
+    "normal": tuple(Rows(turn) for turn in (0.0, 20.0, 40.0)),
+    "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
+}
+FINALISTS = {"quick": 1, "normal": 1, "best": 4}  # grids that are improved to the end
 
 
 def several_grids(
@@ -48,41 +54,58 @@ def several_grids(
     Raises
     ------
     FrontError
-        No front has led to a grid that passes; the fault of the first.
+        No front has led to a grid that passes; the fault of the best.
     """
-    normal = settings.replace(effort="normal")
+    ways, finalists = WAYS[settings.effort], FINALISTS[settings.effort]
+    positions = check_positions(settings.fixed, cloud, boundary.sites.surface, settings.length)
     faults: dict[int, FrontError] = {}
 
     def advance(number: int) -> Grid | None:
-        method, share = FRONTS[number]
-        own = normal.replace(method=method, length=share * settings.length)
-        return _passed(faults, number, lambda: advance_front(cloud, _own_scratch(boundary), own))
+        return _passed(
+            faults, number, lambda: advance_front(cloud, _own_scratch(boundary), settings, rows=ways[number])
+        )
 
-    def improve(number: int, grid: Grid, own: Settings) -> Grid | None:
+    def improve(front: Grid) -> Relief:
+        surface = with_own_scratch(boundary.sites.surface)
+        relief = Relief.from_grid(front, surface, boundary.rim, boundary.corners, settings.length)
+        hold_nodes(relief, positions)
+        equalize(relief)
+        return relief
+
+    def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
-            better = optimize_grid(grid, cloud, own, boundary=_own_scratch(boundary))
-            check(better)
-            return better
+            improve_further(relief, boundary.sites, positions, settings)
+            grid = relief.to_grid(fronts[number]).replace(settings=settings)
+            check(grid)
+            return grid
 
         return _passed(faults, number, work)
 
-    def badness(number: int) -> float:
-        return grid_energy(grids[number], settings.length) / len(grids[number].nodes)
-
-    fronts = _side_by_side(advance, {number: (number,) for number in range(len(FRONTS))}, progress, "front")
+    fronts = _side_by_side(
+        advance, {number: (number,) for number in range(len(ways))}, _part(progress, "front", 0.0, 1.0)
+    )
     advanced = perf_counter()
     if progress:
         progress("optimize", 0.0)
-    half = (lambda _, share: progress("optimize", 0.5 * share)) if progress else None
-    rest = (lambda _, share: progress("optimize", 0.5 + 0.5 * share)) if progress else None
-    grids = _side_by_side(improve, {n: (n, front, normal) for n, front in fronts.items()}, half, "optimize")
+    reliefs = _side_by_side(
+        improve, {n: (front,) for n, front in fronts.items()}, _part(progress, "optimize", 0.0, 0.5)
+    )
+    order = sorted(reliefs, key=lambda number: energy_of_node(reliefs[number]))
+    grids: dict[int, Grid] = {}
+    for begin in range(0, len(order), finalists):
+        jobs = {number: (number, reliefs[number]) for number in order[begin : begin + finalists]}
+        grids = _side_by_side(finish, jobs, _part(progress, "optimize", 0.5, 1.0))
+        if grids:
+            break
     if not grids:
-        raise faults[min(faults)]
-    best = sorted(grids, key=badness)[:FINALISTS]
-    for number, better in _side_by_side(improve, {n: (n, grids[n], settings) for n in best}, rest, "optimize").items():
-        grids[number] = better.replace(before=grids[number].before)
-    chosen = min(best, key=badness)
-    return fronts[chosen], grids[chosen], advanced
+        raise faults[order[0] if order else 0]
+    best = min(grids, key=lambda number: energy_of_node(reliefs[number]))
+    return fronts[best], grids[best], advanced
+
+
+def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:
+    """Report a share of a part of a stage."""
+    return (lambda share: progress(stage, begin + (end - begin) * share)) if progress else None
 
 
 def _passed(faults: dict[int, FrontError], number: int, work: Callable[[], Grid]) -> Grid | None:
@@ -95,22 +118,28 @@ def _passed(faults: dict[int, FrontError], number: int, work: Callable[[], Grid]
 
 
 def _side_by_side(
-    work: Callable[..., Grid | None], jobs: dict[int, tuple[object, ...]], progress: Progress | None, stage: str
-) -> dict[int, Grid]:
-    """Do the work for each job on all processors; return the grids that came out, in the order of the jobs."""
-    done: dict[int, Grid] = {}
+    work: Callable[..., Result | None],
+    jobs: Mapping[int, tuple[object, ...]],
+    report: Callable[[float], None] | None,
+) -> dict[int, Result]:
+    """Do the work for each job on all processors; return what came out, in the order of the jobs."""
+    done: dict[int, Result] = {}
     with ThreadPoolExecutor(processors()) as pool:
         futures = {number: pool.submit(work, *arguments) for number, arguments in jobs.items()}
-        for count, (number, future) in enumerate(futures.items(), 1):
-            grid = future.result()
-            if grid is not None:
-                done[number] = grid
-            if progress:
-                progress(stage, count / len(jobs))
+        try:
+            for count, (number, future) in enumerate(futures.items(), 1):
+                result = future.result()
+                if result is not None:
+                    done[number] = result
+                if report:
+                    report(count / len(jobs))
+        finally:
+            for future in futures.values():
+                future.cancel()
     return done
 
 
 def _own_scratch(boundary: Boundary) -> Boundary:
-    """The same boundary on a scan with room of its own for look-ups."""
+    """Return the same boundary with room of its own for look-ups."""
     sites = boundary.sites
     return replace(boundary, sites=replace(sites, surface=with_own_scratch(sites.surface)))

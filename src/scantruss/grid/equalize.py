@@ -84,22 +84,32 @@ def grid_energy(grid: Grid, length: float) -> float:
     return WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
 
 
-def equalize(relief: Relief, progress: Callable[[float], None] | None = None, effort: str = "normal") -> None:
-    """Flip, settle, search while it pays, move pairs of irregular nodes: the default way to improve a grid."""
+def energy_of_node(relief: Relief) -> float:
+    """The energy that falls, of an opened grid, for one node: grids of other numbers of nodes can be compared."""
+    energy, mean, count = total_energy(relief.net, new_scratch(relief), relief.length, WEIGHT)
+    return energy / max(count, 1) + PRICE * (mean / relief.length - 1.0) ** 2
+
+
+def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
+    """Flip, settle, and search while it pays: the default way to improve a grid."""
     flip_by_angle(relief.net, FOLD, ROUNDS)
     settle(relief, WEIGHT, 1e-3, 60)
     scratch = new_scratch(relief)
-    rounds, links, hope = GLIDES[effort]
     for done in range(SEARCHES):
         if progress:
-            progress(0.2 + 0.6 * done / (SEARCHES + rounds))
+            progress(0.2 + 0.4 * done / SEARCHES)
         if search_once(relief, scratch) == 0:
             break
         settle_again(relief)
-    journal = new_journal(relief)
+
+
+def move_pairs(relief: Relief, effort: str, progress: Callable[[float], None] | None = None) -> None:
+    """Move pairs of irregular nodes by chains of flips, as long as that pays."""
+    rounds, links, hope = GLIDES[effort]
+    scratch, journal = new_scratch(relief), new_journal(relief)
     for done in range(rounds):
         if progress:
-            progress(0.2 + 0.6 * (SEARCHES + done) / (SEARCHES + rounds))
+            progress(0.6 + 0.2 * done / rounds)
         kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, links, hope)
         for _ in range(2):
             settle_again(relief)

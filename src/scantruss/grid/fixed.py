@@ -117,6 +117,13 @@ def _no_node(place: np.ndarray) -> InputError:
     return InputError(f"the grid has no node that could be moved to {_text(place)}; use a smaller length")
 
 
+def hold_nodes(relief: Relief, positions: np.ndarray) -> None:
+    """Let nodes that stand at appointed positions already rest there: the front has come to them."""
+    for place in positions:
+        if (v := _node_at(relief, place)) >= 0:
+            _put_node(relief, v, place)
+
+
 def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
     """Make a node at each position, by whatever disturbs the grid least.
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.flips import flip_by_angle
-from .equalize import equalize, finish
-from .fixed import check_positions, fix_nearest_nodes, fix_nodes
+from .equalize import equalize, finish, move_pairs
+from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import FOLD, ROUNDS
 from .grid import Grid
 from .relief import Relief
@@ -89,16 +89,35 @@ def improve(
     report: Callable[[float], None] | None = None,
 ) -> None:
     """Improve an opened grid by the method of the settings, make nodes at the positions (K, 3) and land on the scan."""
-    from ..scan.sites import narrow_surface
-
     if settings.method == "paper":
         flip_by_angle(relief.net, FOLD, ROUNDS)
         if len(positions):
             fix_nearest_nodes(relief, positions)
             flip_by_angle(relief.net, FOLD, ROUNDS)
         smooth(relief, settings)
+        land(relief, sites)
     else:
-        equalize(relief, report, settings.effort)
-        fix_nodes(relief, positions)
-        finish(relief, settings.prefer)
+        hold_nodes(relief, positions)
+        equalize(relief, report)
+        improve_further(relief, sites, positions, settings, report)
+
+
+def improve_further(
+    relief: Relief,
+    sites: Sites,
+    positions: np.ndarray,
+    settings: Settings,
+    report: Callable[[float], None] | None = None,
+) -> None:
+    """Improve an equalized grid with the effort of the settings, make the nodes that are still missing, land on the scan."""
+    move_pairs(relief, settings.effort, report)
+    fix_nodes(relief, positions)
+    finish(relief, settings.prefer)
+    land(relief, sites)
+
+
+def land(relief: Relief, sites: Sites) -> None:
+    """Let the nodes down on the scan by patches as narrow as it allows."""
+    from ..scan.sites import narrow_surface
+
     relief.land(*(narrow_surface(sites, points) for points in (40.0, 120.0, np.inf)))

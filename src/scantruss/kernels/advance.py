@@ -41,9 +41,6 @@ from .triangles import quality, turned
 from .vectors import Vector, along, norm, row, subtract
 
 
-NEW = 1.0
-
-
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
     """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
@@ -103,12 +100,23 @@ def choose_by_quality(
             if (q == c and alpha < widest) or (q == d and beta < widest):
                 score[i] = value
         elif norm(subtract(pq, place)) < around:
-            if front.out[q] >= 0 or far_from_front(front, s, q, pq, found, near, 0.5 * numbers[NEARNESS] * length, length):
-                score[i] = 0.9 * value if front.out[q] >= 0 else 0.95 * value
+            if front.out[q] >= 0:
+                score[i] = 0.9 * value
+            elif far_from_front(front, s, q, pq, found, near, 0.5 * numbers[NEARNESS] * length, length):
+                score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
     if propose_on_surface(surface, front, s, place, patch):
         pp = row(front.nodes, front.count[NODES])
-        if far_from_front(front, s, front.count[NODES], pp, found, near, (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1, length):
-            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE]) * NEW
+        if far_from_front(
+            front,
+            s,
+            front.count[NODES],
+            pp,
+            found,
+            near,
+            (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1,
+            length,
+        ):
+            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
     for _ in range(near + 1):
         best = -1
         for i in range(near + 1):

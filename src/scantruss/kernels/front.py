@@ -91,14 +91,13 @@ def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) ->
     found = np.empty(NEAR, np.int64)
     begun = front.count[NODES]
     for i in range(len(rows.places)):
-        if front.count[NODES] + 2 > len(front.nodes):
-            break
         place, normal = row(rows.places, i), row(rows.normals, i)
         near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
         room = True
         for k in range(near):
             q = found[k]
-            if q < begun and front.out[q] >= 0 and dot(normal, row(front.normals, q)) > 0.0:
+            if q < begun and dot(normal, row(front.normals, q)) > 0.0:
+                room = room and norm(subtract(place, row(front.nodes, q))) > clear
                 s = front.out[q]
                 while s >= 0:
                     away = distance_to_segment(place, row(front.nodes, q), row(front.nodes, front.head[s]))
@@ -399,7 +398,9 @@ def clear_of_front(
 
 
 @kernel
-def far_from_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float) -> bool:
+def far_from_front(
+    front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float
+) -> bool:
     """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
@@ -408,8 +409,10 @@ def far_from_front(front: Front, s: int, p: int, pp: Vector, found: np.ndarray, 
             if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
                 return False
             t = front.out_next[t]
-        if i < near and q != p and norm(subtract(pp, row(front.nodes, q))) < (
-            least if front.out[q] >= 0 else max(least, 0.45 * length)
+        if (
+            i < near
+            and q != p
+            and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, 0.45 * length))
         ):
             return False
     return True

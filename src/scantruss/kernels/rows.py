@@ -68,9 +68,7 @@ def choose_posts(
 
 
 @kernel
-def link_posts(
-    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, posts: Posts
-) -> None:
+def link_posts(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, posts: Posts) -> None:
     """Fill in means, normals and links of posts, all zero at the start: posts are linked whose places are."""
     for s in range(len(mean)):
         p = owner[s]
@@ -311,7 +309,9 @@ def hand_down(coarse: Posts, owner: np.ndarray, fine: Posts, length: float) -> N
 
 
 @kernel
-def list_nodes(posts: Posts, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray) -> int:
+def list_nodes(
+    posts: Posts, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
+) -> int:
     """Choose posts whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
 
     order : (P,) int64 the order in which posts are asked
