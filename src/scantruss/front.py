@@ -27,7 +27,7 @@ Progress = Callable[[str, float], None]
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
 GAP = 60  # gaps with more segments stay open
 CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
-NEARER = 0.35  # the same for an appointed position
+NEARER = 0.33  # the same for an appointed position
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 

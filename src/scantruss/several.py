@@ -32,7 +32,7 @@ WAYS = {  # rows that are tried
     "normal": tuple(Rows(turn) for turn in (0.0, 20.0, 40.0)),
     "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
-FINALISTS = {"quick": 1, "normal": 1, "best": 4}  # grids that are improved to the end
+FINALISTS = {"quick": 1, "normal": 1, "best": 2}  # grids that are improved to the end
 
 
 def several_grids(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
-from ..kernels.glide import Journal, glide
+from ..kernels.kick import KEPT, MOST, Area, kick_all
 from ..kernels.search import search, suit_nodes
 from ..kernels.trial import Scratch, total_energy
 from .flips import FOLD, ROUNDS
@@ -26,8 +26,8 @@ EVEN = {"balance": 2.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last s
 PRICE = 18.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
-# rounds of chains, most flips of a chain, growth of the energy at which a chain is given up
-GLIDES = {"quick": (0, 0, 0.0), "normal": (1, 4, 0.2), "best": (6, 12, 1.0)}
+KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (80, 0.2)}  # rounds of kicks, and what they may cost at first
+HOT = 0.8  # part of the rounds in which they may cost anything
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
@@ -58,22 +58,14 @@ def settle_again(relief: Relief) -> None:
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
     """Try flips, collapses and splits where nodes ask for them; returns how many were kept."""
-    energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
-    share = min(energy / max(count, 1), SHARE)
-    strain = mean / relief.length - 1.0
+    strain, share = _strain_and_share(relief, scratch)
     return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
 
 
-def new_journal(relief: Relief) -> Journal:
-    """Return room for what a chain of flips touches."""
-    capacity, width = relief.net.ring.shape
-    return Journal(
-        mark=np.zeros(capacity, np.int64),
-        around=np.zeros(capacity, np.int64),
-        nodes=np.zeros((capacity, 4)),
-        ring=np.zeros((capacity, width + 1), np.int64),
-        counter=np.zeros(3, np.int64),
-    )
+def _strain_and_share(relief: Relief, scratch: Scratch) -> tuple[float, float]:
+    """Mean length over desired length - 1, and the energy that any node has."""
+    energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
+    return mean / relief.length - 1.0, min(energy / max(count, 1), SHARE)
 
 
 def grid_energy(grid: Grid, length: float) -> float:
@@ -103,20 +95,38 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
         settle_again(relief)
 
 
-def move_pairs(relief: Relief, effort: str, progress: Callable[[float], None] | None = None) -> None:
-    """Move pairs of irregular nodes by chains of flips, as long as that pays."""
-    rounds, links, hope = GLIDES[effort]
-    scratch, journal = new_scratch(relief), new_journal(relief)
+def new_area(relief: Relief) -> Area:
+    """Return room for what a kick may change, and a fresh source of chance."""
+    capacity, width = relief.net.ring.shape
+    return Area(
+        mark=np.zeros((capacity, 2), np.int64),
+        around=np.zeros(MOST, np.int64),
+        nodes=np.zeros((MOST, 4)),
+        ring=np.zeros((MOST, width), np.int64),
+        state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
+        free=np.zeros(KEPT + 2, np.int64),
+        counter=np.zeros(4, np.int64),
+    )
+
+
+def search_widely(relief: Relief, effort: str, progress: Callable[[float], None] | None = None) -> None:
+    """Kick the grid at its irregular nodes: what a search from there finds is kept if it has paid.
+
+    For `best` it may cost a little at first and less and less later on (simulated annealing).
+    """
+    rounds, heat = KICKS[effort]
+    scratch, area = new_scratch(relief), new_area(relief)
     for done in range(rounds):
         if progress:
             progress(0.6 + 0.2 * done / rounds)
-        kept = glide(relief.net, relief.patches, relief.rim, scratch, journal, relief.length, WEIGHT, links, hope)
-        for _ in range(2):
-            settle_again(relief)
-            kept += search_once(relief, scratch)
+        strain, share = _strain_and_share(relief, scratch)
+        cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
+        kick_all(
+            relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, strain, PRICE, share, cooled
+        )
+        relief.renew(FAR)
+    if rounds:
         settle_again(relief)
-        if kept == 0:
-            break
 
 
 def finish(relief: Relief, prefer: str = "balance") -> None:

@@ -16,7 +16,7 @@ from ..scan.cloud import PointCloud
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
-AT_RIM = 0.3  # a position this near to the boundary becomes a boundary node, in lengths
+AT_RIM = 0.33  # a position this near to the boundary becomes a boundary node, in lengths
 SAME = 1e-6  # a node this near already stands there, in lengths
 CHOICES = 3  # nodes, and edges, that are tried
 
@@ -72,9 +72,16 @@ def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
 
 
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
-    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it."""
+    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it.
+
+    A place nearer to a corner than that is the corner: between two nodes so near to each other no triangle is sound.
+    """
     net = relief.net
     free = (net.degree > 0) & (net.kind < REST)
+    corners = np.flatnonzero((net.degree > 0) & (net.kind == REST) & ~relief.fixed)
+    away = np.linalg.norm(net.nodes[corners] - place, axis=1)
+    if len(away) and away.min() < AT_RIM * relief.length:
+        return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
     if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & (net.kind == RIM)):
         free &= net.kind == RIM

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.flips import flip_by_angle
-from .equalize import equalize, finish, move_pairs
+from .equalize import equalize, finish, search_widely
 from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import FOLD, ROUNDS
 from .grid import Grid
@@ -110,7 +110,7 @@ def improve_further(
     report: Callable[[float], None] | None = None,
 ) -> None:
     """Improve an equalized grid with the effort of the settings, make the nodes that are still missing, land on the scan."""
-    move_pairs(relief, settings.effort, report)
+    search_widely(relief, settings.effort, report)
     fix_nodes(relief, positions)
     finish(relief, settings.prefer)
     land(relief, sites)

@@ -60,22 +60,16 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
 
 
 @kernel
-def restore(net: Net, around: np.ndarray, nodes: np.ndarray, ring: np.ndarray, count: int) -> None:
-    """Put back the first `count` nodes of a list as they were written down."""
-    for i in range(count):
-        v = around[i]
-        for c in range(3):
-            net.nodes[v, c] = nodes[i, c]
-        net.arc[v] = nodes[i, 3]
-        net.state[v, DEGREE] = ring[i, -1]
-        for j in range(ring[i, -1]):
-            net.ring[v, j] = ring[i, j]
-
-
-@kernel
 def put_back(net: Net, scratch: Scratch) -> None:
     """Undo a trial: all around as it was."""
-    restore(net, scratch.around, scratch.nodes, scratch.ring, scratch.counter[1])
+    for i in range(scratch.counter[1]):
+        v = scratch.around[i]
+        for c in range(3):
+            net.nodes[v, c] = scratch.nodes[i, c]
+        net.arc[v] = scratch.nodes[i, 3]
+        net.state[v, DEGREE] = scratch.ring[i, -1]
+        for j in range(scratch.ring[i, -1]):
+            net.ring[v, j] = scratch.ring[i, j]
 
 
 @kernel
