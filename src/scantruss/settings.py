@@ -45,7 +45,7 @@ class Settings:
     )
     method: str = _setting("default", "the paper to the letter, or what we found better", choices=METHODS)
     effort: str = _setting(
-        "normal", "time for regularity, in the default method; best tries several fronts", choices=EFFORTS
+        "normal", "time for regularity, in the default method; best tries 24 fronts and anneals two", choices=EFFORTS
     )
     prefer: str = _setting(
         "balance", "members of one length, or regular triangles, where not both can be had", choices=PREFER
