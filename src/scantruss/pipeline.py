@@ -28,7 +28,9 @@ LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its s
 ATTEMPTS = (1.0, 0.97, 1.04)  #: desired lengths of the front, one after the other until a grid passes all checks
 
 
-def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progress | None = None) -> Grid:
+def grid_from_points(
+    points: np.ndarray, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
     """Return the grid of an array of points.
 
     Parameters
@@ -39,30 +41,41 @@ def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progre
         Desired member length and all the rest.
     progress : callable, optional
         ``progress(stage, share)``, called now and then; may raise to cancel.
+    keep_failed : bool
+        Return a grid that fails its certificate too; else that is a `CertificateError`, which has it as `.grid`.
 
     Returns
     -------
     Grid
-        With `settings`, `before` (quality before the optimization) and `seconds` of each stage.
+        With `settings`, `before` (quality before the optimization), `certificate` and `seconds` of each stage.
     """
     from .scan.cloud import PointCloud
 
     started = perf_counter()
     cloud = PointCloud.from_array(points, unit=settings.unit)
-    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+    spent = perf_counter() - started
+    return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 
 
-def grid_from_scan(path: str | Path, settings: Settings, *, progress: Progress | None = None) -> Grid:
+def grid_from_scan(
+    path: str | Path, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
     """Return the grid of a scan file; see `grid_from_points`."""
     from .scan.readers import read_points
 
     started = perf_counter()
     cloud = read_points(path, unit=settings.unit)
-    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+    spent = perf_counter() - started
+    return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 
 
 def grid_from_cloud(
-    cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, read_seconds: float = 0.0
+    cloud: PointCloud,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+    keep_failed: bool = False,
+    read_seconds: float = 0.0,
 ) -> Grid:
     """Return the grid of a point cloud; see `grid_from_points`.
 
@@ -74,6 +87,8 @@ def grid_from_cloud(
         Desired member length and all the rest.
     progress : callable, optional
         ``progress(stage, share)``.
+    keep_failed : bool
+        Return a grid that fails its certificate too.
     read_seconds : float
         What reading took [s], for the table of times.
     """
@@ -88,7 +103,13 @@ def grid_from_cloud(
     def check(grid: Grid) -> Grid:
         return certified(grid, boundary, settings)
 
-    front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
+    try:
+        front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
+        before = grid.before or front.quality
+    except CertificateError as error:
+        if not keep_failed:
+            raise
+        grid, before, advanced = error.grid, error.grid.before, found
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -97,7 +118,7 @@ def grid_from_cloud(
         "optimize": ended - advanced,
         "total": read_seconds + ended - started,
     }
-    return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
+    return grid.replace(settings=settings, before=before, seconds=seconds)
 
 
 def _checked_grid(

@@ -27,6 +27,7 @@ REACH = 0.5  #: members from the nearest triangle, or part of the scan, up to wh
 LEFT_OUT = 0.2  #: share of the scan that a grid may leave out of reach
 ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
 UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
+FOLDED = 10.0  #: angle between neighbouring triangles below which one lies on the other [degree]
 OFF = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
 
 
@@ -42,7 +43,7 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    kind: str  #: empty manifold orientable pieces loops crossing uneven cover astray fixed
+    kind: str  #: empty manifold orientable pieces loops crossing folded uneven cover astray fixed
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit]
 
@@ -72,7 +73,7 @@ class Certificate:
     smallest_angle: Worst | None  #: [degree]
     largest_angle: Worst | None  #: [degree]
     sharpest_fold: Worst | None  #: smallest angle between two triangles at a member, 180 where they are level [degree]
-    node_deviation: Worst | None  #: distance of a node from the scanned surface
+    node_deviation: Worst | None  #: distance of a node from the scanned surface, at most that from the nearest part of the scan
     fixed_error: Worst | None  #: distance of a fixed position from its node
     irregular: int  #: members too few or too many at the nodes, see `irregular`
     irregular_forced: int  #: ... that the Euler number and the angles of the rim force
@@ -144,6 +145,9 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     middles = grid.nodes[grid.triangles].mean(axis=1) if sound else np.zeros((0, 3))
     left = distances_to_grid(places, grid, length) if sound else np.zeros(0)
     astray = distances_to_scan(middles, places, length)
+    off = distances_to_scan(grid.nodes, places, length) if sound else np.zeros(0)
+    if sound and grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
+        off = np.fmin(off, grid.deviation)
     irregular, forced = count_irregular(grid) if sound else (0, 0)
     closed = found.manifold and found.orientable
     certificate = Certificate(
@@ -163,6 +167,7 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         farthest_scan=_worst(left, places, grid),
         grid_within_reach=float((astray <= REACH * length).mean()) if sound else 0.0,
         farthest_triangle=_worst(astray, middles, grid),
+        node_deviation=_worst(off, grid.nodes, grid),
         fixed_error=_fixed_error(grid, settings) if sound else None,
         irregular=irregular,
         irregular_forced=forced,
@@ -187,21 +192,19 @@ def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, sign: float = 1.0
 
 
 def _extremes(grid: Grid, sound: bool) -> dict[str, Worst | None]:
-    """Return the worst members, angles, fold and node."""
-    names = ("shortest_member", "longest_member", "smallest_angle", "largest_angle", "sharpest_fold", "node_deviation")
+    """Return the worst members, angles and fold."""
+    names = ("shortest_member", "longest_member", "smallest_angle", "largest_angle", "sharpest_fold")
     if not sound:
         return dict.fromkeys(names)
     halves = grid.nodes[grid.edges].mean(axis=1)
     corners = grid.nodes[grid.triangles].reshape(-1, 3)
     angles = corner_angles(grid.nodes, grid.triangles).ravel()
-    deviation = np.zeros(0) if grid.deviation is None else grid.deviation
     found = (
         _worst(grid.lengths, halves, grid, -1.0),
         _worst(grid.lengths, halves, grid),
         _worst(angles, corners, grid, -1.0),
         _worst(angles, corners, grid),
         _worst(fold_angles(grid), halves, grid, -1.0),
-        _worst(deviation, grid.nodes, grid),
     )
     return dict(zip(names, found, strict=True))
 
@@ -234,7 +237,7 @@ def _faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> l
         faults.append(Fault("orientable", "is not orientable"))
     if found.pieces != found.scan_pieces:
         faults.append(Fault("pieces", f"is in {found.pieces} pieces where the scan has {found.scan_pieces}"))
-    if found.boundary_loops > found.scan_loops:
+    if found.boundary_loops != found.scan_loops:
         words = f"has {found.boundary_loops} boundary loops where the scan has {found.scan_loops}"
         faults.append(Fault("loops", words, _odd_loop(grid, boundary)))
     return faults
@@ -250,19 +253,14 @@ def _seam(grid: Grid) -> Place | None:
 
 
 def _odd_loop(grid: Grid, boundary: Boundary) -> Place:
-    """Return a place on the loop of the grid that lies farthest from all loops of the scan; the shortest where it has none."""
-    curves = [loop.points for loop in boundary.loops]
-    if not curves:
-        loop = min(grid.boundary_loops, key=len)
-    else:
-        curve = np.concatenate(curves)
-        loop = max(
-            grid.boundary_loops,
-            key=lambda nodes: float(
-                np.median([np.linalg.norm(curve - place, axis=1).min() for place in grid.nodes[nodes]])
-            ),
-        )
-    return _place(grid.nodes[loop[0]] + grid.origin)
+    """Return a place on the loop that lies farthest from all others: of the grid where it has more loops, else of the scan."""
+    own, theirs = [grid.nodes[loop] for loop in grid.boundary_loops], [loop.points for loop in boundary.loops]
+    many, few = (own, theirs) if len(own) > len(theirs) else (theirs, own)
+    if not few:
+        return _place(min(many, key=len)[0] + grid.origin)
+    others = np.concatenate(few)
+    away = [np.median([np.linalg.norm(others - place, axis=1).min() for place in loop[::4]]) for loop in many]
+    return _place(many[int(np.argmax(away))][0] + grid.origin)
 
 
 def _faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, settings: Settings) -> list[Fault]:
@@ -272,6 +270,8 @@ def _faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, sett
         more = " or more" if len(crossings) == ENOUGH else ""
         where = _place(grid.nodes[grid.triangles[crossings[0]]].mean(axis=(0, 1)) + grid.origin)
         faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
+    if found.sharpest_fold and found.sharpest_fold.value < FOLDED:
+        faults.append(Fault("folded", "is folded over onto itself", found.sharpest_fold.where))
     uneven = grid.quality.length_cv
     if uneven > UNEVEN and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
@@ -281,8 +281,10 @@ def _faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, sett
             Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
         )
     gone = (ASTRAY + settings.smallest_hole / (2 * math.pi)) * settings.length
-    if found.farthest_triangle and found.farthest_triangle.value > gone:
-        faults.append(Fault("astray", "covers what the scan does not", found.farthest_triangle.where))
+    for worst in (found.farthest_triangle, found.node_deviation):
+        if worst and worst.value > gone:
+            faults.append(Fault("astray", "covers what the scan does not", worst.where))
+            break
     if found.fixed_error and not found.fixed_error.value <= OFF * settings.length:
         faults.append(Fault("fixed", "has no node at a fixed position", found.fixed_error.where))
     return faults
