@@ -88,7 +88,9 @@ def row(name: str, outcomes: list[Outcome]) -> str:
     start = f"| {name} | {len(outcomes)} | {count['right']} | {count['wrong']} | {count['refused']} |"
     if not found:
         return start + " |" * 8
-    shape, cv, length, rim = (np.array([getattr(f, key) for f in found]) for key in ("shape_mean", "cv", "length", "rim"))
+    shape, cv, length, rim = (
+        np.array([getattr(f, key) for f in found]) for key in ("shape_mean", "cv", "length", "rim")
+    )
     noisy = np.array([f.distance for f in found if f.distance_in == "noise"] or [np.nan])
     return (
         f"{start} {shape.mean():.4f}, {shape.min():.4f} | {min(f.shape_min for f in found):.2f} |"

@@ -100,7 +100,9 @@ def inside(ring: Callable[[Floats], Floats], middle: Floats, xy: Floats) -> Any:
     """Whether places (K, 2) lie inside a ring."""
     arm = xy - middle
     rim = np.append(ring(ROUND), ring(ROUND[:1]))
-    return np.hypot(*arm.T) < np.interp(np.arctan2(arm[:, 1], arm[:, 0]) % (2 * np.pi), np.append(ROUND, 2 * np.pi), rim)
+    return np.hypot(*arm.T) < np.interp(
+        np.arctan2(arm[:, 1], arm[:, 0]) % (2 * np.pi), np.append(ROUND, 2 * np.pi), rim
+    )
 
 
 def random_outline(rng: np.random.Generator, radius: float, heights: Heights) -> Callable[[Floats], Floats]:
@@ -134,7 +136,12 @@ def random_holes(
 
 
 def sample(
-    rng: np.random.Generator, heights: Heights, kept: Callable[[Floats], Any], half: float, density: float, facts: dict[str, float]
+    rng: np.random.Generator,
+    heights: Heights,
+    kept: Callable[[Floats], Any],
+    half: float,
+    density: float,
+    facts: dict[str, float],
 ) -> Floats:
     """Return places on the kept part of the surface (N, 3), at least `density` of them a member squared."""
     ratio, even = facts["density ratio"], facts["even"] > 0
@@ -187,7 +194,11 @@ def random_surface(seed: int) -> RandomSurface:
 
     def distance(p: Floats) -> Floats:
         own = (p - shift) @ turn / length
-        return np.asarray(length * np.abs(own[:, 2] - heights.at(own[:, :2])) / np.hypot(1, np.linalg.norm(heights.slope(own[:, :2]), axis=1)))
+        return np.asarray(
+            length
+            * np.abs(own[:, 2] - heights.at(own[:, :2]))
+            / np.hypot(1, np.linalg.norm(heights.slope(own[:, :2]), axis=1))
+        )
 
     rims = [rim, *(polar(ring, middle, ROUND) for ring, middle in holes)]
     return RandomSurface(

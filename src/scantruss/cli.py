@@ -1,6 +1,7 @@
 """The command line: the front that reads words, and the only place that says what went wrong and leaves.
 
-A refusal is one line on stderr and exit status 2, or 3 where a grid fails its certificate; nothing is written then. Heavy imports wait for a command.
+A refusal is one line on stderr and exit status 2, or 3 where a grid fails its certificate; nothing is written then. Heavy
+imports wait for a command.
 """
 
 from __future__ import annotations

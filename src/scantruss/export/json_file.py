@@ -1,8 +1,9 @@
 """Our own format: JSON that holds a grid without loss.
 
 What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) and its
-certificate, which needs the scan, are read back to the last bit. What follows from it (members, boundary loops, quality, topology) is written for other
-programs and not read back. No dates and no names are written: the same grid gives the same bytes.
+certificate, which needs the scan, are read back to the last bit. What follows from it (members, boundary loops, quality,
+topology) is written for other programs and not read back. No dates and no names are written: the same grid gives the same
+bytes.
 """
 
 from __future__ import annotations

@@ -73,7 +73,9 @@ class Certificate:
     smallest_angle: Worst | None  #: [degree]
     largest_angle: Worst | None  #: [degree]
     sharpest_fold: Worst | None  #: smallest angle between two triangles at a member, 180 where they are level [degree]
-    node_deviation: Worst | None  #: distance of a node from the scanned surface, at most that from the nearest part of the scan
+    node_deviation: (
+        Worst | None
+    )  #: distance of a node from the scanned surface, at most that from the nearest part of the scan
     fixed_error: Worst | None  #: distance of a fixed position from its node
     irregular: int  #: members too few or too many at the nodes, see `irregular`
     irregular_forced: int  #: ... that the Euler number and the angles of the rim force
@@ -173,7 +175,10 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         irregular_forced=forced,
         **_extremes(grid, sound),
     )
-    faults = [*_faults_of_topology(grid, certificate, boundary), *_faults_in_space(grid, certificate, crossings, settings)]
+    faults = [
+        *_faults_of_topology(grid, certificate, boundary),
+        *_faults_in_space(grid, certificate, crossings, settings),
+    ]
     return replace(certificate, faults=tuple(faults if sound else [Fault("empty", "has no triangles")]))
 
 
@@ -216,7 +221,9 @@ def fold_angles(grid: Grid) -> np.ndarray:
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     first, second = normal[two[:, 0]], normal[two[:, 1]]
-    angle = 180.0 - np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1)))
+    angle = 180.0 - np.degrees(
+        np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1))
+    )
     return np.where(two[:, 1] >= 0, angle, np.nan)
 
 

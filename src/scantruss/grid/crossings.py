@@ -110,7 +110,7 @@ def _folded_flat(a: Exact, b: Exact, c: Exact, d: Exact) -> bool:
     """Whether the triangles abc and abd lie in one plane on the same side of ab; also where one of them is flat."""
     edge = _from(a, b)
     n, m = _cross(edge, _from(a, c)), _cross(edge, _from(a, d))
-    return _cross(n, m) == (0, 0, 0) and _dot(n, m) >= 0
+    return not any(_cross(n, m)) and _dot(n, m) >= 0
 
 
 def _segment_meets(segment: Sequence[Exact], triangle: Sequence[Exact]) -> bool:
@@ -119,10 +119,12 @@ def _segment_meets(segment: Sequence[Exact], triangle: Sequence[Exact]) -> bool:
     a, b, c = triangle
     normal = _cross(_from(a, b), _from(a, c))
     above, below = _dot(normal, _from(a, p)), _dot(normal, _from(a, q))
-    if normal == (0, 0, 0) or above * below > 0:
+    if not any(normal) or above * below > 0:
         return False
     if above == below:  # both zero: all in one plane
-        return _inside(p, triangle, normal) or any(_segments_meet(p, q, *side, normal) for side in _sides([a, b, c]))
+        return _inside(p, triangle, normal) or any(
+            _segments_meet(p, q, start, end, normal) for start, end in ((a, b), (b, c), (c, a))
+        )
     share, step = above / (above - below), _from(p, q)
     return _inside((p[0] + share * step[0], p[1] + share * step[1], p[2] + share * step[2]), triangle, normal)
 

@@ -27,9 +27,7 @@ def count_irregular(grid: Grid) -> tuple[int, int]:
     count = len(grid.nodes)
     edges, uses = grid.edges, grid.edge_uses
     members = np.bincount(edges.ravel(), minlength=count)
-    angle = np.bincount(
-        grid.triangles.ravel(), corner_angles(grid.nodes, grid.triangles).ravel(), minlength=count
-    )
+    angle = np.bincount(grid.triangles.ravel(), corner_angles(grid.nodes, grid.triangles).ravel(), minlength=count)
     room = np.maximum(np.floor(angle / 60.0 + 0.5), 1.0).astype(np.int64)
     rim = np.zeros(count, bool)
     rim[edges[uses != 2].ravel()] = True

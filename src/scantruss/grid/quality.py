@@ -149,9 +149,7 @@ def _is_orientable(grid: Grid) -> bool:
     starts = grid.triangles.T.ravel()
     turned = starts[one] == starts[other]
     a, b = one % count, other % count
-    label = labels(
-        2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned])
-    )
+    label = labels(2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned]))
     return not np.any(label[:count] == label[count:])
 
 

@@ -55,8 +55,8 @@ def nearest_distances(
     """
     for q in range(len(others)):
         x, y, z = row(others, q)
-        reach, best = near, math.inf
-        while best > reach * reach:
+        reach = near
+        while True:
             best = math.inf
             for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
                 for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
@@ -66,6 +66,7 @@ def nearest_distances(
                             d = subtract(row(places, p), (x, y, z))
                             best = min(best, dot(d, d))
                             p = boxes.next[p]
-            if best > reach * reach:
-                reach *= 2.0
-        distance[q] = math.sqrt(best)
+            if best <= reach * reach:
+                distance[q] = math.sqrt(best)
+                break
+            reach *= 2.0
