@@ -56,7 +56,7 @@ def place(tmp_path, monkeypatch):
 def ready(place, monkeypatch):
     """The same, with a finished grid in place of the long work."""
     monkeypatch.setattr(commands, "read_scan", lambda *_: PointCloud.from_array(plate()))
-    monkeypatch.setattr(commands, "make_grid", lambda *_: hexagon())
+    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: hexagon())
     return place
 
 
@@ -428,7 +428,7 @@ def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
 
 def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(commands, "make_grid", lambda *_: 1 // 0)
+    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 
