@@ -18,8 +18,9 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.errors import CertificateError, FrontError
 from scantruss.grid.certificate import FOLDED, Certificate, certify, fold_angles
-from scantruss.grid.cover import distances_to_grid, distances_to_scan, scan_places
+from scantruss.grid.cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
 from scantruss.grid.irregular import count_irregular
+from scantruss.grid.quality import corner_angles
 
 SETTINGS = st.Settings(length=1.0)
 SHIFT = np.array([500_000.0, 4_500_000.0, 100.0])
@@ -89,10 +90,12 @@ def test_distances_agree_with_all_triangles_and_all_places(made):
     places = scan_places(boundary.sites)[::7] + np.random.default_rng(0).normal(size=3)
     corners = grid.nodes[grid.triangles]
     slow = distance_to_triangles(places[:, None], *corners.transpose(1, 0, 2)[:, None]).min(axis=1)
-    assert distances_to_grid(places, grid, 1.0) == pytest.approx(slow, abs=1e-12)
-    assert distances_to_grid(places + 40.0, grid, 1.0).min() > 30
+    assert distances_to_grid(places, boxes_of(places, 0.5), grid, 1.0) == pytest.approx(slow, abs=1e-12)
+    assert distances_to_grid(places + 40.0, boxes_of(places + 40.0, 0.5), grid, 1.0).min() > 30
     middles = corners.mean(axis=1) + np.array([0, 0, 2.5])
-    assert distances_to_scan(middles, places, 1.0) == pytest.approx(cKDTree(places).query(middles)[0], abs=1e-12)
+    assert distances_to_scan(middles, places, boxes_of(places, 0.5), 1.0) == pytest.approx(
+        cKDTree(places).query(middles)[0], abs=1e-12
+    )
 
 
 def test_places_are_in_the_scans_own_frame(made):
@@ -225,7 +228,7 @@ def plain_charges(grid):
 )
 def test_irregular_nodes_are_counted_as_stated(grid, expected):
     charges = plain_charges(grid)
-    present, forced = count_irregular(grid)
+    present, forced = count_irregular(grid, corner_angles(grid.nodes, grid.triangles))
     assert present == sum(map(abs, charges.values())) and forced == abs(sum(charges.values()))
     assert expected is None or (present, forced) == expected
 

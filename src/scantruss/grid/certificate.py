@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .cover import distances_to_grid, distances_to_scan, scan_places
+from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
 from .crossings import ENOUGH, find_crossings
 from .irregular import count_irregular
 from .quality import corner_angles, pinched_nodes
@@ -144,13 +144,15 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     sound = len(grid.triangles) > 0 and bool(np.isfinite(grid.nodes).all())
     crossings = find_crossings(grid.nodes, grid.triangles) if sound else np.zeros((0, 2), np.int64)
     places = scan_places(boundary.sites)
+    boxes = boxes_of(places, 0.5 * length)
     middles = grid.nodes[grid.triangles].mean(axis=1) if sound else np.zeros((0, 3))
-    left = distances_to_grid(places, grid, length) if sound else np.zeros(0)
-    astray = distances_to_scan(middles, places, length)
-    off = distances_to_scan(grid.nodes, places, length) if sound else np.zeros(0)
+    left = distances_to_grid(places, boxes, grid, length) if sound else np.zeros(0)
+    away = distances_to_scan(np.concatenate([middles, grid.nodes[: len(grid.nodes) * sound]]), places, boxes, length)
+    astray, off = away[: len(middles)], away[len(middles) :]
     if sound and grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
         off = np.fmin(off, grid.deviation)
-    irregular, forced = count_irregular(grid) if sound else (0, 0)
+    angles = corner_angles(grid.nodes, grid.triangles) if sound else np.zeros((0, 3))
+    irregular, forced = count_irregular(grid, angles) if sound else (0, 0)
     closed = found.manifold and found.orientable
     certificate = Certificate(
         unit=grid.unit,
@@ -173,7 +175,7 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         fixed_error=_fixed_error(grid, settings) if sound else None,
         irregular=irregular,
         irregular_forced=forced,
-        **_extremes(grid, sound),
+        **_extremes(grid, angles),
     )
     faults = [
         *_faults_of_topology(grid, certificate, boundary),
@@ -196,19 +198,18 @@ def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, sign: float = 1.0
     return Worst(float(values[at]), _place(places[at] + grid.origin))
 
 
-def _extremes(grid: Grid, sound: bool) -> dict[str, Worst | None]:
+def _extremes(grid: Grid, angles: np.ndarray) -> dict[str, Worst | None]:
     """Return the worst members, angles and fold."""
     names = ("shortest_member", "longest_member", "smallest_angle", "largest_angle", "sharpest_fold")
-    if not sound:
+    if len(angles) == 0:
         return dict.fromkeys(names)
     halves = grid.nodes[grid.edges].mean(axis=1)
     corners = grid.nodes[grid.triangles].reshape(-1, 3)
-    angles = corner_angles(grid.nodes, grid.triangles).ravel()
     found = (
         _worst(grid.lengths, halves, grid, -1.0),
         _worst(grid.lengths, halves, grid),
-        _worst(angles, corners, grid, -1.0),
-        _worst(angles, corners, grid),
+        _worst(angles.ravel(), corners, grid, -1.0),
+        _worst(angles.ravel(), corners, grid),
         _worst(fold_angles(grid), halves, grid, -1.0),
     )
     return dict(zip(names, found, strict=True))

@@ -21,30 +21,32 @@ def scan_places(sites: Sites) -> np.ndarray:
     return np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
 
 
-def _boxes_of(places: np.ndarray, box: float) -> SearchBoxes:
+def boxes_of(places: np.ndarray, box: float) -> SearchBoxes:
+    """Return places (P, 3) by box, the boxes no larger than `box` [scan unit]."""
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), box, len(places), len(places))
     put_places(boxes, places)
     return boxes
 
 
-def distances_to_grid(places: np.ndarray, grid: Grid, length: float) -> np.ndarray:
+def distances_to_grid(places: np.ndarray, boxes: SearchBoxes, grid: Grid, length: float) -> np.ndarray:
     """Return the distance of each place (P, 3) to the nearest triangle, (P,) [scan unit].
 
     Far places are looked for again with ever more reach, so the distances are those to the nearest of all triangles.
     """
-    distance = np.full(len(places), np.inf)
-    waiting, reach = np.arange(len(places)), NEAR * length
+    distance, reach = np.full(len(places), np.inf), NEAR * length
+    lower_distances(places, boxes, grid.nodes, grid.triangles, reach, distance)
+    waiting = np.flatnonzero(np.isinf(distance))
     while len(waiting):
-        some = np.ascontiguousarray(places[waiting])
-        found = np.full(len(some), np.inf)
-        lower_distances(some, _boxes_of(some, max(reach, 0.5 * length)), grid.nodes, grid.triangles, reach, found)
+        reach *= 4.0
+        some, found = np.ascontiguousarray(places[waiting]), np.full(len(waiting), np.inf)
+        lower_distances(some, boxes_of(some, max(reach, length)), grid.nodes, grid.triangles, reach, found)
         distance[waiting] = found
-        waiting, reach = waiting[np.isinf(found)], 4.0 * reach
+        waiting = waiting[np.isinf(found)]
     return distance
 
 
-def distances_to_scan(middles: np.ndarray, places: np.ndarray, length: float) -> np.ndarray:
-    """Return the distance of each middle of a triangle (T, 3) to the nearest place of the scan (P, 3), (T,) [scan unit]."""
-    distance = np.empty(len(middles))
-    nearest_distances(middles, places, _boxes_of(places, 0.5 * length), 0.25 * length, distance)
+def distances_to_scan(others: np.ndarray, places: np.ndarray, boxes: SearchBoxes, length: float) -> np.ndarray:
+    """Return the distance of each of some positions (Q, 3) to the nearest place of the scan (P, 3), (Q,) [scan unit]."""
+    distance = np.empty(len(others))
+    nearest_distances(others, places, boxes, 0.25 * length, distance)
     return distance
