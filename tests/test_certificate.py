@@ -138,6 +138,9 @@ def test_a_hole_and_a_loose_piece_and_a_lost_loop_are_found(made):
     assert {"pieces", "loops"} == kinds(
         made, nodes=more, triangles=loose, fixed=np.zeros(len(more), bool), deviation=None
     )
+    found = certify(grid.replace(nodes=more, triangles=loose, deviation=None), boundary, SETTINGS)
+    place = next(fault.where for fault in found.faults if fault.kind == "pieces")
+    assert np.linalg.norm(more[-7:] + grid.origin - place, axis=1).min() < 1e-6
     lost = min(grid.boundary_loops, key=len)
     cap = np.column_stack([np.full(len(lost), len(grid.nodes)), np.roll(lost, -1), lost])
     nodes = np.vstack([grid.nodes, grid.nodes[lost].mean(axis=0)])
@@ -246,6 +249,12 @@ def test_what_is_forced_follows_from_euler_number_and_rim(name):
     room = [max(1, int(np.floor(angle[v] / 60 + 0.5))) for v in rim]
     assert forced == abs(6 * shape.euler - sum(3 - k for k in room))
     assert present >= forced and (present - forced) % 2 == 0
+
+
+def test_a_grid_that_is_changed_loses_its_certificate(made):
+    grid, _ = made
+    assert grid.replace(nodes=grid.nodes + 1.0).certificate is None
+    assert grid.replace(settings=SETTINGS).certificate is grid.certificate
 
 
 def test_a_certificate_is_written_and_read_back_whole(made, tmp_path):

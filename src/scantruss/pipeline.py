@@ -153,7 +153,7 @@ def _checked_grid(
             return front, check(grid), advanced
         except FrontError as error:
             faults.append(error)
-    raise faults[0]
+    raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
 
 
 def certified(grid: Grid, boundary: Boundary, settings: Settings) -> Grid:
@@ -172,7 +172,8 @@ def certified(grid: Grid, boundary: Boundary, settings: Settings) -> Grid:
         return grid
     words = " and ".join(fault.words for fault in certificate.faults)
     where = next((fault.where for fault in certificate.faults if fault.where), None)
-    raise CertificateError(f"the grid {words}; try another length, or clean the scan", grid, where)
+    advice = "try another length, or clean the scan; --keep-failed gives the grid all the same"
+    raise CertificateError(f"the grid {words}; {advice}", grid, where)
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:

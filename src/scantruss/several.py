@@ -75,7 +75,7 @@ def several_grids(
     def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
             improve_further(relief, boundary.sites, positions, settings)
-            return check(relief.to_grid(fronts[number]).replace(settings=settings))
+            return check(relief.to_grid(fronts[number]).replace(settings=settings, before=fronts[number].quality))
 
         return _passed(faults, number, work)
 

@@ -14,7 +14,7 @@ import numpy as np
 from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
 from .crossings import ENOUGH, find_crossings
 from .irregular import count_irregular
-from .quality import corner_angles, pinched_nodes
+from .quality import corner_angles, labels, pinched_nodes
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
@@ -177,11 +177,10 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         irregular_forced=forced,
         **_extremes(grid, angles),
     )
-    faults = [
-        *_faults_of_topology(grid, certificate, boundary),
-        *_faults_in_space(grid, certificate, crossings, settings),
-    ]
-    return replace(certificate, faults=tuple(faults if sound else [Fault("empty", "has no triangles")]))
+    if not sound:
+        return replace(certificate, faults=(Fault("empty", "has no triangles"),))
+    topology = _faults_of_topology(grid, certificate, boundary)
+    return replace(certificate, faults=(*topology, *_faults_in_space(grid, certificate, crossings, settings)))
 
 
 def _place(place: Any) -> Place:
@@ -244,7 +243,8 @@ def _faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> l
     if not found.orientable:
         faults.append(Fault("orientable", "is not orientable"))
     if found.pieces != found.scan_pieces:
-        faults.append(Fault("pieces", f"is in {found.pieces} pieces where the scan has {found.scan_pieces}"))
+        words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}"
+        faults.append(Fault("pieces", words, _smallest_piece(grid)))
     if found.boundary_loops != found.scan_loops:
         words = f"has {found.boundary_loops} boundary loops where the scan has {found.scan_loops}"
         faults.append(Fault("loops", words, _odd_loop(grid, boundary)))
@@ -258,6 +258,13 @@ def _seam(grid: Grid) -> Place | None:
         return _place(grid.nodes[grid.edges[wide[0]]].mean(axis=0) + grid.origin)
     pinched = pinched_nodes(grid)
     return _place(grid.nodes[pinched[0]] + grid.origin) if len(pinched) else None
+
+
+def _smallest_piece(grid: Grid) -> Place:
+    """Return a place on the piece of fewest triangles."""
+    piece = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])[grid.triangles[:, 0]]
+    found, count = np.unique(piece, return_counts=True)
+    return _place(grid.nodes[found[np.argmin(count)]] + grid.origin)
 
 
 def _odd_loop(grid: Grid, boundary: Boundary) -> Place:

@@ -30,7 +30,9 @@ class Grid:
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
 
     def replace(self, **changes: Any) -> Grid:
-        """Return a copy with some fields changed."""
+        """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of."""
+        if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
+            changes = {"certificate": None, **changes}
         return replace(self, **changes)
 
     @cached_property
