@@ -8,17 +8,14 @@ import naive_grid as naive
 import numpy as np
 import pytest
 from rough import strip_of
-from scipy.spatial import cKDTree
 from shapes import make
 from small_clouds import ring
 from small_grids import dome, fan, icosahedron
-from surfaces import distance_to_triangles
 
 import scantruss as st
 from scantruss import pipeline
 from scantruss.errors import CertificateError, FrontError
 from scantruss.grid.certificate import FOLDED, Certificate, certify, fold_angles
-from scantruss.grid.cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
 from scantruss.grid.irregular import count_irregular
 from scantruss.grid.quality import corner_angles
 
@@ -83,19 +80,6 @@ def test_worst_places_are_those_of_plain_loops(made):
         assert worst.where == pytest.approx(grid.nodes[node] + grid.origin)
     assert found.smallest_angle.value == pytest.approx(min(angles.values()))
     assert found.largest_angle.value == pytest.approx(max(angles.values()))
-
-
-def test_distances_agree_with_all_triangles_and_all_places(made):
-    grid, boundary = made
-    places = scan_places(boundary.sites)[::7] + np.random.default_rng(0).normal(size=3)
-    corners = grid.nodes[grid.triangles]
-    slow = distance_to_triangles(places[:, None], *corners.transpose(1, 0, 2)[:, None]).min(axis=1)
-    assert distances_to_grid(places, boxes_of(places, 0.5), grid, 1.0) == pytest.approx(slow, abs=1e-12)
-    assert distances_to_grid(places + 40.0, boxes_of(places + 40.0, 0.5), grid, 1.0).min() > 30
-    middles = corners.mean(axis=1) + np.array([0, 0, 2.5])
-    assert distances_to_scan(middles, places, boxes_of(places, 0.5), 1.0) == pytest.approx(
-        cKDTree(places).query(middles)[0], abs=1e-12
-    )
 
 
 def test_places_are_in_the_scans_own_frame(made):

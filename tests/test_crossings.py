@@ -16,6 +16,8 @@ from scantruss.grid import crossings
 from scantruss.grid.crossings import find_crossings, triangles_meet
 from scantruss.kernels import crossing as kernels
 
+pytestmark = pytest.mark.kernels
+
 whole = some.integers(-3, 3).map(float)
 places = some.lists(some.tuples(whole, whole, whole), min_size=6, max_size=6, unique=True)
 flat_places = some.lists(some.tuples(whole, whole, some.just(0.0)), min_size=6, max_size=6, unique=True)

@@ -171,7 +171,7 @@ def doubtful_pairs(
     count = 0
     for t in range(len(triangles)):
         x, y, z = row(middles, t)
-        reach = radii[t] + widest
+        reach = 1.000001 * (radii[t] + widest)
         for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
             for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
                 for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
