@@ -15,8 +15,10 @@ from small_grids import dome, fan, icosahedron
 import scantruss as st
 from scantruss import pipeline
 from scantruss.errors import CertificateError, FrontError
-from scantruss.grid.certificate import FOLDED, Certificate, certify, fold_angles
+from scantruss.grid.certificate import Certificate
+from scantruss.grid.faults import FOLDED
 from scantruss.grid.irregular import count_irregular
+from scantruss.grid.proof import certify, fold_angles
 from scantruss.grid.quality import corner_angles
 
 SETTINGS = st.Settings(length=1.0)
@@ -308,7 +310,7 @@ def test_where_no_attempt_passes_the_fault_of_the_first_whole_grid_is_told(plate
 
 @pytest.mark.parametrize("effort", ["quick", "best"])
 def test_a_failed_grid_is_kept_where_that_is_asked_for(plate, monkeypatch, effort):
-    monkeypatch.setattr("scantruss.grid.certificate.LEFT_OUT", -1.0)  # no grid can pass
+    monkeypatch.setattr("scantruss.grid.faults.LEFT_OUT", -1.0)  # no grid can pass
     settings = st.Settings(length=1.5, effort=effort)
     with pytest.raises(CertificateError) as refused:
         st.grid_from_points(plate, settings)

@@ -311,7 +311,7 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
 @pytest.fixture
 def failing(place, monkeypatch):
     """No grid can pass."""
-    monkeypatch.setattr("scantruss.grid.certificate.UNEVEN", 0.0)
+    monkeypatch.setattr("scantruss.grid.faults.UNEVEN", 0.0)
     return place
 
 

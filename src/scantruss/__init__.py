@@ -16,7 +16,7 @@ _HOMES = {
     "advance_front": "front",
     "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.quality",
     "optimize_grid": "grid.optimize",
-    "Certificate": "grid.certificate", "certify": "grid.certificate",
+    "Certificate": "grid.certificate", "certify": "grid.proof",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "read_grid": "export.json_file",
     "print_model": "export.solid",

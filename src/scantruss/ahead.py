@@ -104,9 +104,9 @@ def compile_optimization(settings: Settings) -> None:
     import numpy as np
 
     from .boundary import Boundary, Loop
-    from .grid.certificate import certify
     from .grid.grid import Grid
     from .grid.optimize import improve
+    from .grid.proof import certify
     from .grid.relief import Relief
     from .kernels.boxes import new_boxes
     from .kernels.surface import Surface

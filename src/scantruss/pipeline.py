@@ -107,7 +107,7 @@ def grid_from_cloud(
         front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
         before = grid.before or front.quality
     except CertificateError as error:
-        if not keep_failed:
+        if not keep_failed or len(error.grid.triangles) == 0:
             raise
         grid, before, advanced = error.grid, error.grid.before, found
     ended = perf_counter()
@@ -164,7 +164,7 @@ def certified(grid: Grid, boundary: Boundary, settings: Settings) -> Grid:
     CertificateError
         The grid does not pass. Names the first place of a fault.
     """
-    from .grid.certificate import certify
+    from .grid.proof import certify
 
     certificate = certify(grid, boundary, settings)
     grid = grid.replace(certificate=certificate)
