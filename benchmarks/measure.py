@@ -34,6 +34,7 @@ class Measured:
         float  #: mean distance of the nodes from the true surface, in noise (in thousandths of a member: no noise)
     )
     nodes: int
+    distance_in: str = "noise"  #: "member" where there is no noise
 
     def line(self) -> str:
         """Return the figures in one line."""
@@ -88,4 +89,5 @@ def measure(shape: Shape, grid: Grid, length: float) -> Measured:
         corner=max(corners, default=0.0),
         distance=float(shape.distance(nodes).mean()) / (shape.noise or length / 1000),
         nodes=len(nodes),
+        distance_in="noise" if shape.noise else "member",
     )

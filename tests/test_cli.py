@@ -56,7 +56,7 @@ def place(tmp_path, monkeypatch):
 def ready(place, monkeypatch):
     """The same, with a finished grid in place of the long work."""
     monkeypatch.setattr(commands, "read_scan", lambda *_: PointCloud.from_array(plate()))
-    monkeypatch.setattr(commands, "make_grid", lambda *_: hexagon())
+    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: hexagon())
     return place
 
 
@@ -297,6 +297,7 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
     assert main(words) == 0
     said = capsys.readouterr().out
     assert "shape quality, mean" in said and "boundary loop" in said and "seconds" in said
+    assert "certificate: passed, " in said and "triangle farthest from the scan" in said
     assert sorted(entry.name for entry in place.iterdir()) == [
         "a.obj",
         "a.settings.json",
@@ -307,6 +308,31 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
     assert st.Settings.read("a.settings.json") == st.Settings(length=4.0, unit="mm", fixed=((20, 15, 8),))
 
 
+@pytest.fixture
+def failing(place, monkeypatch):
+    """No grid can pass."""
+    monkeypatch.setattr("scantruss.grid.faults.UNEVEN", 0.0)
+    return place
+
+
+def test_a_grid_that_fails_its_certificate_is_not_written(failing, capsys):
+    line = refused(capsys, "grid", "scan.xyz", "a.json", "--length", LENGTH, status=3)
+    assert "members whose lengths are" in line and "(near " in line
+
+
+def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(failing, capsys):
+    words = ["grid", "scan.xyz", "a.json", "a.obj", "--length", LENGTH, "--report", "r.json", "--keep-failed"]
+    assert main(words) == 3
+    said = capsys.readouterr()
+    assert "certificate: FAILED: the grid has members whose lengths are" in said.out and "wrote a.json" in said.out
+    assert said.err.startswith("scantruss: ") and said.err.count("\n") == 1
+    assert (failing / "a.obj").exists()
+    for name in ("a.json", "r.json"):
+        certificate = json.loads((failing / name).read_text())["certificate"]
+        assert certificate["passed"] is False and certificate["faults"][0]["kind"] == "uneven"
+    assert st.read_grid("a.json").certificate.faults[0].kind == "uneven"
+
+
 def test_the_report_holds_every_figure(place):
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
     report = json.loads((place / "r.json").read_text())
@@ -314,7 +340,7 @@ def test_the_report_holds_every_figure(place):
         "shape_mean shape_std shape_min length_mean length_std length_cv angle_min angle_max valence6"
         " node_deviation_mean node_deviation_max"
     )
-    names = "points nodes members triangles quality before topology seconds settings version"
+    names = "points nodes members triangles quality before topology certificate seconds settings version"
     assert set(report) == set(names.split())
     assert set(report["quality"]) == set(report["before"]) == set(figures.split())
     assert set(report["topology"]) == set("components boundary_loops euler manifold orientable".split())
@@ -330,6 +356,7 @@ def test_the_report_holds_every_figure(place):
         "orientable": True,
     }
     assert report["nodes"] - report["members"] + report["triangles"] == 1
+    assert report["certificate"]["passed"] and report["certificate"]["faults"] == []
 
 
 def test_saved_settings_repeat_a_run_to_the_byte(place):
@@ -401,7 +428,7 @@ def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
 
 def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(commands, "make_grid", lambda *_: 1 // 0)
+    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 

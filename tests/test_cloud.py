@@ -13,6 +13,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial import cKDTree
 
 from scantruss.errors import InputError
+from scantruss.scan import cloud as clouds
 from scantruss.scan.cloud import PointCloud, measure_spacing
 
 
@@ -187,3 +188,19 @@ def test_importing_the_cloud_needs_numpy_only() -> None:
     code = "import sys, scantruss.scan.cloud; print(sorted({'numba', 'scipy', 'laspy', 'trimesh'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("count", [8, 150, 20_000])
+def test_the_gap_is_the_median_distance_to_the_sixth_neighbour(count: int) -> None:
+    points = bowl(count)
+    sixth = cKDTree(points).query(points, k=7)[0][:, 6]
+    close = 1e-12 if count < clouds.FEW else 0.15  # of many points only some are looked at
+    assert PointCloud.from_array(points).gap == pytest.approx(float(np.median(sixth**2)) ** 0.5, rel=close)
+
+
+def test_the_gap_of_a_triangular_pattern_is_its_spacing_and_is_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, columns = np.divmod(np.arange(3600), 60)
+    cloud = PointCloud.from_array(np.column_stack([columns + 0.5 * (rows % 2), rows * 0.75**0.5, 0 * rows]))
+    assert cloud.gap == pytest.approx(1.0, rel=1e-9)
+    monkeypatch.setattr(clouds, "measure_gap", lambda _: -1.0)
+    assert cloud.gap == pytest.approx(1.0, rel=1e-9)

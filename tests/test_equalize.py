@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 from rough import compiled_only, curve_of, rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.equalize import PRICE, WEIGHT, equalize, finish, new_scratch, search_once, settle
+from scantruss.grid.equalize import PRICE, WEIGHT, equalize, finish, grid_energy, new_scratch, search_once, settle
 from scantruss.kernels import equalize as kernels
 from scantruss.kernels import rim as curves
 from scantruss.kernels import search
@@ -225,3 +225,34 @@ def test_no_curve_is_nearest_where_there_is_none():
     from rough import no_rim
 
     assert curves.nearest_on_rim(no_rim(), 0.0, 0.0, 0.0)[0] == -1
+
+
+def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_length(rough):
+    for share in (0.8, 1.0, 1.3):
+        length = share * rough.settings.length
+        stretch = np.mean(
+            [np.linalg.norm(np.subtract(*rough.grid.nodes[list(edge)])) for edge in naive.wings(rough.grid)]
+        )
+        price = PRICE * len(rough.grid.nodes) * (stretch / length - 1) ** 2
+        unfolded = naive.energy(rough.grid, length, WEIGHT) - naive.energy(rough.grid, length, 0.0)
+        shapes = sum(1 - naive.shape(*rough.grid.nodes[t]) for t in rough.grid.triangles)
+        assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
+
+
+@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
+def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
+    rough = rough_disc()
+    relief, length = rough.relief(), rough.settings.length
+    net = relief.net
+    v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[7])
+    settle(relief, WEIGHT, 1e-5, 60)
+    rest = net.nodes[v].copy()
+    normal, along = relief.patches[v, 3:6].copy(), relief.patches[v, 6:9].copy()
+    net.nodes[v] = rest + 0.6 * length * along  # it wants to go back, against `along`
+    relief.patches[v, 0:3] = net.nodes[v] + away * length * along
+    relief.patches[v, 9:15] = 0.0
+    place = net.nodes[v].copy()
+    gained = kernels.settle_node(net, relief.patches, relief.rim, v, length, WEIGHT, 1e-6)
+    assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
+    assert np.linalg.norm(net.nodes[v] - relief.patches[v, 0:3]) <= kernels.LEASH * length
+    assert abs((net.nodes[v] - place) @ normal) < 1e-9

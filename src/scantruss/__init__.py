@@ -9,12 +9,14 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "ScanTrussError": "errors", "InputError": "errors", "FrontError": "errors", "FormatError": "errors",
+    "CertificateError": "errors",
     "Settings": "settings",
     "PointCloud": "scan.cloud", "read_points": "scan.readers",
     "Boundary": "boundary", "find_boundary": "boundary",
     "advance_front": "front",
     "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.quality",
     "optimize_grid": "grid.optimize",
+    "Certificate": "grid.certificate", "certify": "grid.proof",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "read_grid": "export.json_file",
     "print_model": "export.solid",

@@ -106,10 +106,10 @@ def compile_optimization(settings: Settings) -> None:
     from .boundary import Boundary, Loop
     from .grid.grid import Grid
     from .grid.optimize import improve
+    from .grid.proof import certify
     from .grid.relief import Relief
     from .kernels.boxes import new_boxes
     from .kernels.surface import Surface
-    from .pipeline import check_cover
     from .scan.sites import Sites
 
     rows = np.arange(-6.0, 7.0) / 5.0
@@ -135,7 +135,7 @@ def compile_optimization(settings: Settings) -> None:
     relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
     relief.to_grid(grid)
     improve(relief, sites, np.zeros((0, 3)), settings)
-    check_cover(relief.to_grid(grid), sites, settings)
+    certify(relief.to_grid(grid), boundary, settings)
 
 
 def main(method: str) -> None:

@@ -1,6 +1,7 @@
 """The command line: the front that reads words, and the only place that says what went wrong and leaves.
 
-A refusal is one line on stderr and exit status 2; nothing is written then. Heavy imports wait for a command.
+A refusal is one line on stderr and exit status 2, or 3 where a grid fails its certificate; nothing is written then. Heavy
+imports wait for a command.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from types import FrameType
 
 from . import __version__
-from .errors import FrontError, InputError, ScanTrussError
+from .errors import CertificateError, FrontError, InputError, ScanTrussError
 
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
@@ -26,6 +27,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
   scantruss demo  [FOLDER]                 all of it on a bundled scan
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.
+Exit status: 0 done; 2 refused, as input or settings do not do; 3 the grid fails its certificate and is not
+written unless --keep-failed is given. One line says why.
 """
 
 
@@ -71,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse("interrupted; nothing was written", 130)
     except FrontError as error:
         place = "" if error.where is None else f" (near {', '.join(f'{c:.6g}' for c in error.where)})"
-        return refuse(f"{error}{place}")
+        return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)
     except ScanTrussError as error:
         return refuse(str(error))
     except OSError as error:

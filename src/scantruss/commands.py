@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import FormatError, InputError
+from .errors import CertificateError, FormatError, InputError
 
 if TYPE_CHECKING:
     from .grid.grid import Grid
@@ -75,6 +75,11 @@ def grid_parser() -> Parser:
     )
     files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
     files.add_argument("--report", metavar="FILE.json", help="save all figures of the run")
+    files.add_argument(
+        "--keep-failed",
+        action="store_true",
+        help="write a grid that fails its certificate too; the exit status is 3 either way",
+    )
     add_settings(parser)
     return parser
 
@@ -93,7 +98,7 @@ def grid(values: Namespace) -> None:
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
         cloud = read_scan(values.scan, settings, bars)
-        result = make_grid(cloud, settings, bars)
+        result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
     from .export.formats import write
 
     with SaveTogether() as save:
@@ -103,6 +108,8 @@ def grid(values: Namespace) -> None:
         if report is not None:
             save.json(report, report_of(result, len(cloud.points)))
     show_grid(result, len(cloud.points), [*outs, settings_file, *([report] if report else [])])
+    if result.certificate is not None and not result.certificate.passed:
+        raise CertificateError("the grid fails its certificate, and was written because of --keep-failed")
 
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
@@ -140,7 +147,7 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
+def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False) -> Grid:
     """Run the chain, and say so where kernels must be compiled."""
     from .ahead import CompileAhead
     from .pipeline import check_length, grid_from_cloud
@@ -148,7 +155,7 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars) -> Grid:
     check_length(cloud, settings)
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
-        grid = grid_from_cloud(cloud, settings, progress=progress)
+        grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed)
     note_strays(bars, cloud, settings)
     return grid
 
@@ -171,11 +178,13 @@ def note_compiling(bars: Bars, method: str, *stages: str) -> None:
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
-    """Print the figures of Table 2 and what was written."""
-    from .report.figures import grid_lines, quality_rows
+    """Print the figures of Table 2, the worst places and what was written."""
+    from .report.figures import certificate_rows, grid_lines, quality_rows
     from .report.terminal import print_lines, print_table
 
     print_table(("", "before", "after optimization"), quality_rows(result))
+    if result.certificate is not None:
+        print_table(("worst", "", "at"), certificate_rows(result.certificate))
     print_lines([*grid_lines(result, points), "wrote " + " ".join(map(str, written))])
 
 

@@ -3,6 +3,7 @@
 ScanTrussError
     InputError     data or a setting cannot be used (also a ValueError)
     FrontError     the front stopped early; has .grid, what was reached, and .where
+      CertificateError   a whole grid that does not pass; .grid has its certificate
     FormatError    a file cannot be read or written
 
 A message says what was got, what is needed and what to do, in one line.
@@ -36,6 +37,10 @@ class FrontError(ScanTrussError):
         super().__init__(message)
         self.grid = grid
         self.where = where
+
+
+class CertificateError(FrontError):
+    """A grid has come out that fails its certificate."""
 
 
 class FormatError(ScanTrussError):

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import FrontError, InputError
+from .errors import CertificateError, FrontError, InputError
 from .settings import Settings
 
 if TYPE_CHECKING:
     from .boundary import Boundary
     from .grid.grid import Grid
     from .scan.cloud import PointCloud
-    from .scan.sites import Sites
 
 Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
 
@@ -27,13 +26,11 @@ USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
 LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
 ATTEMPTS = (1.0, 0.97, 1.04)  #: desired lengths of the front, one after the other until a grid passes all checks
-COVER = 1.2  #: members from the nearest node at which a part of the scan counts as left out
-UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
-ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
-LEFT_OUT = 0.2  #: share of the scan that a grid may leave out
 
 
-def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progress | None = None) -> Grid:
+def grid_from_points(
+    points: np.ndarray, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
     """Return the grid of an array of points.
 
     Parameters
@@ -44,30 +41,41 @@ def grid_from_points(points: np.ndarray, settings: Settings, *, progress: Progre
         Desired member length and all the rest.
     progress : callable, optional
         ``progress(stage, share)``, called now and then; may raise to cancel.
+    keep_failed : bool
+        Return a grid that fails its certificate too; else that is a `CertificateError`, which has it as `.grid`.
 
     Returns
     -------
     Grid
-        With `settings`, `before` (quality before the optimization) and `seconds` of each stage.
+        With `settings`, `before` (quality before the optimization), `certificate` and `seconds` of each stage.
     """
     from .scan.cloud import PointCloud
 
     started = perf_counter()
     cloud = PointCloud.from_array(points, unit=settings.unit)
-    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+    spent = perf_counter() - started
+    return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 
 
-def grid_from_scan(path: str | Path, settings: Settings, *, progress: Progress | None = None) -> Grid:
+def grid_from_scan(
+    path: str | Path, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
     """Return the grid of a scan file; see `grid_from_points`."""
     from .scan.readers import read_points
 
     started = perf_counter()
     cloud = read_points(path, unit=settings.unit)
-    return grid_from_cloud(cloud, settings, progress=progress, read_seconds=perf_counter() - started)
+    spent = perf_counter() - started
+    return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 
 
 def grid_from_cloud(
-    cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, read_seconds: float = 0.0
+    cloud: PointCloud,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+    keep_failed: bool = False,
+    read_seconds: float = 0.0,
 ) -> Grid:
     """Return the grid of a point cloud; see `grid_from_points`.
 
@@ -79,6 +87,8 @@ def grid_from_cloud(
         Desired member length and all the rest.
     progress : callable, optional
         ``progress(stage, share)``.
+    keep_failed : bool
+        Return a grid that fails its certificate too.
     read_seconds : float
         What reading took [s], for the table of times.
     """
@@ -90,12 +100,16 @@ def grid_from_cloud(
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
 
-    def check(grid: Grid) -> None:
-        check_grid(grid)
-        check_boundary(grid, boundary)
-        check_cover(grid, boundary.sites, settings)
+    def check(grid: Grid) -> Grid:
+        return certified(grid, boundary, settings)
 
-    front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
+    try:
+        front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
+        before = grid.before or front.quality
+    except CertificateError as error:
+        if not keep_failed or len(error.grid.triangles) == 0:
+            raise
+        grid, before, advanced = error.grid, error.grid.before, found
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -104,14 +118,14 @@ def grid_from_cloud(
         "optimize": ended - advanced,
         "total": read_seconds + ended - started,
     }
-    return grid.replace(settings=settings, before=grid.before or front.quality, seconds=seconds)
+    return grid.replace(settings=settings, before=before, seconds=seconds)
 
 
 def _checked_grid(
     cloud: PointCloud,
     boundary: Boundary,
     settings: Settings,
-    check: Callable[[Grid], None],
+    check: Callable[[Grid], Grid],
     progress: Progress | None = None,
 ) -> tuple[Grid, Grid, float]:
     """Return the front and the grid of the first attempt that passes, and when its front was done.
@@ -136,95 +150,30 @@ def _checked_grid(
             if progress:
                 progress("optimize", 0.0)
             grid = optimize_grid(front, cloud, settings, boundary=boundary, progress=progress)
-            check(grid)
-            return front, grid, advanced
+            return front, check(grid), advanced
         except FrontError as error:
             faults.append(error)
-    raise faults[0]
+    raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
 
 
-def check_grid(grid: Grid) -> None:
-    """Refuse a grid that is none: rather no result than a wrong one that looks right.
-
-    Raises
-    ------
-    FrontError
-        No triangles, or the grid is not manifold, not orientable, or its members differ wildly.
-    """
-    if len(grid.triangles) == 0:
-        raise FrontError("no triangle could be made; use another length, or check the scan", grid)
-    found = grid.topology
-    if not (found.manifold and found.orientable):
-        fault = "not manifold" if not found.manifold else "not orientable"
-        raise FrontError(
-            f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
-        )
-    uneven = grid.quality.length_cv
-    if uneven > UNEVEN:
-        raise FrontError(
-            f"the lengths of the members came out {uneven:.0%} apart, so the grid is not written;"
-            " try a smaller length, or clean the scan",
-            grid,
-        )
-
-
-def check_boundary(grid: Grid, boundary: Boundary) -> None:
-    """Refuse a grid that has come apart or has openings that the scan has not.
+def certified(grid: Grid, boundary: Boundary, settings: Settings) -> Grid:
+    """Return the grid with its certificate: rather no result than a wrong one that looks right.
 
     Raises
     ------
-    FrontError
-        The grid has other components than the scan, or more boundary loops.
+    CertificateError
+        The grid does not pass. Names the first place of a fault.
     """
-    found, pieces, loops = grid.topology, len(boundary.sites.pieces), len(boundary.loops)
-    fault = ""
-    if found.components != pieces:
-        fault = f"in {found.components} pieces where the scan has {pieces}"
-    elif found.boundary_loops > loops:
-        fault = f"with {found.boundary_loops} boundary loops where the scan has {loops}"
-    if fault:
-        raise FrontError(
-            f"the grid came out {fault}, so it is not written; try a smaller length, or clean the scan", grid
-        )
+    from .grid.proof import certify
 
-
-def check_cover(grid: Grid, sites: Sites, settings: Settings) -> None:
-    """Refuse a grid that has left out a good part of the scan, or covers what the scan does not.
-
-    Raises
-    ------
-    FrontError
-        More than a fifth of the scan is farther than 1.2 members from every node; or the middle of a triangle is farther from the
-        scan than the holes that are closed are wide. Names a place there.
-    """
-    places = np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
-    far = np.empty(len(places), np.bool_)
-    count = _find_far(places, grid.nodes, COVER * settings.length, far)
-    if count > LEFT_OUT * len(places):
-        raise _astray(grid, places[np.argmax(far)], f"leaves out {count / len(places):.0%} of the scan")
-    middles = np.ascontiguousarray(grid.nodes[grid.triangles].mean(axis=1))
-    far = np.empty(len(middles), np.bool_)
-    if _find_far(middles, places, (ASTRAY + settings.smallest_hole / (2 * math.pi)) * settings.length, far):
-        raise _astray(grid, middles[np.argmax(far)], "covers what the scan does not")
-
-
-def _find_far(places: np.ndarray, others: np.ndarray, reach: float, far: np.ndarray) -> int:
-    """Mark the places that have none of the others within reach; returns their number."""
-    from .kernels.boxes import new_boxes
-    from .kernels.cover import mark_far
-
-    boxes = new_boxes(others.min(axis=0), others.max(axis=0), reach, len(others), len(others))
-    return mark_far(places, others, boxes, reach, far)
-
-
-def _astray(grid: Grid, place: np.ndarray, what: str) -> FrontError:
-    """The refusal of a grid that does not lie where the scan does."""
-    x, y, z = (place + grid.origin).tolist()
-    return FrontError(
-        f"the grid {what}, so it is not written; try another length, or clean the scan of what is not surface",
-        grid,
-        (x, y, z),
-    )
+    certificate = certify(grid, boundary, settings)
+    grid = grid.replace(certificate=certificate)
+    if certificate.passed:
+        return grid
+    words = " and ".join(fault.words for fault in certificate.faults)
+    where = next((fault.where for fault in certificate.faults if fault.where), None)
+    advice = "try another length, or clean the scan; --keep-failed gives the grid all the same"
+    raise CertificateError(f"the grid {words}; {advice}", grid, where)
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:

@@ -39,7 +39,7 @@ def several_grids(
     cloud: PointCloud,
     boundary: Boundary,
     settings: Settings,
-    check: Callable[[Grid], None],
+    check: Callable[[Grid], Grid],
     progress: Progress | None = None,
 ) -> tuple[Grid, Grid, float]:
     """Return the front and the grid of least energy a node out of several, and when the fronts were done.
@@ -49,7 +49,7 @@ def several_grids(
     Parameters
     ----------
     check : callable
-        Raises `FrontError` for a grid that must not be kept.
+        Returns the grid with its certificate; raises `FrontError` for one that must not be kept.
 
     Raises
     ------
@@ -75,9 +75,7 @@ def several_grids(
     def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
             improve_further(relief, boundary.sites, positions, settings)
-            grid = relief.to_grid(fronts[number]).replace(settings=settings)
-            check(grid)
-            return grid
+            return check(relief.to_grid(fronts[number]).replace(settings=settings, before=fronts[number].quality))
 
         return _passed(faults, number, work)
 

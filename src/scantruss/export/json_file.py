@@ -1,8 +1,9 @@
 """Our own format: JSON that holds a grid without loss.
 
-What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) is
-read back to the last bit. What follows from it (members, boundary loops, quality, topology) is written for other
-programs and not read back. No dates and no names are written: the same grid gives the same bytes.
+What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) and its
+certificate, which needs the scan, are read back to the last bit. What follows from it (members, boundary loops, quality,
+topology) is written for other programs and not read back. No dates and no names are written: the same grid gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import FormatError, InputError
+from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.quality import GridQuality
 from ..settings import UNITS, Settings
@@ -37,6 +39,7 @@ def encode_json(grid: Grid) -> bytes:
         "quality": _known(grid.quality.to_dict()),
         "before": None if grid.before is None else _known(grid.before.to_dict()),
         "topology": grid.topology.to_dict(),
+        "certificate": None if grid.certificate is None else grid.certificate.to_dict(),
         "fixed": np.flatnonzero(grid.fixed).tolist(),
         "boundary_loops": [loop.tolist() for loop in grid.boundary_loops],
         "nodes": np.asarray(grid.nodes, np.float64).tolist(),
@@ -123,7 +126,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         deviation = _floats([math.nan if d is None else d for d in deviation], "deviation", 1).ravel()
         if len(deviation) != len(nodes):
             raise ValueError(f"{len(deviation)} deviations for {len(nodes)} nodes")
-    settings, before = values.get("settings"), values.get("before")
+    settings, before, certificate = (values.get(name) for name in ("settings", "before", "certificate"))
     return Grid(
         nodes=nodes,
         triangles=triangles,
@@ -133,6 +136,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         deviation=deviation,
         settings=None if settings is None else Settings.from_dict(settings),
         before=None if before is None else GridQuality(**before, unit=unit),
+        certificate=None if certificate is None else Certificate.from_dict(certificate),
     )
 
 

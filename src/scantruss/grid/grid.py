@@ -10,6 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from ..settings import Settings
+    from .certificate import Certificate
     from .quality import GridQuality, Topology
 
 
@@ -25,10 +26,13 @@ class Grid:
     deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)
+    certificate: Certificate | None = None  #: what was checked against the scan
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
 
     def replace(self, **changes: Any) -> Grid:
-        """Return a copy with some fields changed."""
+        """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of."""
+        if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
+            changes = {"certificate": None, **changes}
         return replace(self, **changes)
 
     @cached_property

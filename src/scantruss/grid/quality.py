@@ -116,7 +116,7 @@ def measure_quality(grid: Grid) -> GridQuality:
     )
 
 
-def _labels(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def labels(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return for each of `count` things the smallest thing that the links first-second join it with."""
     label = np.arange(count)
     while True:
@@ -149,14 +149,12 @@ def _is_orientable(grid: Grid) -> bool:
     starts = grid.triangles.T.ravel()
     turned = starts[one] == starts[other]
     a, b = one % count, other % count
-    label = _labels(
-        2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned])
-    )
+    label = labels(2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned]))
     return not np.any(label[:count] == label[count:])
 
 
-def _count_pinched_nodes(grid: Grid) -> int:
-    """Return the number of nodes whose triangles are more than one fan, joined over edges at the node."""
+def pinched_nodes(grid: Grid) -> np.ndarray:
+    """Return the nodes whose triangles are more than one fan, joined over edges at the node."""
     count = len(grid.triangles)
     corners = grid.triangles.T.ravel()  # corner k of triangle t stands at k * count + t, as does the half-edge k
     one, other = _links(grid)
@@ -167,9 +165,9 @@ def _count_pinched_nodes(grid: Grid) -> int:
         for half, found in ((one, first), (other, second)):
             starts = corners[half] == node
             found.append(np.where(starts, half, (half + count) % (3 * count)))
-    label = _labels(3 * count, np.concatenate(first), np.concatenate(second))
+    label = labels(3 * count, np.concatenate(first), np.concatenate(second))
     fans = np.bincount(corners[np.unique(label)], minlength=len(grid.nodes))
-    return int((fans > 1).sum())
+    return np.flatnonzero(fans > 1)
 
 
 def measure_topology(grid: Grid) -> Topology:
@@ -181,10 +179,10 @@ def measure_topology(grid: Grid) -> Topology:
     triangles, edges, uses = grid.triangles, grid.edges, grid.edge_uses
     if len(triangles) == 0:
         return Topology(components=0, boundary_loops=0, euler=0, manifold=True, orientable=True)
-    node = _labels(len(grid.nodes), edges[:, 0], edges[:, 1])
+    node = labels(len(grid.nodes), edges[:, 0], edges[:, 1])
     used = np.unique(triangles)
     rim = edges[uses == 1]
-    rim_label = _labels(len(grid.nodes), rim[:, 0], rim[:, 1])
+    rim_label = labels(len(grid.nodes), rim[:, 0], rim[:, 1])
     passages = np.bincount(rim.ravel(), minlength=len(grid.nodes)) // 2
     loops = len(np.unique(rim_label[rim[:, 0]])) + int(np.maximum(passages - 1, 0).sum())
     a, b, c = np.sort(triangles, axis=1).T
@@ -193,6 +191,6 @@ def measure_topology(grid: Grid) -> Topology:
         components=len(np.unique(node[used])),
         boundary_loops=loops,
         euler=len(used) - len(edges) + len(triangles),
-        manifold=bool(whole and uses.max() <= 2 and _count_pinched_nodes(grid) == 0),
+        manifold=bool(whole and uses.max() <= 2 and len(pinched_nodes(grid)) == 0),
         orientable=_is_orientable(grid),
     )

@@ -1,24 +1,72 @@
-"""How much of a scan a grid covers, and of a grid the scan."""
+"""How far a scan lies from a grid, and a grid from the scan."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .boxes import SearchBoxes, put, search
+from .boxes import SearchBoxes, box_index, put, slot_of
 from .compile import kernel
+from .triangles import distance_to_triangle
+from .vectors import dot, row, subtract
 
 
 @kernel
-def mark_far(places: np.ndarray, others: np.ndarray, boxes: SearchBoxes, reach: float, far: np.ndarray) -> int:
-    """Mark the places (P, 3) that have none of the others (Q, 3) within `reach`; returns their number.
+def put_places(boxes: SearchBoxes, places: np.ndarray) -> None:
+    """Put all places (P, 3) into empty boxes with room for them."""
+    for p in range(len(places)):
+        put(boxes, p, places[p, 0], places[p, 1], places[p, 2])
 
-    boxes : empty, with room for Q items. far : (P,) bool, filled.
+
+@kernel
+def lower_distances(
+    places: np.ndarray, boxes: SearchBoxes, nodes: np.ndarray, triangles: np.ndarray, reach: float, distance: np.ndarray
+) -> None:
+    """Lower the distance (P,) of each place to that of the nearest triangle, where that is at most `reach`.
+
+    boxes : the places (P, 3) by box.
     """
-    for n in range(len(others)):
-        put(boxes, n, others[n, 0], others[n, 1], others[n, 2])
-    found = np.empty(1, np.int64)
-    count = 0
-    for s in range(len(places)):
-        far[s] = search(boxes, others, places[s, 0], places[s, 1], places[s, 2], reach, found) == 0
-        count += far[s]
-    return count
+    for t in range(len(triangles)):
+        a, b, c = row(nodes, triangles[t, 0]), row(nodes, triangles[t, 1]), row(nodes, triangles[t, 2])
+        x0, x1 = min(a[0], b[0], c[0]) - reach, max(a[0], b[0], c[0]) + reach
+        y0, y1 = min(a[1], b[1], c[1]) - reach, max(a[1], b[1], c[1]) + reach
+        z0, z1 = min(a[2], b[2], c[2]) - reach, max(a[2], b[2], c[2]) + reach
+        for i in range(box_index(boxes, 0, x0), box_index(boxes, 0, x1) + 1):
+            for j in range(box_index(boxes, 1, y0), box_index(boxes, 1, y1) + 1):
+                for k in range(box_index(boxes, 2, z0), box_index(boxes, 2, z1) + 1):
+                    p = boxes.first[slot_of(boxes, i, j, k)]
+                    while p >= 0:
+                        x, y, z = places[p, 0], places[p, 1], places[p, 2]
+                        if x0 <= x <= x1 and y0 <= y <= y1 and z0 <= z <= z1:
+                            d = distance_to_triangle((x, y, z), a, b, c)
+                            if d <= reach and d < distance[p]:
+                                distance[p] = d
+                        p = boxes.next[p]
+
+
+@kernel
+def nearest_distances(
+    others: np.ndarray, places: np.ndarray, boxes: SearchBoxes, near: float, distance: np.ndarray
+) -> None:
+    """Distance (Q,) of each of the others (Q, 3) to the nearest place; the search starts with `near` and goes on to twice as far.
+
+    boxes : the places (P, 3) by box, one at least.
+    """
+    for q in range(len(others)):
+        x, y, z = row(others, q)
+        reach = near
+        while True:
+            best = math.inf
+            for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+                for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+                    for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                        p = boxes.first[slot_of(boxes, i, j, k)]
+                        while p >= 0:
+                            d = subtract(row(places, p), (x, y, z))
+                            best = min(best, dot(d, d))
+                            p = boxes.next[p]
+            if best <= reach * reach:
+                distance[q] = math.sqrt(best)
+                break
+            reach *= 2.0

@@ -105,6 +105,27 @@ def distance_to_segment(p: Vector, a: Vector, b: Vector) -> float:
 
 
 @kernel
+def across_edge(edge: Vector, arm: Vector) -> Vector:
+    """Part of an arm at right angles to an edge; the arm itself where the edge has no length."""
+    square = dot(edge, edge)
+    t = dot(arm, edge) / square if square > 0.0 else 0.0
+    return arm[0] - t * edge[0], arm[1] - t * edge[1], arm[2] - t * edge[2]
+
+
+@kernel
+def distance_to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
+    """Distance of a place from the triangle abc, its inside included."""
+    ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
+    normal = cross(ab, ac)
+    square = dot(normal, normal)
+    if square > 0.0:
+        second, third = dot(cross(ap, ac), normal), dot(cross(ab, ap), normal)
+        if second >= 0.0 and third >= 0.0 and second + third <= square:
+            return abs(dot(ap, normal)) / math.sqrt(square)
+    return min(distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a))
+
+
+@kernel
 def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
     """Unit vector at an angle anticlockwise from a direction, in the plane of a unit normal."""
     flat = subtract(

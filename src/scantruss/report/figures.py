@@ -10,6 +10,7 @@ from .. import __version__
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
+    from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
 
@@ -32,6 +33,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
         "quality": grid.quality.to_dict(),
         "before": grid.before.to_dict() if grid.before is not None else None,
         "topology": grid.topology.to_dict(),
+        "certificate": grid.certificate.to_dict() if grid.certificate is not None else None,
         "seconds": dict(grid.seconds),
         "settings": grid.settings.to_dict() if grid.settings is not None else None,
         "version": __version__,
@@ -91,17 +93,39 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
             f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {count_holes(grid)} of them holes"
             if loops
             else "closed"
-        )
-        + ("" if topology.manifold and topology.orientable else "; WARNING: the grid is not an oriented manifold"),
+        ),
     ]
     if quality.node_deviation_mean is not None and quality.node_deviation_max is not None:
         lines.append(
             f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the scan on average,"
             f" {quality.node_deviation_max:.3g}{unit} at most"
         )
+    if grid.certificate is not None:
+        lines.append(f"certificate: {grid.certificate}")
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
     return lines
+
+
+def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
+    """Return the worst places of a grid: name, figure, place in the scan's own frame."""
+    unit = f" {certificate.unit}" if certificate.unit else ""
+    found = (
+        ("shortest member", certificate.shortest_member, unit),
+        ("longest member", certificate.longest_member, unit),
+        ("smallest angle", certificate.smallest_angle, " degrees"),
+        ("largest angle", certificate.largest_angle, " degrees"),
+        ("sharpest fold between triangles", certificate.sharpest_fold, " degrees"),
+        ("node farthest from the scan", certificate.node_deviation, unit),
+        ("triangle farthest from the scan", certificate.farthest_triangle, unit),
+        ("scan farthest from the grid", certificate.farthest_scan, unit),
+        ("fixed node farthest from its position", certificate.fixed_error, unit),
+    )
+    return [
+        (name, f"{worst.value:.4g}{words}", ", ".join(f"{c:.6g}" for c in worst.where))
+        for name, worst, words in found
+        if worst is not None
+    ]
 
 
 def cloud_lines(cloud: PointCloud) -> list[str]:

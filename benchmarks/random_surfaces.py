@@ -1,0 +1,144 @@
+"""Random surfaces through the whole chain: `python -m benchmarks.random_surfaces --seeds 1000` on all processors.
+
+Each seed is a cloud with known topology (`tests/random_surfaces.py`). Right: a grid of that topology that passes its
+certificate. Wrong: a grid that passes, of another topology. Refused: an error in words, by its first fault.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from random_surfaces import RandomSurface, random_surface
+
+import scantruss as st
+
+from .measure import Measured, measure
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one seed."""
+
+    seed: int
+    result: str  #: right wrong refused
+    fault: str  #: of a refused one: the kinds of its faults, or the class of the error
+    words: str
+    found: Measured | None  #: of a grid that came out
+    extra: int = 0  #: irregular nodes beyond those that are forced
+
+    def line(self) -> str:
+        """Return all in one line."""
+        figures = self.found.line() if self.found else ""
+        return f"{self.seed:6d} {self.result} {self.fault} {self.words} {figures}".rstrip()
+
+
+def judge(surface: RandomSurface, seed: int, settings: st.Settings) -> Outcome:
+    """Return what becomes of a surface with some settings."""
+    try:
+        grid = st.grid_from_points(surface.points, settings)
+    except st.CertificateError as error:
+        assert error.grid.certificate is not None
+        kinds = " ".join(fault.kind for fault in error.grid.certificate.faults)
+        return Outcome(seed, "refused", kinds, f"{error} {error.where}", None)
+    except st.ScanTrussError as error:
+        return Outcome(seed, "refused", type(error).__name__, str(error), None)
+    found, certificate = measure(surface, grid, settings.length), grid.certificate  # type: ignore[arg-type]
+    assert certificate is not None
+    extra = certificate.irregular - certificate.irregular_forced
+    return Outcome(seed, "right" if found.right else "wrong", "", "", found, extra)
+
+
+def try_seed(seed: int, method: str = "default", effort: str = "normal") -> Outcome:
+    """Return what becomes of a seed."""
+    surface = random_surface(seed)
+    return judge(surface, seed, st.Settings(length=surface.length, method=method, effort=effort))
+
+
+def try_seeds(seeds: Iterable[int], method: str, effort: str) -> Iterator[Outcome]:
+    """Yield what becomes of the seeds, on all processors, in their order."""
+    work = partial(try_seed, method=method, effort=effort)
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(work, seeds, chunksize=4)
+
+
+HEADER = (
+    "| by | seeds | right | wrong | refused | mean G: mean, least | min G: least | CV: mean, most | angles | six |"
+    " length | distance | rim |\n" + "| --- |" + " ---: |" * 12
+)
+NOTE = """\
+Smooth random heights over random outlines with concave rims, 0 to 4 holes, necks and gaps of three members or more,
+20 to 120 points a member squared and up to four times denser at one end, noise up to a tenth of a member, any pose and unit.
+Right: the topology of the surface, and the certificate passed. Length: mean length in desired lengths, least and most.
+Distance: mean distance of the nodes from the true surface in standard deviations of the noise, the mean and the most of
+all seeds with noise. Rim: largest distance of the true rim from the grid's rim, in members."""
+
+
+def row(name: str, outcomes: list[Outcome]) -> str:
+    """Return the row of a table."""
+    count = Counter(outcome.result for outcome in outcomes)
+    found = [outcome.found for outcome in outcomes if outcome.found]
+    start = f"| {name} | {len(outcomes)} | {count['right']} | {count['wrong']} | {count['refused']} |"
+    if not found:
+        return start + " |" * 8
+    shape, cv, length, rim = (
+        np.array([getattr(f, key) for f in found]) for key in ("shape_mean", "cv", "length", "rim")
+    )
+    noisy = np.array([f.distance for f in found if f.distance_in == "noise"] or [np.nan])
+    return (
+        f"{start} {shape.mean():.4f}, {shape.min():.4f} | {min(f.shape_min for f in found):.2f} |"
+        f" {cv.mean():.4f}, {cv.max():.4f} | {min(f.angle_min for f in found):.0f}-{max(f.angle_max for f in found):.0f} |"
+        f" {np.mean([f.valence6 for f in found]):.2f} | {length.min():.3f}-{length.max():.3f} |"
+        f" {noisy.mean():.2f}, {noisy.max():.2f} | {rim.mean():.2f}, {rim.max():.2f} |"
+    )
+
+
+def failures(outcomes: list[Outcome]) -> str:
+    """Return all that is not right, by its fault, with the seeds."""
+    bad = [outcome for outcome in outcomes if outcome.result != "right"]
+    kinds = Counter((outcome.result, outcome.fault) for outcome in bad)
+    return "\n".join(
+        f"- {result} {fault}: ".replace(" :", ":")
+        + f"{number} (seeds {', '.join(str(o.seed) for o in bad if (o.result, o.fault) == (result, fault))})"
+        for (result, fault), number in kinds.most_common()
+    )
+
+
+def section(seeds: int, methods: Iterable[tuple[str, str]] = (("default", "quick"), ("default", "normal"))) -> str:
+    """Return the section of docs/numbers.md: a row for each method and effort, and every failure."""
+    rows, bad = [HEADER], []
+    for method, effort in methods:
+        outcomes = list(try_seeds(range(seeds), method, effort))
+        name = effort if method == "default" else method
+        rows.append(row(name, outcomes))
+        bad.append(f"By {name}:\n\n{failures(outcomes)}" if failures(outcomes) else f"By {name}: no failure.")
+    return "\n\n".join([NOTE, "\n".join(rows), *bad])
+
+
+def main() -> int:
+    """Run what the arguments name; the exit status is 1 if any seed is not right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=100, help="how many")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--method", default="default")
+    parser.add_argument("--effort", default="normal")
+    parser.add_argument("--lines", action="store_true", help="print the line of every seed, not only of failures")
+    options = parser.parse_args()
+    outcomes = []
+    for outcome in try_seeds(range(options.first, options.first + options.seeds), options.method, options.effort):
+        outcomes.append(outcome)
+        if options.lines or outcome.result != "right":
+            print(outcome.line(), flush=True)
+    print(f"{HEADER}\n{row(f'{options.method} {options.effort}', outcomes)}\n\n{failures(outcomes)}".rstrip())
+    return int(any(outcome.result != "right" for outcome in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

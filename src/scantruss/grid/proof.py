@@ -1,0 +1,135 @@
+"""How the certificate of a grid is made.
+
+A grid that does not pass is refused by `pipeline`: rather no result than a wrong one that looks right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .certificate import Certificate, Fault, Worst, place_of
+from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
+from .crossings import find_crossings
+from .faults import faults_in_space, faults_of_topology
+from .irregular import count_irregular
+from .quality import corner_angles
+
+if TYPE_CHECKING:
+    from ..boundary import Boundary
+    from ..settings import Settings
+    from .grid import Grid
+
+REACH = 0.5  #: members from the nearest triangle, or part of the scan, up to which one lies within reach of the other
+
+
+def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
+    """Return the certificate of a grid.
+
+    Parameters
+    ----------
+    grid : Grid
+        Of the same origin as the scan.
+    boundary : Boundary
+        Boundary loops of the scan, and the sites they were found in.
+    settings : Settings
+        `length` is the desired member length, `smallest_hole` tells which holes are closed, `fixed` where nodes must be.
+
+    Returns
+    -------
+    Certificate
+        Nothing is raised where it does not pass; see `Certificate.faults`.
+    """
+    found = grid.topology
+    closed = found.manifold and found.orientable
+    told = Certificate(
+        unit=grid.unit,
+        reach=REACH * settings.length,
+        manifold=found.manifold,
+        orientable=found.orientable,
+        pieces=found.components,
+        scan_pieces=len(boundary.sites.pieces),
+        boundary_loops=found.boundary_loops,
+        scan_loops=len(boundary.loops),
+        euler=found.euler,
+        handles=(2 * found.components - found.boundary_loops - found.euler) // 2 if closed else None,
+    )
+    if len(grid.triangles) == 0:
+        return replace(told, faults=(Fault("empty", "has no triangles"),))
+    if not np.isfinite(grid.nodes).all():
+        return replace(told, faults=(Fault("empty", "has nodes that are nowhere"),))
+    cuts = find_crossings(grid.nodes, grid.triangles)
+    told = replace(told, crossings=len(cuts), **_cover(grid, boundary, settings.length), **_extremes(grid, settings))
+    return replace(
+        told, faults=(*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings))
+    )
+
+
+def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
+    """Return how far scan and grid lie from each other."""
+    places = scan_places(boundary.sites)
+    boxes = boxes_of(places, 0.5 * length)
+    left = distances_to_grid(places, boxes, grid, length)
+    middles = grid.nodes[grid.triangles].mean(axis=1)
+    away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
+    astray, off = away[: len(middles)], away[len(middles) :]
+    if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
+        off = np.fmin(off, grid.deviation)
+    return {
+        "scan_within_reach": float((left <= REACH * length).mean()),
+        "farthest_scan": _worst(left, places, grid),
+        "grid_within_reach": float((astray <= REACH * length).mean()),
+        "farthest_triangle": _worst(astray, middles, grid),
+        "node_deviation": _worst(off, grid.nodes, grid),
+    }
+
+
+def _extremes(grid: Grid, settings: Settings) -> dict[str, Any]:
+    """Return the worst members, angles, fold and fixed node, and how many irregular nodes there are."""
+    halves = grid.nodes[grid.edges].mean(axis=1)
+    corners = grid.nodes[grid.triangles].reshape(-1, 3)
+    angles = corner_angles(grid.nodes, grid.triangles)
+    irregular, forced = count_irregular(grid, angles)
+    return {
+        "shortest_member": _worst(grid.lengths, halves, grid, -1.0),
+        "longest_member": _worst(grid.lengths, halves, grid),
+        "smallest_angle": _worst(angles.ravel(), corners, grid, -1.0),
+        "largest_angle": _worst(angles.ravel(), corners, grid),
+        "sharpest_fold": _worst(fold_angles(grid), halves, grid, -1.0),
+        "fixed_error": _fixed_error(grid, settings),
+        "irregular": irregular,
+        "irregular_forced": forced,
+    }
+
+
+def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, sign: float = 1.0) -> Worst | None:
+    """Return the largest of the values (K,), or the smallest for sign -1, and its place (K, 3); None of none."""
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) == 0:
+        return None
+    at = known[np.argmax(sign * values[known])]
+    return Worst(float(values[at]), place_of(places[at] + grid.origin))
+
+
+def fold_angles(grid: Grid) -> np.ndarray:
+    """Return the angle between the first two triangles at each member, (E,) [degree]: 180 level, 0 folded flat; NaN at the rim."""
+    two = grid.edge_triangles
+    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+    first, second = normal[two[:, 0]], normal[two[:, 1]]
+    angle = 180.0 - np.degrees(
+        np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1))
+    )
+    return np.where(two[:, 1] >= 0, angle, np.nan)
+
+
+def _fixed_error(grid: Grid, settings: Settings) -> Worst | None:
+    """Return the largest distance of a position of the settings from the nearest fixed node."""
+    if not settings.fixed:
+        return None
+    positions = np.array(settings.fixed) - grid.origin
+    nodes = grid.nodes[grid.fixed] if grid.fixed.any() else grid.nodes
+    return _worst(np.linalg.norm(positions[:, None] - nodes, axis=2).min(axis=1), positions, grid)
