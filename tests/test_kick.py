@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.equalize import WEIGHT, energy_of_node, new_area, new_scratch, search_widely, settle
+from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_area, new_scratch, search_widely, settle
 from scantruss.kernels import kick as kernels
 from scantruss.kernels.trial import total_energy
 
@@ -113,7 +113,7 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
     rough, relief, _, _ = settled
     grid = relief.to_grid(rough.grid)
     mean = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean()
-    slow = naive_grid.energy(grid, relief.length, WEIGHT) / len(grid.nodes) + 18.0 * (mean / relief.length - 1.0) ** 2
+    slow = naive_grid.energy(grid, relief.length, WEIGHT) / len(grid.nodes) + PRICE * (mean / relief.length - 1.0) ** 2
     assert energy_of_node(relief) == pytest.approx(slow, rel=1e-9)
 
 

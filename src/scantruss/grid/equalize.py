@@ -23,7 +23,7 @@ from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = {"balance": 2.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
-PRICE = 18.0  # of a mean length that is not the desired one
+PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (80, 0.2)}  # rounds of kicks, and what they may cost at first
