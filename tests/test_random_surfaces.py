@@ -11,7 +11,10 @@ from scipy.spatial import cKDTree
 
 import scantruss as st
 
-FAILED: dict[int, str] = {}  # seeds that once failed, by method and effort
+KEPT = {  # seeds that failed or came out worst, their method and effort
+    45: "default normal",  # noise makes corners of smooth rims: angles of 13 and 152 degrees
+    152: "default normal",  # the same: twenty-one corners where there is none, angles of 8 and 163 degrees
+}
 
 
 def check(seed: int, method: str, effort: str) -> None:
@@ -32,9 +35,9 @@ def test_random_surfaces_come_out_right(seed: int, method: str) -> None:
     check(seed, method, "quick")
 
 
-@pytest.mark.parametrize("seed", FAILED)
-def test_seeds_that_once_failed(seed: int) -> None:
-    check(seed, *FAILED[seed].split())
+@pytest.mark.parametrize("seed", KEPT)
+def test_seeds_that_are_kept_come_out_right(seed: int) -> None:
+    check(seed, *KEPT[seed].split())
 
 
 @settings(max_examples=8)
