@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from pathlib import Path
 
 from scantruss.settings import Settings
@@ -23,12 +23,10 @@ def settings_table() -> str:
     rows = []
     for spec in fields(Settings):
         about = spec.metadata
-        default = (
-            "needed" if spec.default is MISSING else "none" if spec.default in ("", (), None) else str(spec.default)
-        )
+        default = "needed" if spec.name == "length" else "none" if spec.default in ("", (), None) else str(spec.default)
         cells = (
             f"`{spec.name}`",
-            f"`--{spec.name.replace('_', '-')}`",
+            f"`--{spec.name.removesuffix('_field').replace('_', '-')}`",
             about["symbol"],
             about["unit"],
             default,

@@ -69,6 +69,7 @@ def advance_front(
             settings.search_range * sites.spacing,
             1.0,
             float(settings.case3 == "quadrangle"),
+            settings.length,
         ]
     )
     for strict in STRICTNESS:
@@ -78,20 +79,23 @@ def advance_front(
             lists.enqueue(front, s)
         by_cases = settings.method == "paper" and strict == STRICTNESS[0]
         front = run(front, sites, numbers, progress, kernels.advance_by_cases if by_cases else kernels.advance)
-    close_gaps(front, settings)
+    close_gaps(front, sites, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     used, numbered = np.unique(triangles, return_inverse=True)
+    graded = bool(np.any(sites.surface.field != 1.0))
+    desired = settings.length * sites.surface.field[front.site[used]] if graded else None
     return Grid(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),
         np.zeros(len(used), np.bool_),
         cloud.origin,
         cloud.unit,
+        desired=desired,
         settings=settings,
     )
 
 
-def close_gaps(front: lists.Front, settings: Settings) -> None:
+def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
     Loops of the boundary of which the front has reached no segment are left out.
@@ -101,8 +105,9 @@ def close_gaps(front: lists.Front, settings: Settings) -> None:
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()
+            length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
-            if unreached or count > GAP or not gaps.close_gap(front, segments, count, settings.length):
+            if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
                 before, after = front.previous[segments[0]], front.next[segments[-1]]
                 for t in segments:
                     lists.remove_segment(front, t)
@@ -112,8 +117,9 @@ def close_gaps(front: lists.Front, settings: Settings) -> None:
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = sites.surface.mean, int(2.0 * sites.area / (0.433 * settings.length**2)) + 2000
-    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), settings.length, room, room)
+    mean, room = sites.surface.mean, int(2.0 * sites.graded_area / (0.433 * settings.length**2)) + 2000
+    usual = settings.length * float(np.sqrt(sites.area / sites.graded_area))
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), usual, room, room)
     return _blank(room, boxes)
 
 
@@ -172,8 +178,9 @@ def start_front(
     for number in boundary.sites.pieces:
         if number not in bounded:
             site = int(np.flatnonzero(piece == number)[0])
-            ids = seed_of_rows(front, surface, site, settings.length)
-            add_seed(front, ids or new_seed(front, surface, site, settings.length))
+            length = settings.length * float(surface.field[site])
+            ids = seed_of_rows(front, surface, site, length)
+            add_seed(front, ids or new_seed(front, surface, site, length))
     return front
 
 
@@ -254,7 +261,7 @@ def run(
     front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = sites.area / (0.433 * numbers[lists.LENGTH] ** 2)
+    expected = sites.graded_area / (0.433 * numbers[lists.REFERENCE] ** 2)
     while True:
         status = step(sites.surface, front, numbers, BUDGET)
         if progress:

@@ -48,6 +48,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         state=np.zeros((capacity, 5), np.int64),
         arc=np.zeros(capacity),
         free=np.zeros(capacity + 2, np.int64),
+        desired=np.ones(capacity),
     )
     net.curve[:] = -1
     source = np.full(capacity, -1, np.int64)
@@ -66,10 +67,17 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     return net, source
 
 
-def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | None = None) -> Grid:
+def close_net(
+    net: Net,
+    source: np.ndarray,
+    grid: Grid,
+    deviation: np.ndarray | None = None,
+    desired: np.ndarray | None = None,
+) -> Grid:
     """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped.
 
-    `deviation` (C,) is the distance of each node of the net from the scan [scan unit].
+    `deviation` (C,) is the distance of each node of the net from the scan, `desired` (C,) the desired member length there, where it
+    is not the same for all [scan unit].
     """
     used = net.used
     room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
@@ -81,6 +89,7 @@ def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | 
         triangles=inverse.reshape(-1, 3).astype(np.int64),
         fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
         deviation=None if deviation is None else deviation[kept],
+        desired=None if desired is None else desired[kept],
     )
 
 
@@ -94,7 +103,7 @@ class Relief:
     patches: np.ndarray  #: (C, PATCH) local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
-    length: float  #: desired member length [scan unit]
+    length: float  #: desired member length, that of the length field's 1 [scan unit]
     landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
 
     @classmethod
@@ -172,7 +181,10 @@ class Relief:
 
     def to_grid(self, grid: Grid) -> Grid:
         """Put the net together again, with all else as in `grid`; deviation measured."""
-        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), self.deviation())
+        deviation = self.deviation()
+        graded = bool(np.any(self.surface.field != 1.0))
+        desired = self.length * self.net.desired if graded else None
+        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), deviation, desired)
 
 
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
+from .field import length_at
 from .grid import CURVE, DEGREE, INTERIOR, KIND, RIM, Net
 from .rim import Rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
@@ -59,15 +60,16 @@ def seat_nodes(
 def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, begin: int, end: int) -> int:
     """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
 
-    Returns how many.
+    Returns how many. Every node also gets the length that is desired where it stands.
     """
     count = 0
     for v in range(begin, end):
         if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
-            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near:
+            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
                 count += 1
+            net.desired[v] = length_at(surface, int(patches[v, 15]), place)
     return count
 
 
@@ -79,7 +81,7 @@ def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> Non
         if net.state[v, DEGREE] > 0 and net.state[v, KIND] == INTERIOR:
             x, y, z = onto_patch(patches[v], (x, y, z))
         elif net.state[v, DEGREE] > 0 and net.state[v, KIND] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach, x, y, z)
+            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach * net.desired[v], x, y, z)
         net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 
