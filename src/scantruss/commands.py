@@ -51,7 +51,9 @@ def info(values: Namespace) -> None:
 
         boundary = find_boundary(cloud, settings, progress=bars)
         note_strays(bars, cloud, settings)
-    print_lines([f"boundaries for members of {settings.length:g} {cloud.unit}".rstrip() + ":"])
+    field = boundary.sites.surface.field
+    longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
+    print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:
         print_table(("boundary", "length", "corners"), loop_rows(boundary))
     else:

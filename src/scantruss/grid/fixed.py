@@ -41,17 +41,18 @@ def check_positions(
     relative = places - cloud.origin
     for k, place in enumerate(relative):
         distance = _distance_from_scan(surface, place)
-        if distance > 0.5 * length:
+        local = length * _desired_at(surface, place)
+        if distance > 0.5 * local:
             raise InputError(
                 f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * length:.4g}{unit}"
+                f" it must lie within half a member, {0.5 * local:.4g}{unit}"
             )
         gaps = np.linalg.norm(relative[:k] - place, axis=1)
-        if k and gaps.min() < 0.5 * length * (1 - 1e-9):
+        if k and gaps.min() < 0.5 * local * (1 - 1e-9):
             other = places[int(gaps.argmin())]
             raise InputError(
                 f"fixed positions {_text(other)} and {_text(places[k])} are {gaps.min():.4g}{unit} apart;"
-                f" they need half a member, {0.5 * length:.4g}{unit}"
+                f" they need half a member, {0.5 * local:.4g}{unit}"
             )
     return relative
 
@@ -71,6 +72,11 @@ def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
     return float(np.sqrt(best))
 
 
+def _desired_at(surface: Surface, place: np.ndarray) -> float:
+    """Desired length at a place, in lengths."""
+    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
+
+
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it.
 
@@ -83,7 +89,8 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     if len(away) and away.min() < AT_RIM * relief.length:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
-    if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & (net.kind == RIM)):
+    local = relief.length * _desired_at(relief.surface, place)
+    if curve >= 0 and distance <= AT_RIM * local and np.any(free & (net.kind == RIM)):
         free &= net.kind == RIM
     nodes = np.flatnonzero(free)
     order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")
