@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
+from scantruss.options import option_of
 from scantruss.settings import Settings
 
 PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
@@ -26,7 +27,7 @@ def settings_table() -> str:
         default = "needed" if spec.name == "length" else "none" if spec.default in ("", (), None) else str(spec.default)
         cells = (
             f"`{spec.name}`",
-            f"`--{spec.name.removesuffix('_field').replace('_', '-')}`",
+            f"`{option_of(spec.name)}`",
             about["symbol"],
             about["unit"],
             default,

@@ -166,8 +166,8 @@ _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
 
 
 def option_of(name: str) -> str:
-    """Return the option of a field."""
-    return "--" + name.replace("_", "-")
+    """Return the option of a field; a length field is a value of ``--length``."""
+    return "--" + name.removesuffix("_field").replace("_", "-")
 
 
 def describe(spec: Field[Any]) -> str:
@@ -186,7 +186,7 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
     group = parser.add_argument_group("settings of the method")
     for spec in fields(Settings):
         if (names and spec.name not in names) or spec.name == "length_field":
-            continue  # a length field is a value of --length
+            continue
         choices = spec.metadata["choices"]
         options: dict[str, Any] = {"dest": spec.name, "default": argparse.SUPPRESS, "help": describe(spec)}
         if spec.name == "fixed":

@@ -155,8 +155,8 @@ def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
 def measure_bends(surface: Surface, sites: np.ndarray, found: np.ndarray, begin: int, end: int) -> None:
     """Measure how much the scan bends at some sites (P,), from `begin` to `end` - 1.
 
-    found : (P, 3), filled: largest curvature without sign, its standard deviation by the noise, mean distance of the points from
-    the patch; the deviation is that of least squares with the weights of a patch, which grows where the scan lies to one side only
+    found : (P, 2), filled: largest curvature without sign, and its standard deviation by the noise: that of least squares with the
+    weights of a patch, which grows where the scan lies to one side only
     """
     patch = np.zeros(PATCH)
     for i in range(begin, end):
@@ -169,8 +169,7 @@ def measure_bends(surface: Surface, sites: np.ndarray, found: np.ndarray, begin:
             x, y, z = x + d[0], y + d[1], z + d[2]
         aside = norm((x, y, z)) / (max(count, 1) * surface.scale[2])
         found[i, 0] = _bend(patch)
-        found[i, 2] = patch[17]
         spread = SPREAD * (1.0 + ASIDE * aside * aside) * 1.25 * patch[17]
         found[i, 1] = spread / (surface.scale[2] * surface.scale[2] * math.sqrt(max(taken, 1)))
         if taken < 10:
-            found[i, 1] = found[i, 2] = np.inf
+            found[i, 1] = np.inf

@@ -20,8 +20,7 @@ SLOPE = (
 )  # growth per way; the ways over the links are up to an eighth too long
 FLAT = 0.002  # a member of the longest length that bulges by less than this, in its length, is flat
 BENT = 0.95  # share of the scan that bends less than where the shortest length is desired
-DOUBT = 2.0  # standard deviations of a curvature that may be noise
-LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
+DOUBT = 3.3  # standard deviations of a curvature that may be noise
 FAR = 1.0  # a given length may be so far from the scan, in that length
 PART = 200  # fewest sites for a thread of their own
 
@@ -106,30 +105,32 @@ def _by_curvature(surface: Surface, most: float) -> np.ndarray:
 def measured_bends(surface: Surface, most: float) -> np.ndarray:
     """Return the largest curvature of the scan at each site (S,), less what may be noise [1 / scan unit].
 
-    Measured by patches as wide as the members may become, where those follow the scan as well as narrow ones do.
+    Measured by patches as wide as the members may become, where those bend as narrow ones do, but for what may be noise (Lepski).
     """
     chosen = np.zeros(len(surface.mean), np.bool_)
     kernels.choose_apart(surface.neighbors, chosen)
     sites = np.flatnonzero(chosen)
-    least, best = np.full(len(sites), np.inf), np.zeros(len(sites))
+    low, high, best = np.zeros(len(sites)), np.full(len(sites), np.inf), np.zeros(len(sites))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt, apart = _bends(surface, sites, most**share).T
-        least = np.minimum(least, apart) if share else apart
-        best = np.where(apart <= LIKE * least, np.maximum(bend - DOUBT * doubt, 0.0), best)
+        bend, doubt = _bends(surface, sites, most**share).T
+        low, high = np.maximum(low, bend - DOUBT * doubt), np.minimum(high, bend + DOUBT * doubt)
+        best = np.where(low <= high, np.maximum(bend - DOUBT * doubt, 0.0), best)
     bends = np.zeros(len(chosen))
     bends[sites] = best
-    return _spread(surface.neighbors, bends, chosen)
+    bends = _spread(surface.neighbors, bends, chosen)
+    everywhere = np.ones_like(chosen)
+    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one site alone is noise
 
 
 def _bends(surface: Surface, sites: np.ndarray, wider: float) -> np.ndarray:
-    """Curvature, its doubt and the distance of the points at some sites, (P, 3), by patches so many times wider."""
+    """Curvature and its doubt at some sites, (P, 2) [1 / scan unit], by patches so many times wider."""
     from .sites import with_own_scratch
 
     scale = surface.scale.copy()
     scale[2] *= wider
     scale[3] = max(scale[3] / wider**2, 1.0)
     scaled = surface._replace(scale=scale)
-    found = np.empty((len(sites), 3))
+    found = np.empty((len(sites), 2))
 
     def measure_part(part: int, begin: int, end: int) -> None:
         kernels.measure_bends(with_own_scratch(scaled), sites, found, begin, end)
@@ -139,11 +140,8 @@ def _bends(surface: Surface, sites: np.ndarray, wider: float) -> np.ndarray:
 
 
 def _spread(neighbors: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Values (S,) at all sites: the mean of those known at a site and its neighbours, and of these once more."""
-    for passed in range(2):
-        weight = np.where(neighbors >= 0, known[neighbors], False)
-        total = weight.sum(axis=1) + known
-        summed = (weight * values[neighbors]).sum(axis=1) + known * values
-        values = np.where(total > 0, summed / np.maximum(total, 1), values)
-        known = known | (total > 0) if passed == 0 else known
-    return values
+    """Values (S,) at all sites: the mean of those known at a site and its neighbours."""
+    weight = np.where(neighbors >= 0, known[neighbors], False)
+    total = weight.sum(axis=1) + known
+    summed = (weight * values[neighbors]).sum(axis=1) + known * values
+    return np.where(total > 0, summed / np.maximum(total, 1), values)

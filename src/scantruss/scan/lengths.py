@@ -47,7 +47,7 @@ def _length_column(header: list[str], layout: Layout) -> int:
     """Column of the lengths: by its name, else the one behind the coordinates."""
     for line in reversed(header):
         names = [name.strip().lower() for name in split_fields(line.strip().lstrip("#/%!;* "), layout.separator)]
-        for column, name in enumerate(names):
+        for column, name in enumerate(names if len(names) > 3 else ()):
             words = name.replace("_", " ").replace("[", " ").replace("(", " ").split()
             if words and words[0] in NAMES:
                 return column
