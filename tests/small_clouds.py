@@ -130,7 +130,6 @@ def numbers_of(settings, spacing, strict=1.0):
     """The numbers that steer a front, for the kernels."""
     numbers = np.zeros(16)
     numbers[lists.LENGTH], numbers[lists.NEARNESS] = settings.length, settings.nearness
-    numbers[lists.REFERENCE] = settings.length
     numbers[lists.W1], numbers[lists.MERGE] = settings.length_weight, np.radians(settings.merge_angle)
     numbers[lists.SHAPE], numbers[lists.SIZE] = settings.shape_weight, settings.size_weight
     numbers[lists.RANGE], numbers[lists.STRICT] = settings.search_range * spacing, strict

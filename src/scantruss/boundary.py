@@ -13,7 +13,7 @@ from .kernels.field import lengths_along
 from .kernels.rim import Rim
 from .kernels.surface import Surface
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, check_two_sided, prepare_sites
+from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -279,7 +279,7 @@ def smooth_loop(curve: np.ndarray, piece: int, settings: Settings, surface: Surf
 
 def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
     """Return the desired length at each point of a curve (M, 3), in lengths; None where it is the same for all."""
-    if np.all(surface.field == 1.0):
+    if not is_graded(surface):
         return None
     field = np.empty(len(curve))
     lengths_along(surface, np.ascontiguousarray(curve), field)

@@ -70,6 +70,7 @@ def advance_front(
             1.0,
             float(settings.case3 == "quadrangle"),
             settings.length,
+            float(sites.graded),
         ]
     )
     for strict in STRICTNESS:
@@ -82,8 +83,7 @@ def advance_front(
     close_gaps(front, sites, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     used, numbered = np.unique(triangles, return_inverse=True)
-    graded = bool(np.any(sites.surface.field != 1.0))
-    desired = settings.length * sites.surface.field[front.site[used]] if graded else None
+    desired = settings.length * sites.surface.field[front.site[used]] if sites.graded else None
     return Grid(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
 from ..machine import in_parts
-from ..scan.sites import with_own_scratch
+from ..scan.sites import is_graded, with_own_scratch
 from .grid import Grid
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
@@ -153,15 +154,23 @@ class Relief:
 
         in_parts(self.net.used, PART, land_part)
 
+    @cached_property
+    def graded(self) -> bool:
+        """Whether the desired length differs from node to node."""
+        return is_graded(self.surface)
+
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
         return self.surface if part == 0 else with_own_scratch(self.surface)
 
     def renew(self, near: float) -> None:
-        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch."""
+        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; renew the lengths desired there."""
 
         def renew_part(part: int, begin: int, end: int) -> None:
-            seat.renew_patches(self.net, self._scratch(part), self.patches, near * self.length, begin, end)
+            surface = self._scratch(part)
+            seat.renew_patches(self.net, surface, self.patches, near * self.length, begin, end)
+            if self.graded:
+                seat.renew_lengths(self.net, surface, self.patches, begin, end)
 
         in_parts(self.net.used, PART, renew_part)
 
@@ -182,8 +191,7 @@ class Relief:
     def to_grid(self, grid: Grid) -> Grid:
         """Put the net together again, with all else as in `grid`; deviation measured."""
         deviation = self.deviation()
-        graded = bool(np.any(self.surface.field != 1.0))
-        desired = self.length * self.net.desired if graded else None
+        desired = self.length * self.net.desired if self.graded else None
         return close_net(self.net, self.source, grid.replace(fixed=self.fixed), deviation, desired)
 
 

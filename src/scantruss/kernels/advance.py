@@ -14,6 +14,7 @@ from .front import (
     DONE,
     FIRST,
     FULL,
+    GRADED,
     LAST,
     LENGTH,
     MORE,
@@ -162,6 +163,8 @@ def take_segment(front: Front) -> int:
 @kernel
 def set_length(surface: Surface, front: Front, s: int, numbers: np.ndarray) -> None:
     """Set the length that is desired where the triangle of a segment will lie."""
+    if numbers[GRADED] == 0.0:
+        return
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)

@@ -30,7 +30,10 @@ NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
 LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(
     9
 )  # places in `numbers`; LENGTH is that at the segment in hand
-REFERENCE = 9  # place of the length that the length field multiplies
+REFERENCE, GRADED = (
+    9,
+    10,
+)  # places of the length that the length field multiplies, and of 1 where there is one that differs
 SHEET = 0.45  # what is farther from a triangle than this is another sheet, in lengths
 NEAR = 400  # most front nodes looked at in one step
 

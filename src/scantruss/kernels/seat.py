@@ -60,7 +60,7 @@ def seat_nodes(
 def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, begin: int, end: int) -> int:
     """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
 
-    Returns how many. Every node also gets the length that is desired where it stands.
+    Returns how many.
     """
     count = 0
     for v in range(begin, end):
@@ -69,8 +69,15 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
                 count += 1
-            net.desired[v] = length_at(surface, int(patches[v, 15]), place)
     return count
+
+
+@kernel
+def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, end: int) -> None:
+    """Give each node from `begin` to `end` - 1 the member length that is desired where it stands."""
+    for v in range(begin, end):
+        if net.state[v, DEGREE] > 0:
+            net.desired[v] = length_at(surface, int(patches[v, 15]), row(net.nodes, v))
 
 
 @kernel

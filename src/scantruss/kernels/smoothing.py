@@ -60,9 +60,9 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
             a, b = subtract(row(net.nodes, u), here), subtract(row(net.nodes, w), here)
             if v < u:
                 members += 1
-                target = 0.5 * (net.desired[v] + net.desired[u])
-                total += norm(a) / target
-                squares += dot(a, a) / (target * target)
+                shorter = 2.0 / (net.desired[v] + net.desired[u])
+                total += shorter * norm(a)
+                squares += shorter * shorter * dot(a, a)
             if v < u and v < w and i < d - net.state[v, OPEN]:
                 triangles += 1
                 c = subtract(b, a)

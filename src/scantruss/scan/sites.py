@@ -37,6 +37,11 @@ class Sites:
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
 
+    @property
+    def graded(self) -> bool:
+        """Whether the desired member length differs from place to place."""
+        return is_graded(self.surface)
+
 
 _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, Wish | None], Sites]] = (
     weakref.WeakKeyDictionary()
@@ -59,6 +64,11 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
         kept.clear()
         kept[key] = _prepare(cloud.points, cloud.spacing, *key)
     return kept[key]
+
+
+def is_graded(surface: Surface) -> bool:
+    """Whether the desired member length differs from place to place."""
+    return bool(np.any(surface.field != 1.0))
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
