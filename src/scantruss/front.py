@@ -19,7 +19,7 @@ from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal
 from .kernels.triangles import quality
 from .rows import STRAIGHT, Rows, lay_rows, nodes_at
 from .scan.cloud import PointCloud
-from .scan.sites import Sites
+from .scan.sites import Sites, local_field
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -47,7 +47,8 @@ def advance_front(
     boundary : Boundary
     settings : Settings
     rows : Rows, optional
-        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does.
+        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does, and as it does
+        where the desired length differs from place to place.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
@@ -57,7 +58,7 @@ def advance_front(
         front = start_front(front, boundary, settings)
     else:
         positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
-        front = start_front(front, boundary, settings, rows, positions)
+        front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
     numbers = np.array(
         [
             settings.length,
@@ -169,8 +170,9 @@ def start_front(
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
-    if positions is not None:
-        front = offer(front, surface, nodes_at(positions, surface, settings.length), NEARER * settings.length)
+    for place in positions if positions is not None else ():
+        length = settings.length * local_field(surface, place)
+        front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
     if rows is not None:
         front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
@@ -178,7 +180,7 @@ def start_front(
     for number in boundary.sites.pieces:
         if number not in bounded:
             site = int(np.flatnonzero(piece == number)[0])
-            length = settings.length * float(surface.field[site])
+            length = settings.length * local_field(surface, surface.mean[site])
             ids = seed_of_rows(front, surface, site, length)
             add_seed(front, ids or new_seed(front, surface, site, length))
     return front

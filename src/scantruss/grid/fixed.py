@@ -13,6 +13,7 @@ from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..kernels.trial import TRIED, Scratch, total_energy
 from ..scan.cloud import PointCloud
+from ..scan.sites import local_field
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
@@ -41,7 +42,7 @@ def check_positions(
     relative = places - cloud.origin
     for k, place in enumerate(relative):
         distance = _distance_from_scan(surface, place)
-        local = length * _desired_at(surface, place)
+        local = length * local_field(surface, place)
         if distance > 0.5 * local:
             raise InputError(
                 f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
@@ -72,11 +73,6 @@ def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
     return float(np.sqrt(best))
 
 
-def _desired_at(surface: Surface, place: np.ndarray) -> float:
-    """Desired length at a place, in lengths."""
-    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
-
-
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it.
 
@@ -89,7 +85,7 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     if len(away) and away.min() < AT_RIM * relief.length:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
-    local = relief.length * _desired_at(relief.surface, place)
+    local = relief.length * local_field(relief.surface, place)
     if curve >= 0 and distance <= AT_RIM * local and np.any(free & (net.kind == RIM)):
         free &= net.kind == RIM
     nodes = np.flatnonzero(free)

@@ -71,6 +71,11 @@ def is_graded(surface: Surface) -> bool:
     return bool(np.any(surface.field != 1.0))
 
 
+def local_field(surface: Surface, place: np.ndarray) -> float:
+    """Desired length at a place, in lengths: that of the nearest site."""
+    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
+
+
 def narrow_surface(sites: Sites, points: float) -> Surface:
     """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
 
