@@ -5,6 +5,7 @@ import heapq
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as limits
 from hypothesis import strategies as some
 from rough import compiled_only, rough_disc
 from small_clouds import ball, cap, ring, sheet, sites_of
@@ -80,6 +81,7 @@ def graded_slowly(mean, neighbors, lengths, slope):
 
 
 @pytest.mark.kernels
+@limits(max_examples=20)
 @given(some.integers(0, 1000), some.floats(0.01, 1.0))
 def test_grading_is_the_least_of_all_lengths_grown_by_their_way(seed, slope):
     rng = np.random.default_rng(seed)
@@ -111,6 +113,7 @@ def test_a_step_is_graded_to_both_sides_by_the_ratio():
 
 
 @pytest.mark.kernels
+@limits(max_examples=30)
 @given(some.integers(0, 1000), some.sampled_from([1, 2, 5, 12, 13, 60]))
 def test_a_blend_agrees_with_weights_written_down(seed, count):
     rng = np.random.default_rng(seed)
