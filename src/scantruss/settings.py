@@ -18,9 +18,12 @@ EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
-Lengths = tuple[tuple[float, float, float, float], ...]  #: x, y, z and the desired length there [scan unit]
 CURVATURE = "curvature:"  # a length field that follows the curvature begins so
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # metres
+
+
+class Lengths(tuple[tuple[float, float, float, float], ...]):
+    """Rows of a length field that have been checked: x, y, z and the desired length there [scan unit]."""
 
 
 def _setting(
@@ -190,8 +193,10 @@ def check_length_field(given: Any) -> str | Lengths:
         return ""
     if isinstance(given, str):
         return _check_curvature(given)
+    if isinstance(given, Lengths):
+        return given
     try:
-        rows = tuple((float(x), float(y), float(z), float(length)) for x, y, z, length in given)
+        rows = Lengths((float(x), float(y), float(z), float(length)) for x, y, z, length in given)
     except (TypeError, ValueError):
         raise InputError("length_field must be rows of four numbers, x y z length, or curvature:MIN:MAX") from None
     if not rows:
@@ -219,7 +224,7 @@ def _check_curvature(text: str) -> str:
     return f"{CURVATURE}{low!r}:{high!r}"
 
 
-def shortest_and_longest(field: str | Lengths) -> tuple[float, float]:
+def shortest_and_longest(field: str | tuple[tuple[float, float, float, float], ...]) -> tuple[float, float]:
     """Return the bounds of a length field as it is given [scan unit]."""
     if isinstance(field, str):
         low, high = (float(part) for part in field.removeprefix(CURVATURE).split(":"))
