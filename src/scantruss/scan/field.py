@@ -15,9 +15,7 @@ from ..machine import in_parts
 from ..settings import Settings, shortest_and_longest
 
 RATIO = 1.2  # of the lengths desired for two members that follow each other, at most
-SLOPE = (
-    0.87 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)
-)  # growth per way; the ways over the links are up to an eighth too long
+SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per way; ways over the links, and members, may be longer
 FLAT = 0.002  # a member of the longest length that bulges by less than this, in its length, is flat
 BENT = 0.95  # share of the scan that bends less than where the shortest length is desired
 DOUBT = 3.3  # standard deviations of a curvature that may be noise
