@@ -103,7 +103,7 @@ def new_area(relief: Relief) -> Area:
     return Area(
         mark=np.zeros((capacity, 2), np.int64),
         around=np.zeros(MOST, np.int64),
-        nodes=np.zeros((MOST, 4)),
+        nodes=np.zeros((MOST, 5)),
         ring=np.zeros((MOST, width), np.int64),
         state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
         free=np.zeros(KEPT + 2, np.int64),
