@@ -130,14 +130,15 @@ def test_info_takes_a_field(plate, capsys):
         ("curvature:2:1", "curvature:2:1: the shortest length is above the longest; write curvature:1:2"),
         ("curvature:0.5:1", "the shortest length of the length field, 0.5, is too small for points that are"),
         ("curvature:1:20", "the longest length of the length field, 20, is larger than the scan"),
-        ("FAR", "1 of 2 given lengths lie off the scan, as that at (5, 0, 9)"),
+        ("5 0 9 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 9)"),
+        ("5 0 1.6 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 1.6)"),
         ("missing.csv", "--length: needs a number, a file of lengths or curvature:MIN:MAX, got 'missing.csv'"),
     ],
 )
 def test_a_field_that_the_scan_cannot_carry_is_refused(plate, tmp_path, capsys, monkeypatch, length, words):
     monkeypatch.chdir(tmp_path)
-    if length == "FAR":
-        (tmp_path / "far.xyz").write_text("-5 0 0 1\n5 0 9 1.2\n")
+    if " " in length:
+        (tmp_path / "far.xyz").write_text(f"-5 0 0 1\n{length}\n")
         length = "far.xyz"
     assert run("grid", plate / "plate.xyz", "out.obj", "--length", length) == 2
     said = capsys.readouterr().err

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import field as kernels
 from ..kernels.boxes import new_boxes
-from ..kernels.cover import mark_far
+from ..kernels.cover import nearest_distances, put_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings, shortest_and_longest
@@ -73,12 +73,18 @@ def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
 
 def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: float) -> None:
     """Refuse given lengths (K, 4) that stand away from the scan: they are of another part, frame or unit."""
-    reach = FAR * scale * rows[:, 3]
     mean = surface.mean
-    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), float(np.median(reach)), len(mean), len(mean))
-    far = np.empty(len(rows), np.bool_)
-    count = mark_far(places, mean, boxes, reach + 1.5 * surface.scale[4], far)
-    if count:
+    allowed = FAR * scale * rows[:, 3] + 1.5 * surface.scale[4]
+    low, high = mean.min(axis=0), mean.max(axis=0)
+    far = np.maximum(low - places, places - high).max(axis=1) > allowed
+    inside = np.flatnonzero(~far)
+    step = max(4.0 * float(surface.scale[4]), 0.01 * float((high - low).max()))
+    boxes = new_boxes(low, high, step, len(mean), len(mean))
+    put_places(boxes, mean)
+    away = np.empty(len(inside))
+    nearest_distances(np.ascontiguousarray(places[inside]), mean, boxes, step, away)
+    far[inside] = away > allowed[inside]
+    if count := int(far.sum()):
         k = int(np.argmax(far))
         place = ", ".join(f"{c:.10g}" for c in rows[k, :3])
         raise InputError(
