@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from pathlib import Path
 
+from scantruss.options import option_of
 from scantruss.settings import Settings
 
 PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
@@ -23,12 +24,10 @@ def settings_table() -> str:
     rows = []
     for spec in fields(Settings):
         about = spec.metadata
-        default = (
-            "needed" if spec.default is MISSING else "none" if spec.default in ("", (), None) else str(spec.default)
-        )
+        default = "needed" if spec.name == "length" else "none" if spec.default in ("", (), None) else str(spec.default)
         cells = (
             f"`{spec.name}`",
-            f"`--{spec.name.replace('_', '-')}`",
+            f"`{option_of(spec.name)}`",
             about["symbol"],
             about["unit"],
             default,

@@ -15,6 +15,7 @@ from scantruss import commands, pipeline
 from scantruss.cli import main
 from scantruss.errors import FrontError
 from scantruss.grid.grid import Grid
+from scantruss.options import option_of
 from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 
 LENGTH = "4"
@@ -82,8 +83,14 @@ def refused(capsys, *words, status=2):
         ("grid scan.xyz", "missing OUT"),
         ("grid scan.xyz a.obj", "--length is missing"),
         ("grid scan.xyz a.obj --length", "--length: expected one argument"),
-        ("grid scan.xyz a.obj --length abc", "--length: needs a number, got 'abc'"),
-        ("grid scan.xyz a.obj --length 4,7", "--length: needs a number, got '4,7'"),
+        (
+            "grid scan.xyz a.obj --length abc",
+            "--length: needs a number, a file of lengths or curvature:MIN:MAX, got 'abc'",
+        ),
+        (
+            "grid scan.xyz a.obj --length 4,7",
+            "--length: needs a number, a file of lengths or curvature:MIN:MAX, got '4,7'",
+        ),
         ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),
         ("grid scan.xyz a.obj --length 4 --merge-angle wide", "--merge-angle: needs a number"),
         ("grid scan.xyz a.obj --length 4 --smooth-passes 1.5", "--smooth-passes: needs a whole number"),
@@ -274,7 +281,7 @@ def test_help_and_version_import_nothing_heavy():
         f"assert not set('{heavy}'.split()) & set(sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert all(f"--{spec.name.replace('_', '-')} " in done.stdout for spec in fields(st.Settings))
+    assert all(f"{option_of(spec.name)} " in done.stdout for spec in fields(st.Settings))
     assert f"scantruss {st.__version__}\n" in done.stdout
 
 

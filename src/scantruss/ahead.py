@@ -122,10 +122,19 @@ def compile_optimization(settings: Settings) -> None:
     normals[:, 2] = 1.0
     scale = np.array([settings.length, 0.2, 0.65, 8.0, 0.26])
     surface = Surface(
-        places, np.arange(count + 1), places, normals, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64)
+        places,
+        np.arange(count + 1),
+        places,
+        normals,
+        neighbors,
+        scale,
+        scratch,
+        scratch.copy(),
+        np.zeros(1, np.int64),
+        np.ones(count),
     )
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.4, count, count)
-    sites = Sites(surface, boxes, scratch.copy(), np.zeros(count), 0.2, 5.76, (0,))
+    sites = Sites(surface, boxes, scratch.copy(), np.zeros(count), 0.2, 5.76, 5.76, (0,))
     angle = np.arange(6) * np.pi / 3.0
     rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
     loop = Loop(rim, np.zeros(1, np.int64), True, 6.0, 0)

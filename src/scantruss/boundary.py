@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .corners import STEP, find_corners
 from .kernels import boundary as kernels
+from .kernels.field import lengths_along
 from .kernels.rim import Rim
 from .kernels.surface import Surface
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, check_two_sided, prepare_sites
+from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -34,6 +35,7 @@ class Loop:
     external: bool  #: the outer boundary of its piece; False: a hole
     length: float  #: [scan unit]
     piece: int  #: number of the piece of the cloud it bounds
+    field: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None where it is the same for all
 
     @property
     def corners(self) -> np.ndarray:
@@ -113,7 +115,7 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
         curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
         if len(curve) >= 8:
             found.append((curve, piece))
-    loops = [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings)) is not None]
+    loops = [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings, surface)) is not None]
     if progress:
         progress("boundary", 1.0)
     return Boundary(_external_first(loops), sites)
@@ -264,14 +266,34 @@ def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
         curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
 
 
-def smooth_loop(curve: np.ndarray, piece: int, settings: Settings) -> Loop | None:
+def smooth_loop(curve: np.ndarray, piece: int, settings: Settings, surface: Surface) -> Loop | None:
     """Find the corners of a closed curve of equal steps, smooth it between them; None where it is too short to keep."""
     at, places = find_corners(curve, settings)
     smoothed, corner_at = smooth_between(curve, at, places, int(round(WINDOW / STEP)))
-    length = _around(smoothed)
-    if length < settings.smallest_hole * settings.length:
+    length, field = _around(smoothed), field_along(surface, smoothed)
+    in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
+    if in_lengths < settings.smallest_hole * settings.length:
         return None
-    return Loop(smoothed, corner_at, False, length, piece)
+    return Loop(smoothed, corner_at, False, length, piece, field)
+
+
+def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
+    """Return the desired length at each point of a curve (M, 3), in lengths; None where it is the same for all."""
+    if not is_graded(surface):
+        return None
+    field = np.empty(len(curve))
+    lengths_along(surface, np.ascontiguousarray(curve), field)
+    return field
+
+
+def _steps(curve: np.ndarray) -> np.ndarray:
+    """Distance of each point of a closed curve to the next (M,)."""
+    return np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
+
+
+def _between(field: np.ndarray) -> np.ndarray:
+    """Mean of each value along a closed curve and the next (M,)."""
+    return 0.5 * (field + np.roll(field, -1))
 
 
 def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
@@ -330,12 +352,14 @@ def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
     for i, loop in enumerate(loops):
         if loop.piece not in longest or loop.length > loops[longest[loop.piece]].length:
             longest[loop.piece] = i
-    marked = [Loop(p.points, p.corner_at, longest[p.piece] == i, p.length, p.piece) for i, p in enumerate(loops)]
+    marked = [replace(p, external=longest[p.piece] == i) for i, p in enumerate(loops)]
     return tuple(sorted(marked, key=lambda p: (not p.external, -p.length)))
 
 
 def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Characteristic points of a loop: nodes about `length` apart, equally between corners, corners being nodes.
+
+    With a length field they are equally far apart in desired lengths: in the integral of ds / l.
 
     Returns
     -------
@@ -348,8 +372,12 @@ def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
     nodes, is_corner = [], []
     for i, begin in enumerate(ends):
         end = ends[i + 1] if i + 1 < len(ends) else ends[0] + count
-        part = loop.points[np.arange(begin, end + 1) % count]
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(part, axis=0), axis=1))])
+        at_curve = np.arange(begin, end + 1) % count
+        part = loop.points[at_curve]
+        steps = np.linalg.norm(np.diff(part, axis=0), axis=1)
+        if loop.field is not None:
+            steps /= 0.5 * (loop.field[at_curve[1:]] + loop.field[at_curve[:-1]])
+        arc = np.concatenate([[0.0], np.cumsum(steps)])
         pieces = max(int(round(arc[-1] / length)), least)
         at = np.arange(pieces) * (arc[-1] / pieces)
         nodes.append(np.stack([np.interp(at, arc, part[:, c]) for c in range(3)], axis=1))

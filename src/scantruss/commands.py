@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import CertificateError, FormatError, InputError
+from .settings import CURVATURE
 
 if TYPE_CHECKING:
     from .grid.grid import Grid
@@ -51,7 +52,9 @@ def info(values: Namespace) -> None:
 
         boundary = find_boundary(cloud, settings, progress=bars)
         note_strays(bars, cloud, settings)
-    print_lines([f"boundaries for members of {settings.length:g} {cloud.unit}".rstrip() + ":"])
+    field = boundary.sites.surface.field
+    longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
+    print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:
         print_table(("boundary", "length", "corners"), loop_rows(boundary))
     else:
@@ -117,7 +120,9 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     from .export.files import check_place
     from .export.formats import check_output
 
-    inputs = ((values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes"))
+    inputs = [(values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
+    if isinstance(length := vars(values).get("length"), str) and not length.startswith(CURVATURE):
+        inputs.append((length, "file of lengths"))
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)

@@ -19,7 +19,7 @@ from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal
 from .kernels.triangles import quality
 from .rows import STRAIGHT, Rows, lay_rows, nodes_at
 from .scan.cloud import PointCloud
-from .scan.sites import Sites
+from .scan.sites import Sites, local_field
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -47,7 +47,8 @@ def advance_front(
     boundary : Boundary
     settings : Settings
     rows : Rows, optional
-        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does.
+        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does, and as it does
+        where the desired length differs from place to place.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
@@ -57,7 +58,7 @@ def advance_front(
         front = start_front(front, boundary, settings)
     else:
         positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
-        front = start_front(front, boundary, settings, rows, positions)
+        front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
     numbers = np.array(
         [
             settings.length,
@@ -69,6 +70,8 @@ def advance_front(
             settings.search_range * sites.spacing,
             1.0,
             float(settings.case3 == "quadrangle"),
+            settings.length,
+            float(sites.graded),
         ]
     )
     for strict in STRICTNESS:
@@ -78,20 +81,22 @@ def advance_front(
             lists.enqueue(front, s)
         by_cases = settings.method == "paper" and strict == STRICTNESS[0]
         front = run(front, sites, numbers, progress, kernels.advance_by_cases if by_cases else kernels.advance)
-    close_gaps(front, settings)
+    close_gaps(front, sites, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     used, numbered = np.unique(triangles, return_inverse=True)
+    desired = settings.length * sites.surface.field[front.site[used]] if sites.graded else None
     return Grid(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),
         np.zeros(len(used), np.bool_),
         cloud.origin,
         cloud.unit,
+        desired=desired,
         settings=settings,
     )
 
 
-def close_gaps(front: lists.Front, settings: Settings) -> None:
+def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
     Loops of the boundary of which the front has reached no segment are left out.
@@ -101,8 +106,9 @@ def close_gaps(front: lists.Front, settings: Settings) -> None:
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()
+            length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
-            if unreached or count > GAP or not gaps.close_gap(front, segments, count, settings.length):
+            if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
                 before, after = front.previous[segments[0]], front.next[segments[-1]]
                 for t in segments:
                     lists.remove_segment(front, t)
@@ -112,8 +118,9 @@ def close_gaps(front: lists.Front, settings: Settings) -> None:
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = sites.surface.mean, int(2.0 * sites.area / (0.433 * settings.length**2)) + 2000
-    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), settings.length, room, room)
+    mean, room = sites.surface.mean, int(2.0 * sites.graded_area / (0.433 * settings.length**2)) + 2000
+    usual = settings.length * float(np.sqrt(sites.area / sites.graded_area))
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), usual, room, room)
     return _blank(room, boxes)
 
 
@@ -163,8 +170,9 @@ def start_front(
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
-    if positions is not None:
-        front = offer(front, surface, nodes_at(positions, surface, settings.length), NEARER * settings.length)
+    for place in positions if positions is not None else ():
+        length = settings.length * local_field(surface, place)
+        front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
     if rows is not None:
         front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
@@ -172,8 +180,9 @@ def start_front(
     for number in boundary.sites.pieces:
         if number not in bounded:
             site = int(np.flatnonzero(piece == number)[0])
-            ids = seed_of_rows(front, surface, site, settings.length)
-            add_seed(front, ids or new_seed(front, surface, site, settings.length))
+            length = settings.length * local_field(surface, surface.mean[site])
+            ids = seed_of_rows(front, surface, site, length)
+            add_seed(front, ids or new_seed(front, surface, site, length))
     return front
 
 
@@ -254,7 +263,7 @@ def run(
     front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = sites.area / (0.433 * numbers[lists.LENGTH] ** 2)
+    expected = sites.graded_area / (0.433 * numbers[lists.REFERENCE] ** 2)
     while True:
         status = step(sites.surface, front, numbers, BUDGET)
         if progress:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
 from .errors import FormatError, InputError
-from .settings import Settings
+from .settings import CURVATURE, Settings
 
 Position = tuple[float, float, float]
 
@@ -76,6 +77,15 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"needs a number, got {text!r}") from None
+
+
+def length_or_field(text: str) -> float | str:
+    """Return the value of ``--length``: a number, else "curvature:MIN:MAX" or the name of a file of lengths as it stands."""
+    with suppress(ValueError):
+        return float(text)
+    if not text.startswith(CURVATURE) and not Path(text).is_file():
+        raise argparse.ArgumentTypeError(f"needs a number, a file of lengths or {CURVATURE}MIN:MAX, got {text!r}")
+    return text
 
 
 def number_or_none(text: str) -> float | None:
@@ -156,15 +166,15 @@ _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
 
 
 def option_of(name: str) -> str:
-    """Return the option of a field."""
-    return "--" + name.replace("_", "-")
+    """Return the option of a field; a length field is a value of ``--length``."""
+    return "--" + name.removesuffix("_field").replace("_", "-")
 
 
 def describe(spec: Field[Any]) -> str:
     """Return the words on a field for the help: what it is, its place in the paper, its default."""
     about = spec.metadata
     notes = [note for note in (about["symbol"], about["source"]) if note]
-    if spec.default is not MISSING and spec.default not in ("", (), None):
+    if spec.default is not MISSING and spec.name != "length" and spec.default not in ("", (), None):
         notes.append(f"default {spec.default}" + (f" {about['unit']}" if about["unit"] else ""))
     elif about["unit"]:
         notes.append(f"in {about['unit']}s")
@@ -175,13 +185,15 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
     """Add one option for every field of `Settings`, or for the named ones; only what is said explicitly is set."""
     group = parser.add_argument_group("settings of the method")
     for spec in fields(Settings):
-        if names and spec.name not in names:
+        if (names and spec.name not in names) or spec.name == "length_field":
             continue
         choices = spec.metadata["choices"]
         options: dict[str, Any] = {"dest": spec.name, "default": argparse.SUPPRESS, "help": describe(spec)}
         if spec.name == "fixed":
             options |= {"action": "append", "type": position, "metavar": "X,Y,Z"}
             options["help"] += "; repeatable"
+        elif spec.name == "length":
+            options |= {"type": length_or_field, "metavar": "NUMBER|FILE|curvature:MIN:MAX"}
         elif spec.type == "bool":
             options["action"] = argparse.BooleanOptionalAction
         else:
@@ -197,8 +209,16 @@ def settings_of(values: argparse.Namespace) -> Settings:
     explicit = {spec.name: given[spec.name] for spec in fields(Settings) if spec.name in given}
     if given.get("fixed_file"):
         explicit["fixed"] = (*explicit.get("fixed", ()), *read_positions(given["fixed_file"]))
+    if isinstance(explicit.get("length"), float):
+        explicit["length_field"] = ""  # one number means one length everywhere
+    elif "length" in explicit:
+        from .scan.lengths import read_lengths
+
+        named = explicit.pop("length")
+        explicit["length_field"] = named if named.startswith(CURVATURE) else read_lengths(named)
+        kept.pop("length", None)
     merged = kept | explicit
-    if "length" not in merged:
+    if "length" not in merged and not merged.get("length_field"):
         raise UsageError(
             "--length is missing, the desired member length in the scan's unit; scantruss info SCAN suggests one"
         )

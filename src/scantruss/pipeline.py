@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .errors import CertificateError, FrontError, InputError
-from .settings import Settings
+from .settings import Settings, shortest_and_longest
 
 if TYPE_CHECKING:
     from .boundary import Boundary
@@ -187,6 +187,8 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     extent = extent_of(cloud)
     spacing = cloud.spacing
     unit = f" {cloud.unit}" if cloud.unit else ""
+    if settings.length_field:
+        _check_field(settings, extent, spacing)
     if settings.length > extent:
         raise InputError(
             f"length {settings.length:g}{unit} is larger than the scan, whose longest side is {extent:.4g}{unit};"
@@ -196,6 +198,23 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
         raise InputError(
             f"length {settings.length:g}{unit} is too small for points that are {spacing:.3g}{unit} apart;"
             f" use at least {length_range(cloud)[0]:g}"
+        )
+
+
+def _check_field(settings: Settings, extent: float, spacing: float) -> None:
+    """Refuse a length field of which a part cannot be carried."""
+    shortest, longest = shortest_and_longest(settings.length_field)
+    scale = settings.length / shortest
+    unit = f" {settings.unit}" if settings.unit else ""
+    if scale * longest > extent:
+        raise InputError(
+            f"the longest length of the length field, {scale * longest:g}{unit}, is larger than the scan,"
+            f" whose longest side is {extent:.4g}{unit}; use shorter ones"
+        )
+    if settings.length < SPACINGS * spacing * (1 - 1e-9):
+        raise InputError(
+            f"the shortest length of the length field, {settings.length:g}{unit}, is too small for points that are"
+            f" {spacing:.3g}{unit} apart; use at least {round_length(SPACINGS * spacing, 'up'):g}"
         )
 
 

@@ -18,7 +18,12 @@ EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
+CURVATURE = "curvature:"  # a length field that follows the curvature begins so
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # metres
+
+
+class Lengths(tuple[tuple[float, float, float, float], ...]):
+    """Rows of a length field that have been checked: x, y, z and the desired length there [scan unit]."""
 
 
 def _setting(
@@ -34,14 +39,17 @@ def _setting(
 class Settings:
     """One record of all settings; unknown or impossible values raise InputError."""
 
-    length: float = field(
-        metadata={
-            "help": "desired length of the members",
-            "symbol": "l_e",
-            "unit": "scan unit",
-            "source": "Eq. 10",
-            "choices": (),
-        }
+    length: float = _setting(
+        0.0,
+        "desired length of the members; of a length field the shortest, and all of it is scaled to this",
+        symbol="l_e",
+        unit="scan unit",
+        source="Eq. 10",
+    )
+    length_field: str | tuple[tuple[float, float, float, float], ...] = _setting(
+        "",
+        "desired lengths that differ over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
+        unit="scan unit",
     )
     method: str = _setting("default", "the paper to the letter, or what we found better", choices=METHODS)
     effort: str = _setting(
@@ -100,6 +108,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check every value, with a message that says what is needed."""
+        object.__setattr__(self, "length_field", check_length_field(self.length_field))
+        if self.length_field and self.length == 0:
+            object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         for spec in fields(self):
@@ -148,7 +159,7 @@ class Settings:
         names = {spec.name for spec in fields(cls)}
         if unknown := sorted(set(values) - names):
             raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
-        if "length" not in values:
+        if "length" not in values and not values.get("length_field"):
             raise InputError("settings need a length (the desired member length in the scan's unit)")
         try:
             return cls(**values)
@@ -168,3 +179,55 @@ class Settings:
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
         return cls.from_dict(values)
+
+
+def check_length_field(given: Any) -> str | Lengths:
+    """Return a length field as the settings hold it: "" for none, "curvature:MIN:MAX", or rows of x, y, z, length.
+
+    Raises
+    ------
+    InputError
+        It is none of these, a length is not positive, or MIN is larger than MAX.
+    """
+    if given is None or (isinstance(given, str) and not given):
+        return ""
+    if isinstance(given, str):
+        return _check_curvature(given)
+    if isinstance(given, Lengths):
+        return given
+    try:
+        rows = Lengths((float(x), float(y), float(z), float(length)) for x, y, z, length in given)
+    except (TypeError, ValueError):
+        raise InputError("length_field must be rows of four numbers, x y z length, or curvature:MIN:MAX") from None
+    if not rows:
+        raise InputError("length_field has no rows; it needs x, y, z, length at one place at least")
+    for row in rows:
+        if not all(map(math.isfinite, row)):
+            raise InputError(f"length_field must be finite numbers, got {row}")
+        if row[3] <= 0:
+            raise InputError(f"length_field must have positive lengths, got {row[3]:g} at {row[:3]}")
+    return rows
+
+
+def _check_curvature(text: str) -> str:
+    """Return "curvature:MIN:MAX" in its plainest writing, or refuse it."""
+    try:
+        low, high = (float(part) for part in text.removeprefix(CURVATURE).split(":"))
+    except ValueError:
+        low = high = math.nan
+    if not (text.startswith(CURVATURE) and math.isfinite(low) and math.isfinite(high)):
+        raise InputError(f"a length field must be curvature:MIN:MAX with two lengths, got {text!r}")
+    if low <= 0:
+        raise InputError(f"{text}: the shortest length must be positive, got {low:g}")
+    if low > high:
+        raise InputError(f"{text}: the shortest length is above the longest; write {CURVATURE}{high:g}:{low:g}")
+    return f"{CURVATURE}{low!r}:{high!r}"
+
+
+def shortest_and_longest(field: str | tuple[tuple[float, float, float, float], ...]) -> tuple[float, float]:
+    """Return the bounds of a length field as it is given [scan unit]."""
+    if isinstance(field, str):
+        low, high = (float(part) for part in field.removeprefix(CURVATURE).split(":"))
+        return low, high
+    lengths = [row[3] for row in field]
+    return min(lengths), max(lengths)

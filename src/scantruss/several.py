@@ -32,6 +32,11 @@ WAYS = {  # rows that are tried
     "normal": tuple(Rows(turn) for turn in (0.0, 20.0, 40.0)),
     "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
+SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desired length differs from place to place
+    "quick": (1.0,),
+    "normal": (1.0, 0.97, 1.03),
+    "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
+}
 FINALISTS = {"quick": 1, "normal": 1, "best": 2}  # grids that are improved to the end
 
 
@@ -57,13 +62,16 @@ def several_grids(
         No front has led to a grid that passes; the fault of the best.
     """
     ways, finalists = WAYS[settings.effort], FINALISTS[settings.effort]
+    graded = boundary.sites.graded
+    if graded:
+        ways = tuple(Rows(scale=scale) for scale in SCALES[settings.effort])
     positions = check_positions(settings.fixed, cloud, boundary.sites.surface, settings.length)
     faults: dict[int, FrontError] = {}
 
     def advance(number: int) -> Grid | None:
-        return _passed(
-            faults, number, lambda: advance_front(cloud, _own_scratch(boundary), settings, rows=ways[number])
-        )
+        way = ways[number]
+        own = settings.replace(length=way.scale * settings.length) if graded else settings
+        return _passed(faults, number, lambda: advance_front(cloud, _own_scratch(boundary), own, rows=way))
 
     def improve(front: Grid) -> Relief:
         surface = with_own_scratch(boundary.sites.surface)

@@ -58,4 +58,7 @@ def _nodes(grid: Grid) -> bytes:
     if grid.deviation is not None:
         header += _with_unit("deviation", grid.unit)
         columns.append(np.asarray(grid.deviation, float).tolist())
+    if grid.desired is not None:
+        header += _with_unit("desired_length", grid.unit)
+        columns.append(np.asarray(grid.desired, float).tolist())
     return _table(header, zip(range(len(grid.nodes)), *columns, strict=True))

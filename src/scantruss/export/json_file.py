@@ -47,6 +47,8 @@ def encode_json(grid: Grid) -> bytes:
         "triangles": grid.triangles.tolist(),
         "deviation": deviation and [_number(d) for d in deviation],
     }
+    if grid.desired is not None:
+        values["desired"] = np.asarray(grid.desired, float).tolist()
     parts = [f"{json.dumps(key)}: {_lines(value) if key in ROWS else _text(value)}" for key, value in values.items()]
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
@@ -126,6 +128,9 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         deviation = _floats([math.nan if d is None else d for d in deviation], "deviation", 1).ravel()
         if len(deviation) != len(nodes):
             raise ValueError(f"{len(deviation)} deviations for {len(nodes)} nodes")
+    desired = values.get("desired")
+    if desired is not None and len(desired) != len(nodes):
+        raise ValueError(f"{len(desired)} desired lengths for {len(nodes)} nodes")
     settings, before, certificate = (values.get(name) for name in ("settings", "before", "certificate"))
     return Grid(
         nodes=nodes,
@@ -134,6 +139,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         origin=_floats([values["origin"]], "origin", 3)[0],
         unit=unit,
         deviation=deviation,
+        desired=None if desired is None else _floats(desired, "desired", 1).ravel(),
         settings=None if settings is None else Settings.from_dict(settings),
         before=None if before is None else GridQuality(**before, unit=unit),
         certificate=None if certificate is None else Certificate.from_dict(certificate),

@@ -16,7 +16,8 @@ def header_lines(grid: Grid) -> list[str]:
         f"nodes: {len(grid.nodes)}, members: {len(grid.edges)}, triangles: {len(grid.triangles)}",
     ]
     if grid.settings is not None:
-        lines.insert(2, f"desired member length: {float(grid.settings.length)!r}")
+        longest = "" if grid.desired is None else f" to {float(np.max(grid.desired, initial=0.0))!r}"
+        lines.insert(2, f"desired member length: {float(grid.settings.length)!r}{longest}")
     return lines
 
 

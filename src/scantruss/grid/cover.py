@@ -21,6 +21,11 @@ def scan_places(sites: Sites) -> np.ndarray:
     return np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
 
 
+def scan_field(sites: Sites) -> np.ndarray:
+    """Return the desired length at these parts of the scan, in lengths (P,)."""
+    return sites.surface.field[np.isin(sites.piece, sites.pieces)]
+
+
 def boxes_of(places: np.ndarray, box: float) -> SearchBoxes:
     """Return places (P, 3) by box, the boxes no larger than `box` [scan unit]."""
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), box, len(places), len(places))

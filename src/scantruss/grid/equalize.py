@@ -3,6 +3,8 @@
 What falls is one energy, in units of which a member at double length costs 1 and a degenerate triangle costs 1:
 
     E = weight * sum (L / l_e - 1)^2 over members + sum (1 - G) over triangles + folded members + price * V * (mean L / l_e - 1)^2
+
+where l_e is the mean of what is desired at the two nodes of a member.
 """
 
 from __future__ import annotations
@@ -70,7 +72,7 @@ def _strain_and_share(relief: Relief, scratch: Scratch) -> tuple[float, float]:
 
 def grid_energy(grid: Grid, length: float) -> float:
     """The energy that falls, of a whole grid; folded members left out."""
-    stretch = grid.lengths / length - 1.0
+    stretch = grid.stretches(length) - 1.0
     shapes = shape_qualities(grid.nodes, grid.triangles)
     price = PRICE * len(grid.nodes) * float(stretch.mean()) ** 2
     return WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
@@ -101,7 +103,7 @@ def new_area(relief: Relief) -> Area:
     return Area(
         mark=np.zeros((capacity, 2), np.int64),
         around=np.zeros(MOST, np.int64),
-        nodes=np.zeros((MOST, 4)),
+        nodes=np.zeros((MOST, 5)),
         ring=np.zeros((MOST, width), np.int64),
         state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
         free=np.zeros(KEPT + 2, np.int64),

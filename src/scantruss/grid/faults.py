@@ -66,6 +66,14 @@ def _odd_loop(grid: Grid, boundary: Boundary) -> Place:
     return place_of(many[int(np.argmax(away))][0] + grid.origin)
 
 
+def _length_at(grid: Grid, where: Place, settings: Settings) -> float:
+    """Return the length desired at a place: that at the nearest node [scan unit]."""
+    if grid.desired is None:
+        return settings.length
+    away = ((grid.nodes + grid.origin - np.array(where)) ** 2).sum(axis=1)
+    return float(grid.desired[away.argmin()])
+
+
 def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, settings: Settings) -> list[Fault]:
     """Return what is wrong with where the nodes are; `crossings` (P, 2) are triangles that cut each other."""
     faults = []
@@ -76,7 +84,8 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
     if found.sharpest_fold and found.sharpest_fold.value < FOLDED:
         faults.append(Fault("folded", "is folded over onto itself", found.sharpest_fold.where))
-    uneven = grid.quality.length_cv
+    quality = grid.quality
+    uneven = quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
     if uneven > UNEVEN and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
@@ -84,9 +93,9 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         faults.append(
             Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
         )
-    gone = (ASTRAY + settings.smallest_hole / (2 * math.pi)) * settings.length
+    gone = ASTRAY + settings.smallest_hole / (2 * math.pi)
     for worst in (found.farthest_triangle, found.node_deviation):
-        if worst and worst.value > gone:
+        if worst and worst.value > gone * _length_at(grid, worst.where, settings):
             faults.append(Fault("astray", "covers what the scan does not", worst.where))
             break
     if found.fixed_error and not found.fixed_error.value <= OFF * settings.length:

@@ -13,6 +13,7 @@ from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..kernels.trial import TRIED, Scratch, total_energy
 from ..scan.cloud import PointCloud
+from ..scan.sites import local_field
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
@@ -41,17 +42,18 @@ def check_positions(
     relative = places - cloud.origin
     for k, place in enumerate(relative):
         distance = _distance_from_scan(surface, place)
-        if distance > 0.5 * length:
+        local = length * local_field(surface, place)
+        if distance > 0.5 * local:
             raise InputError(
                 f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * length:.4g}{unit}"
+                f" it must lie within half a member, {0.5 * local:.4g}{unit}"
             )
         gaps = np.linalg.norm(relative[:k] - place, axis=1)
-        if k and gaps.min() < 0.5 * length * (1 - 1e-9):
+        if k and gaps.min() < 0.5 * local * (1 - 1e-9):
             other = places[int(gaps.argmin())]
             raise InputError(
                 f"fixed positions {_text(other)} and {_text(places[k])} are {gaps.min():.4g}{unit} apart;"
-                f" they need half a member, {0.5 * length:.4g}{unit}"
+                f" they need half a member, {0.5 * local:.4g}{unit}"
             )
     return relative
 
@@ -83,7 +85,8 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     if len(away) and away.min() < AT_RIM * relief.length:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
-    if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & (net.kind == RIM)):
+    local = relief.length * local_field(relief.surface, place)
+    if curve >= 0 and distance <= AT_RIM * local and np.any(free & (net.kind == RIM)):
         free &= net.kind == RIM
     nodes = np.flatnonzero(free)
     order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")

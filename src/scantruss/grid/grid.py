@@ -24,6 +24,9 @@ class Grid:
     origin: np.ndarray  #: (3,) float64 [scan unit]
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
     deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
+    desired: np.ndarray | None = (
+        None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
+    )
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)
     certificate: Certificate | None = None  #: what was checked against the scan
@@ -94,6 +97,12 @@ class Grid:
     def lengths(self) -> np.ndarray:
         """(E,) length of each member [scan unit]."""
         return np.linalg.norm(self.nodes[self.edges[:, 0]] - self.nodes[self.edges[:, 1]], axis=1)
+
+    def stretches(self, length: float) -> np.ndarray:
+        """(E,) length of each member over the desired one: the mean of that at its nodes, or `length` where it is the same for all."""
+        if self.desired is None:
+            return self.lengths / length
+        return self.lengths / self.desired[self.edges].mean(axis=1)
 
     @cached_property
     def quality(self) -> GridQuality:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .certificate import Certificate, Fault, Worst, place_of
-from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_places
+from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_field, scan_places
 from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
@@ -72,17 +72,20 @@ def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
     places = scan_places(boundary.sites)
     boxes = boxes_of(places, 0.5 * length)
     left = distances_to_grid(places, boxes, grid, length)
+    local = length * scan_field(boundary.sites)
     middles = grid.nodes[grid.triangles].mean(axis=1)
+    members = np.full(len(middles), length) if grid.desired is None else grid.desired[grid.triangles].mean(axis=1)
+    at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
     astray, off = away[: len(middles)], away[len(middles) :]
     if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
         off = np.fmin(off, grid.deviation)
     return {
-        "scan_within_reach": float((left <= REACH * length).mean()),
-        "farthest_scan": _worst(left, places, grid),
-        "grid_within_reach": float((astray <= REACH * length).mean()),
-        "farthest_triangle": _worst(astray, middles, grid),
-        "node_deviation": _worst(off, grid.nodes, grid),
+        "scan_within_reach": float((left <= REACH * local).mean()),
+        "farthest_scan": _worst(left, places, grid, length / local),
+        "grid_within_reach": float((astray <= REACH * members).mean()),
+        "farthest_triangle": _worst(astray, middles, grid, length / members),
+        "node_deviation": _worst(off, grid.nodes, grid, length / at_nodes),
     }
 
 
@@ -104,12 +107,12 @@ def _extremes(grid: Grid, settings: Settings) -> dict[str, Any]:
     }
 
 
-def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, sign: float = 1.0) -> Worst | None:
-    """Return the largest of the values (K,), or the smallest for sign -1, and its place (K, 3); None of none."""
+def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, weight: float | np.ndarray = 1.0) -> Worst | None:
+    """Return the value (K,) that is largest times its weight, the smallest for weight -1, and its place (K, 3); None of none."""
     known = np.flatnonzero(np.isfinite(values))
     if len(known) == 0:
         return None
-    at = known[np.argmax(sign * values[known])]
+    at = known[np.argmax((weight * values)[known])]
     return Worst(float(values[at]), place_of(places[at] + grid.origin))
 
 

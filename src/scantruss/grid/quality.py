@@ -27,16 +27,26 @@ class GridQuality:
     node_deviation_mean: float | None  #: distance of the nodes from the scanned surface [scan unit]
     node_deviation_max: float | None
     unit: str = ""
+    stretch_mean: float | None = (
+        None  #: mean of member lengths over those desired there; None where one length is desired
+    )
+    stretch_cv: float | None = None  #: their standard deviation over their mean
 
     def __str__(self) -> str:
         """Return shape and length in one line."""
         shape = f"shape {self.shape_mean:.3f} +- {self.shape_std:.3f}"
+        if self.stretch_mean is not None and self.stretch_cv is not None:
+            return (
+                f"{shape}, length {self.stretch_mean:.3f} +- {self.stretch_mean * self.stretch_cv:.3f} of the desired"
+            )
         return f"{shape}, length {self.length_mean:.4g} +- {self.length_std:.2g} {self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON."""
         values = asdict(self)
         del values["unit"]
+        if self.stretch_mean is None:
+            del values["stretch_mean"], values["stretch_cv"]
         return values
 
 
@@ -99,6 +109,7 @@ def measure_quality(grid: Grid) -> GridQuality:
     interior[edges[grid.edge_uses != 2].ravel()] = False
     mean = float(lengths.mean())
     deviation = grid.deviation
+    stretches = grid.stretches(1.0) if grid.desired is not None and some else None
     measured = deviation is not None and len(deviation) > 0
     return GridQuality(
         shape_mean=float(shape.mean()),
@@ -113,6 +124,8 @@ def measure_quality(grid: Grid) -> GridQuality:
         node_deviation_mean=float(np.mean(deviation)) if measured and deviation is not None else None,
         node_deviation_max=float(np.max(deviation)) if measured and deviation is not None else None,
         unit=grid.unit,
+        stretch_mean=None if stretches is None else float(stretches.mean()),
+        stretch_cv=None if stretches is None else float(stretches.std() / stretches.mean()),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
 from ..machine import in_parts
-from ..scan.sites import with_own_scratch
+from ..scan.sites import is_graded, with_own_scratch
 from .grid import Grid
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
@@ -48,6 +49,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         state=np.zeros((capacity, 5), np.int64),
         arc=np.zeros(capacity),
         free=np.zeros(capacity + 2, np.int64),
+        desired=np.ones(capacity),
     )
     net.curve[:] = -1
     source = np.full(capacity, -1, np.int64)
@@ -66,10 +68,17 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     return net, source
 
 
-def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | None = None) -> Grid:
+def close_net(
+    net: Net,
+    source: np.ndarray,
+    grid: Grid,
+    deviation: np.ndarray | None = None,
+    desired: np.ndarray | None = None,
+) -> Grid:
     """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped.
 
-    `deviation` (C,) is the distance of each node of the net from the scan [scan unit].
+    `deviation` (C,) is the distance of each node of the net from the scan, `desired` (C,) the desired member length there, where it
+    is not the same for all [scan unit].
     """
     used = net.used
     room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
@@ -81,6 +90,7 @@ def close_net(net: Net, source: np.ndarray, grid: Grid, deviation: np.ndarray | 
         triangles=inverse.reshape(-1, 3).astype(np.int64),
         fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
         deviation=None if deviation is None else deviation[kept],
+        desired=None if desired is None else desired[kept],
     )
 
 
@@ -94,7 +104,7 @@ class Relief:
     patches: np.ndarray  #: (C, PATCH) local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
-    length: float  #: desired member length [scan unit]
+    length: float  #: desired member length, that of the length field's 1 [scan unit]
     landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
 
     @classmethod
@@ -144,15 +154,23 @@ class Relief:
 
         in_parts(self.net.used, PART, land_part)
 
+    @cached_property
+    def graded(self) -> bool:
+        """Whether the desired length differs from node to node."""
+        return is_graded(self.surface)
+
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
         return self.surface if part == 0 else with_own_scratch(self.surface)
 
     def renew(self, near: float) -> None:
-        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch."""
+        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; renew the lengths desired there."""
 
         def renew_part(part: int, begin: int, end: int) -> None:
-            seat.renew_patches(self.net, self._scratch(part), self.patches, near * self.length, begin, end)
+            surface = self._scratch(part)
+            seat.renew_patches(self.net, surface, self.patches, near * self.length, begin, end)
+            if self.graded:
+                seat.renew_lengths(self.net, surface, self.patches, begin, end)
 
         in_parts(self.net.used, PART, renew_part)
 
@@ -172,7 +190,9 @@ class Relief:
 
     def to_grid(self, grid: Grid) -> Grid:
         """Put the net together again, with all else as in `grid`; deviation measured."""
-        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), self.deviation())
+        deviation = self.deviation()
+        desired = self.length * self.net.desired if self.graded else None
+        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), deviation, desired)
 
 
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

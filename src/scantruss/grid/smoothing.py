@@ -41,9 +41,9 @@ def moved_too_far(after: State, max_deviation: float) -> bool:
     return after.moved > max_deviation
 
 
-def deviation_allowed(settings: Settings) -> float:
-    """Return the criterion of stop (c): as set, else a share of the desired length [scan unit]."""
-    return settings.length / 4 if settings.max_deviation is None else settings.max_deviation
+def deviation_allowed(settings: Settings, local: float = 1.0) -> float:
+    """Return the criterion of stop (c): as set, else a share of the desired length, `local` times that of the settings on average."""
+    return local * settings.length / 4 if settings.max_deviation is None else settings.max_deviation
 
 
 def smooth(relief: Relief, settings: Settings) -> Smoothing:
@@ -55,7 +55,7 @@ def smooth(relief: Relief, settings: Settings) -> Smoothing:
     net = relief.net
     start, before, spare = net.nodes.copy(), net.nodes.copy(), np.empty_like(net.nodes)
     arc = net.arc.copy()
-    allowed = deviation_allowed(settings)
+    allowed = deviation_allowed(settings, float(net.desired[: net.used][net.degree[: net.used] > 0].mean()))
     state = State(*kernels.state_of(net, start))
     for done in range(settings.smooth_passes):
         before[:], arc[:] = net.nodes, net.arc

@@ -8,17 +8,20 @@ import numpy as np
 
 from .cases import choose_by_case
 from .compile import kernel
+from .field import length_at
 from .front import (
     ACTIVE,
     DONE,
     FIRST,
     FULL,
+    GRADED,
     LAST,
     LENGTH,
     MORE,
     NEAR,
     NEARNESS,
     NODES,
+    REFERENCE,
     SEGMENTS,
     SHAPE,
     SIZE,
@@ -69,7 +72,7 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
     gap = norm(subtract(row(surface.mean, near), foot))
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)
-    return gap < 0.9 * surface.scale[0]
+    return gap < 0.9 * surface.scale[0] * surface.field[near]
 
 
 @kernel
@@ -158,6 +161,19 @@ def take_segment(front: Front) -> int:
 
 
 @kernel
+def set_length(surface: Surface, front: Front, s: int, numbers: np.ndarray) -> None:
+    """Set the length that is desired where the triangle of a segment will lie."""
+    if numbers[GRADED] == 0.0:
+        return
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    ab = subtract(pb, pa)
+    height = 0.4 * numbers[REFERENCE] * surface.field[front.site[a]]
+    place = along(along(pa, 0.5, ab), height, turned(ab, row(front.normals, a), 0.5 * math.pi))
+    numbers[LENGTH] = numbers[REFERENCE] * length_at(surface, front.site[a], place)
+
+
+@kernel
 def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
     """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(NEAR, np.int64)
@@ -168,6 +184,7 @@ def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) ->
         s = take_segment(front)
         if s < 0:
             return DONE
+        set_length(surface, front, s, numbers)
         if not choose_by_quality(surface, front, s, numbers, found, patch):
             front.state[s] = WAITING
     return MORE
@@ -184,6 +201,7 @@ def advance_by_cases(surface: Surface, front: Front, numbers: np.ndarray, budget
         s = take_segment(front)
         if s < 0:
             return DONE
+        set_length(surface, front, s, numbers)
         if not choose_by_case(surface, front, s, numbers, found, patch):
             front.state[s] = WAITING
     return MORE

@@ -1,7 +1,8 @@
 """Equalizing: nodes move on the scanned surface until the energy of members and triangles is least.
 
 The energy is E = weight * sum (L / l_0 - 1)^2 over the members + sum (1 - G) over the triangles, G negative where a triangle is
-turned over. Its first part is springs, its second is Laplace: for a fixed opposite side, G grows towards the middle.
+turned over; l_0 is the mean of the lengths desired at both nodes of a member. Its first part is springs, its second is Laplace: for
+a fixed opposite side, G grows towards the middle.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ def star_energy(
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
     nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
-    d = net.state[v, DEGREE]
+    d, half = net.state[v, DEGREE], 0.5 * length
+    own = half * net.desired[v]
     w = net.ring[v, d - 1]
     cx, cy, cz = nodes[w, 0] - x, nodes[w, 1] - y, nodes[w, 2] - z
     cc = cx * cx + cy * cy + cz * cz
@@ -43,9 +45,10 @@ def star_energy(
         cc = cx * cx + cy * cy + cz * cz
         size = math.sqrt(cc)
         if size > 0.0:
-            stretch = size / length - 1.0
+            target = own + half * net.desired[w]
+            stretch = size / target - 1.0
             energy += weight * stretch * stretch
-            f = 2.0 * weight * stretch / (length * size)
+            f = 2.0 * weight * stretch / (target * size)
             gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
         if i == 0 and net.state[v, OPEN] == 1:
             continue
@@ -74,7 +77,7 @@ def star_energy(
 def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
-    Steps shorter than `still` are not made.
+    Steps shorter than `still`, where members are to have the length, are not made.
     """
     kind = net.state[v, KIND]
     if kind >= REST or net.state[v, DEGREE] == 0:
@@ -85,10 +88,11 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
         nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
-    step = STRIDE * length * length / (net.state[v, DEGREE] * (weight + 1.3))
-    most = 0.3 * length
+    local = length * net.desired[v]
+    step = STRIDE * local * local / (net.state[v, DEGREE] * (weight + 1.3))
+    most = 0.3 * local
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
-    if size < still:
+    if size < still * net.desired[v]:
         return 0.0
     if size > most:
         step *= most / size
@@ -100,7 +104,7 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
         else:
             px, py, pz = onto_patch(patches[v], place)
             dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
-            if dx * dx + dy * dy + dz * dz > LEASH * LEASH * length * length:
+            if dx * dx + dy * dy + dz * dz > LEASH * LEASH * local * local:
                 step *= 0.3
                 continue
         after = star_energy(net, patches, v, px, py, pz, length, weight)[0]

@@ -27,7 +27,13 @@ from .vectors import Vector, across, along, cross, dot, norm, row, subtract, uni
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
-LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(9)  # places in `numbers`
+LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(
+    9
+)  # places in `numbers`; LENGTH is that at the segment in hand
+REFERENCE, GRADED = (
+    9,
+    10,
+)  # places of the length that the length field multiplies, and of 1 where there is one that differs
 SHEET = 0.45  # what is farther from a triangle than this is another sheet, in lengths
 NEAR = 400  # most front nodes looked at in one step
 

@@ -32,6 +32,7 @@ class Net(NamedTuple):
     state: np.ndarray  #: (C, 5) int64, see the properties
     arc: np.ndarray  #: (C,) place of a boundary node on its curve, as arc length from the start
     free: np.ndarray  #: (C + 2,) int64 stack of free nodes; last but one their number, last the nodes in use
+    desired: np.ndarray  #: (C,) desired member length at each node, in lengths: ones where there is one length
 
     @property
     def degree(self) -> np.ndarray:
@@ -127,6 +128,12 @@ def fill_rings(
                 ring[v, i + 1] = fan[last]
             at = partner[last]
     return used
+
+
+@kernel
+def target_length(net: Net, v: int, u: int, length: float) -> float:
+    """Length that the member from v to u shall have: the mean of what is desired at its ends, where `length` is the unit."""
+    return 0.5 * length * net.desired[v] + 0.5 * length * net.desired[u]
 
 
 @kernel
@@ -295,6 +302,7 @@ def split(net: Net, a: int, b: int) -> int:
     rim = right < 0 or left < 0
     net.state[m, OPEN], net.state[m, KIND] = (1, RIM) if rim else (0, INTERIOR)
     net.state[m, CURVE] = net.state[a, CURVE] if rim else -1
+    net.desired[m] = 0.5 * (net.desired[a] + net.desired[b])
     if right >= 0:
         put_in(net, right, place_of(net, right, b) + 1, m)
     if left >= 0:

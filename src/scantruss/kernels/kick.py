@@ -9,7 +9,7 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import settle_node
-from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, wings
+from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
 from .trial import MARK, Scratch, gather, local_energy
@@ -29,7 +29,7 @@ class Area(NamedTuple):
 
     mark: np.ndarray  #: (C, 2) int64 number of the kick that has the node in its area; rings away from the kicked node
     around: np.ndarray  #: (A,) int64 the nodes
-    nodes: np.ndarray  #: (A, 4) their places and arcs
+    nodes: np.ndarray  #: (A, 5) their places, arcs and desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
     state: np.ndarray  #: (A, 5) int64 their states
     free: np.ndarray  #: (KEPT + 2,) int64 the top of the stack of free nodes; their number, and how many are here
@@ -71,7 +71,7 @@ def list_area(net: Net, area: Area, v: int) -> bool:
         u = area.around[k]
         for c in range(3):
             area.nodes[k, c] = net.nodes[u, c]
-        area.nodes[k, 3] = net.arc[u]
+        area.nodes[k, 3], area.nodes[k, 4] = net.arc[u], net.desired[u]
         for c in range(net.ring.shape[1]):
             area.ring[k, c] = net.ring[u, c]
         for c in range(net.state.shape[1]):
@@ -95,7 +95,7 @@ def put_area_back(net: Net, area: Area) -> None:
         u = area.around[k]
         for c in range(3):
             net.nodes[u, c] = area.nodes[k, c]
-        net.arc[u] = area.nodes[k, 3]
+        net.arc[u], net.desired[u] = area.nodes[k, 3], area.nodes[k, 4]
         for c in range(net.ring.shape[1]):
             net.ring[u, c] = area.ring[k, c]
         for c in range(net.state.shape[1]):
@@ -200,7 +200,7 @@ def search_area(
                 a, b = u, v
             if not (is_allowed(net, move, a, b) and is_within(net, area, a, b)):
                 continue
-            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / length
+            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
             if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
                 continue
             if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):

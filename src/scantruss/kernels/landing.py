@@ -71,10 +71,11 @@ def land_nodes(
             if net.state[v, KIND] != INTERIOR:
                 normal = patch_normal(patches[v], foot)
                 foot = along(place, dot(subtract(foot, place), normal), normal)
-            if fixed[v] or norm(subtract(foot, place)) > 0.6 * broad.scale[0]:
+            local = broad.scale[0] * net.desired[v]
+            if fixed[v] or norm(subtract(foot, place)) > 0.6 * local:
                 break
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
-            if norm(subtract(foot, place)) < SETTLED * broad.scale[0]:
+            if norm(subtract(foot, place)) < SETTLED * local:
                 break
         place = row(net.nodes, v)
         fit_patch(fine, patches[v], int(patches[v, 15]), place)

@@ -22,6 +22,7 @@ from .grid import (
     may_flip,
     may_split,
     split,
+    target_length,
     wings,
 )
 from .rim import Rim, at_arc
@@ -205,7 +206,8 @@ def is_regular(net: Net, v: int, length: float) -> bool:
         return False
     for i in range(net.state[v, DEGREE]):
         w = net.ring[v, i]
-        if abs(norm(subtract(row(net.nodes, w), row(net.nodes, v))) / length - 1.0) > STRAINED:
+        size = norm(subtract(row(net.nodes, w), row(net.nodes, v)))
+        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED:
             return False
     return True
 
@@ -263,7 +265,7 @@ def search(
                 a, b = u, v
             if not is_allowed(net, move, a, b):
                 continue
-            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / length
+            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
             if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
                 continue
             half = 0.5 if move == SPLIT else -0.5

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
+from .field import length_at
 from .grid import CURVE, DEGREE, INTERIOR, KIND, RIM, Net
 from .rim import Rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
@@ -65,10 +66,18 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
     for v in range(begin, end):
         if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
-            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near:
+            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
                 count += 1
     return count
+
+
+@kernel
+def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, end: int) -> None:
+    """Give each node from `begin` to `end` - 1 the member length that is desired where it stands."""
+    for v in range(begin, end):
+        if net.state[v, DEGREE] > 0:
+            net.desired[v] = length_at(surface, int(patches[v, 15]), row(net.nodes, v))
 
 
 @kernel
@@ -79,7 +88,7 @@ def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> Non
         if net.state[v, DEGREE] > 0 and net.state[v, KIND] == INTERIOR:
             x, y, z = onto_patch(patches[v], (x, y, z))
         elif net.state[v, DEGREE] > 0 and net.state[v, KIND] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach, x, y, z)
+            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach * net.desired[v], x, y, z)
         net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 

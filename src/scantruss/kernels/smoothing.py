@@ -16,8 +16,9 @@ from .vectors import cross, dot, norm, row, subtract
 def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
     """Move every free node by `factor` of the way to the middle of its neighbours; on the rim, of its two neighbours there.
 
-    Neighbours weigh as much as their members are long, so that long members become shorter: with equal weights a grid keeps
-    the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from which they start.
+    Neighbours weigh as much as their members are long beside what is desired there, so that long members become shorter: with equal
+    weights a grid keeps the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from
+    which they start.
     """
     used = net.free[-1]
     for v in range(used):
@@ -30,7 +31,7 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
         x = y = z = total = 0.0
         for i in range(0, d, step):
             arm = subtract(row(before, net.ring[v, i]), row(before, v))
-            weight = norm(arm)
+            weight = norm(arm) / (net.desired[v] + net.desired[net.ring[v, i]])
             total += weight
             x, y, z = x + weight * arm[0], y + weight * arm[1], z + weight * arm[2]
         if total > 0.0:
@@ -41,7 +42,10 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
 
 @kernel
 def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
-    """Mean shape quality of the triangles, standard deviation of the member lengths, mean way of the nodes from their start (C, 3)."""
+    """Mean shape quality of the triangles, standard deviation of the member lengths, mean way of the nodes from their start (C, 3).
+
+    The lengths are those of members where one reference length is desired.
+    """
     shape = total = squares = moved = 0.0
     triangles = members = count = 0
     for v in range(net.free[-1]):
@@ -56,8 +60,9 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
             a, b = subtract(row(net.nodes, u), here), subtract(row(net.nodes, w), here)
             if v < u:
                 members += 1
-                total += norm(a)
-                squares += dot(a, a)
+                shorter = 2.0 / (net.desired[v] + net.desired[u])
+                total += shorter * norm(a)
+                squares += shorter * shorter * dot(a, a)
             if v < u and v < w and i < d - net.state[v, OPEN]:
                 triangles += 1
                 c = subtract(b, a)

@@ -30,6 +30,9 @@ class Surface(NamedTuple):
     stamp: np.ndarray  #: (S,) int64 scratch of `flood`
     queue: np.ndarray  #: (S,) int64 scratch of `flood`
     counter: np.ndarray  #: (1,) int64 number of the last flood
+    field: (
+        np.ndarray
+    )  #: (S,) desired member length at each site, in member lengths of `scale`: ones where there is one length
 
 
 @kernel
@@ -121,7 +124,10 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
     """
     site = walk(surface, site, place)
     facing = row(surface.normals, site)
-    radius, most = surface.scale[2], int(surface.scale[3])
+    local = surface.field[
+        site
+    ]  # a patch is as wide as the members there; the wider, the fewer points of a site suffice
+    radius, most = surface.scale[2] * local, max(int(surface.scale[3] / (local * local)), 1)
     patch[15] = site
     taken = 0
     while True:
@@ -142,7 +148,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
                         buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
                         buffer[taken, 3] = w * w
                         taken += 1
-        if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]):
+        if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]) * local:
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)
@@ -153,7 +159,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
     for i in range(taken):
         mean += buffer[i, 4]
     mean = mean / max(taken, 1)
-    if mean > 0.002 * surface.scale[0] and taken > 12:
+    if mean > 0.002 * surface.scale[0] * local and taken > 12:
         for i in range(taken):
             r = buffer[i, 4] / (2.0 * mean)
             buffer[i, 3] /= (1.0 + r * r) * (1.0 + r * r)

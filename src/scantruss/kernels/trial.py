@@ -9,7 +9,7 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT
-from .grid import DEGREE, OPEN, Net, wings
+from .grid import DEGREE, OPEN, Net, target_length, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
 
 MARK, TRIED = 0, 1  # columns of `Scratch.note`
@@ -112,7 +112,7 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
             cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
             cc = cx * cx + cy * cy + cz * cz
             if at >= 0 and not counted:
-                stretch = math.sqrt(cc) / length - 1.0
+                stretch = math.sqrt(cc) / target_length(net, v, w, length) - 1.0
                 energy += weight * stretch * stretch
             if at == 0 and not closed:
                 continue
@@ -133,7 +133,7 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
 
 @kernel
 def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
-    """Energy of the whole grid, mean length of its members, and its nodes."""
+    """Energy of the whole grid, mean length of its members where `length` is desired, and its nodes."""
     scratch.counter[0] += 1
     count = members = 0
     total = 0.0
@@ -146,6 +146,7 @@ def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tu
                 u = net.ring[v, i]
                 if v < u:
                     members += 1
-                    total += norm(subtract(row(net.nodes, u), row(net.nodes, v)))
+                    target = 0.5 * (net.desired[v] + net.desired[u])
+                    total += norm(subtract(row(net.nodes, u), row(net.nodes, v))) / target
     scratch.counter[1] = count
     return local_energy(net, scratch, length, weight), total / max(members, 1), count

@@ -66,6 +66,8 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
         ("member length, mean", "length_mean", "{:.4g}"),
         ("member length, std", "length_std", "{:.3g}"),
         ("length std / mean", "length_cv", "{:.4f}"),
+        ("length / desired, mean", "stretch_mean", "{:.4f}"),
+        ("the same, std / mean", "stretch_cv", "{:.4f}"),
         ("smallest angle", "angle_min", "{:.1f}"),
         ("largest angle", "angle_max", "{:.1f}"),
         ("nodes of six members", "valence6", "{:.0%}"),
@@ -79,6 +81,7 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
             form.format(after[key]),
         )
         for name, key, form in rows
+        if key in after
     ]
 
 

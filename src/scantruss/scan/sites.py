@@ -14,6 +14,7 @@ from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud
+from .field import Wish, length_field, wish_of
 from .strays import find_strays, has_strays
 
 NEIGHBORS = 12  # links of a site
@@ -32,11 +33,19 @@ class Sites:
     thickness: np.ndarray  #: (S,) rms distance of each site and its neighbours from their plane [scan unit]
     spacing: float  #: typical distance between neighbouring points [scan unit]
     area: float  #: rough area of the scanned surface [scan unit^2]
+    graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
 
+    @property
+    def graded(self) -> bool:
+        """Whether the desired member length differs from place to place."""
+        return is_graded(self.surface)
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float], Sites]] = weakref.WeakKeyDictionary()
+
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, Wish | None], Sites]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
@@ -46,14 +55,25 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `stray_distance` which points are left out.
+        `length` and `box_size` decide how far apart sites are, `stray_distance` which points are left out, `length_field` where
+        members are to be longer.
     """
-    key = (settings.length, settings.box_size, settings.stray_distance)
+    key = (settings.length, settings.box_size, settings.stray_distance, wish_of(settings, cloud.origin))
     kept = _KEPT.setdefault(cloud, {})
     if key not in kept:
         kept.clear()
         kept[key] = _prepare(cloud.points, cloud.spacing, *key)
     return kept[key]
+
+
+def is_graded(surface: Surface) -> bool:
+    """Whether the desired member length differs from place to place."""
+    return bool(np.any(surface.field != 1.0))
+
+
+def local_field(surface: Surface, place: np.ndarray) -> float:
+    """Desired length at a place, in lengths: that of the nearest site."""
+    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -66,6 +86,8 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     scale = surface.scale.copy()
     scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
     scale[3] = ALL
+    if np.isfinite(points):  # so many points, whatever the length of the members
+        surface = surface._replace(field=np.ones_like(surface.field))
     return surface._replace(scale=scale)
 
 
@@ -91,7 +113,9 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float, stray_distance: float) -> Sites:
+def _prepare(
+    points: np.ndarray, spacing: float, length: float, box_size: float, stray_distance: float, wish: Wish | None
+) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
     strays = 0
     while True:
@@ -125,12 +149,24 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float,
     _face_outside(mean, smoothed, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
-    surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
+    surface = Surface(
+        grouped,
+        start,
+        mean,
+        smoothed,
+        neighbors,
+        scale,
+        scratch,
+        scratch.copy(),
+        np.zeros(1, np.int64),
+        np.ones(len(mean)),
+    )
+    surface = surface._replace(field=length_field(surface, wish))
     piece = _number(piece)
     area = _site_areas(surface)
-    return Sites(
-        surface, boxes, piece, thickness, spacing, float(area.sum()), _large_pieces(piece, area, length), strays
-    )
+    graded = area / surface.field**2
+    pieces = _large_pieces(piece, area, graded, length)
+    return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), float(graded.sum()), pieces, strays)
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -191,11 +227,11 @@ def _site_areas(surface: Surface) -> np.ndarray:
     return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
 
 
-def _large_pieces(piece: np.ndarray, area: np.ndarray, length: float) -> tuple[int, ...]:
+def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, length: float) -> tuple[int, ...]:
     """Pieces that are not debris: room for some twenty triangles, and a hundredth of the largest."""
     count = np.bincount(piece)
     total = np.bincount(piece, area)
-    large = (total >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
+    large = (np.bincount(piece, graded) >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
     large[0] = True
     return tuple(int(i) for i in np.flatnonzero(large))
 
