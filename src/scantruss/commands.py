@@ -117,7 +117,8 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     from .export.files import check_place
     from .export.formats import check_output
 
-    inputs = ((values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes"))
+    inputs = [(values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
+    inputs += [(name, "fixed line") for name in getattr(values, "fixed_lines", ())]
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)

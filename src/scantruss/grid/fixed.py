@@ -13,6 +13,7 @@ from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..kernels.trial import TRIED, Scratch, total_energy
 from ..scan.cloud import PointCloud
+from ..scan.sites import distance_from_scan
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
@@ -40,7 +41,7 @@ def check_positions(
     unit = f" {cloud.unit}" if cloud.unit else ""
     relative = places - cloud.origin
     for k, place in enumerate(relative):
-        distance = _distance_from_scan(surface, place)
+        distance = distance_from_scan(surface, place)
         if distance > 0.5 * length:
             raise InputError(
                 f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
@@ -58,17 +59,6 @@ def check_positions(
 
 def _text(place: np.ndarray) -> str:
     return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
-
-
-def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
-    """Distance of a place from the nearest point of the scan."""
-    squares = ((surface.mean - place) ** 2).sum(axis=1)
-    reach = np.sqrt(squares.min()) + 2.0 * surface.scale[1]
-    best = np.inf
-    for site in np.flatnonzero(squares <= reach * reach):
-        points = surface.points[surface.start[site] : surface.start[site + 1]]
-        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
-    return float(np.sqrt(best))
 
 
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:

@@ -23,6 +23,9 @@ class Grid:
     fixed: np.ndarray  #: (V,) bool, nodes at positions that the user appointed
     origin: np.ndarray  #: (3,) float64 [scan unit]
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    lines: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 2), np.int64)
+    )  #: (K, 2) members along fixed lines, ridges
     deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)

@@ -70,7 +70,7 @@ def optimize_grid(
         return grid.replace(settings=settings, before=grid.quality)
     if boundary is None:
         boundary = find_boundary(cloud, settings)
-    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
+    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.stops, settings.length, boundary.lines)
     before = relief.to_grid(grid).quality
     report = (lambda share: progress("optimize", share)) if progress else None
     if report:
