@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields
 from pathlib import Path
 
+from scantruss.options import option_of
 from scantruss.settings import Settings
 
 PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
@@ -28,7 +29,7 @@ def settings_table() -> str:
         )
         cells = (
             f"`{spec.name}`",
-            f"`--{spec.name.replace('_', '-')}`",
+            f"`{option_of(spec.name)}`",
             about["symbol"],
             about["unit"],
             default,

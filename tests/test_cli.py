@@ -15,6 +15,7 @@ from scantruss import commands, pipeline
 from scantruss.cli import main
 from scantruss.errors import FrontError
 from scantruss.grid.grid import Grid
+from scantruss.options import option_of
 from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 
 LENGTH = "4"
@@ -274,7 +275,7 @@ def test_help_and_version_import_nothing_heavy():
         f"assert not set('{heavy}'.split()) & set(sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert all(f"--{spec.name.replace('_', '-')} " in done.stdout for spec in fields(st.Settings))
+    assert all(f"{option_of(spec.name)} " in done.stdout for spec in fields(st.Settings))
     assert f"scantruss {st.__version__}\n" in done.stdout
 
 

@@ -62,7 +62,7 @@ def _text(place: np.ndarray) -> str:
 
 
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
-    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it.
+    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary or line that it is at.
 
     A place nearer to a corner than that is the corner: between two nodes so near to each other no triangle is sound.
     """
@@ -73,8 +73,12 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     if len(away) and away.min() < AT_RIM * relief.length:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
-    if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & (net.kind == RIM)):
-        free &= net.kind == RIM
+    on_line = (net.kind == RIM) & (net.is_open == 0)
+    near = (net.kind == RIM) & (~on_line | (net.curve == curve))
+    if curve >= 0 and distance <= AT_RIM * relief.length and np.any(free & near):
+        free &= near
+    else:
+        free &= ~on_line  # a line is bent by no more than that
     nodes = np.flatnonzero(free)
     order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")
     return nodes[order]

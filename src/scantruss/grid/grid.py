@@ -56,6 +56,14 @@ class Grid:
         """(E,) the number of triangles at each member."""
         return np.bincount(self.half_edge_edges, minlength=len(self.edges))
 
+    @cached_property
+    def edge_on_line(self) -> np.ndarray:
+        """(E,) bool, the members along fixed lines and ridges."""
+        count = max(len(self.nodes), 1)
+        low, high = np.sort(self.lines, axis=1).T
+        found: np.ndarray = np.isin(self.edges[:, 0] * count + self.edges[:, 1], low * count + high)
+        return found
+
     @property
     def edges(self) -> np.ndarray:
         """(E, 2) the members, smaller node first, sorted."""

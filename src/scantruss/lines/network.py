@@ -120,7 +120,7 @@ class Network:
                 self._add_track(points, True, order, [], sharp)
             return
         for begin, end in self._pieces(points, closed, joints):
-            if (begin[0], end[0]) not in dropped:
+            if not any(low <= begin[0] and end[0] <= high for low, high in dropped):
                 self._add_piece(points, begin, end, order, sharp)
 
     def lines(self) -> Lines:

@@ -152,8 +152,9 @@ def _onto_scan(points: np.ndarray, number: int, cloud: PointCloud, surface: Surf
             site = nearest_site(surface, *at)
         fit_patch(surface, patch, site, at)
         feet[k] = onto_patch(patch, at)
-        gap = max(float(np.linalg.norm(feet[k] - points[k])), float(np.linalg.norm(surface.mean[site] - points[k])))
-        if gap > 0.5 * length + 2.0 * surface.scale[1]:
+        gap = float(np.linalg.norm(feet[k] - points[k]))
+        beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.scale[1]
+        if (gap := max(gap, beside)) > 0.5 * length:
             unit = _unit(cloud.unit)
             raise InputError(
                 f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + cloud.origin)};"
