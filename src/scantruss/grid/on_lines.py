@@ -6,7 +6,8 @@ import numpy as np
 
 from ..kernels.grid import LOCKED, RIM, Net
 from ..kernels.rim import Rim, nearest_on_rim
-from ..lines.network import Lines
+from ..lines.network import Lines, rim_of
+from .grid import Grid
 
 SNAP = 0.4  # the end of a line is the node of a line nearest to it, within so many lengths
 
@@ -19,6 +20,26 @@ def joined(first: Rim, second: Rim) -> Rim:
         np.concatenate([first.start, second.start[1:] + first.start[-1]]),
         np.concatenate([first.total, second.total]),
     )
+
+
+def inner_lines(grid: Grid) -> np.ndarray:
+    """Members (K, 2) of lines that are not on the boundary, where nothing can be flipped anyway."""
+    kept: np.ndarray = grid.edges[grid.edge_on_line & (grid.edge_uses > 1)] if len(grid.lines) else grid.lines
+    return kept
+
+
+def with_rim_members(grid: Grid, lines: Lines, length: float) -> Grid:
+    """Return the grid with the members of the boundary that lines run along among its lines."""
+    if not lines.along:
+        return grid
+    track = rim_of(lines.along, [False] * len(lines.along))
+    ends = grid.edges[grid.edge_uses == 1]
+
+    def is_near(place: np.ndarray) -> bool:
+        return nearest_on_rim(track, *place.tolist())[2] < SNAP * length
+
+    near = [is_near(a) and is_near(b) and is_near(0.5 * (a + b)) for a, b in grid.nodes[ends]]
+    return grid.replace(lines=np.unique(np.concatenate([grid.lines, ends[np.array(near, np.bool_)]]), axis=0))
 
 
 def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length: float) -> None:

@@ -12,6 +12,7 @@ from .equalize import equalize, finish, search_widely
 from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import FOLD, ROUNDS
 from .grid import Grid
+from .on_lines import with_rim_members
 from .relief import Relief
 from .smoothing import smooth
 
@@ -78,7 +79,8 @@ def optimize_grid(
     improve(relief, sites, positions, settings, report)
     if report:
         report(1.0)
-    return relief.to_grid(grid).replace(settings=settings, before=before)
+    better = with_rim_members(relief.to_grid(grid), boundary.lines, settings.length)
+    return better.replace(settings=settings, before=before)
 
 
 def improve(

@@ -17,7 +17,7 @@ from ..lines.network import NO_LINES, Lines
 from ..machine import in_parts
 from ..scan.sites import with_own_scratch
 from .grid import Grid
-from .on_lines import find_on_lines, joined
+from .on_lines import find_on_lines, inner_lines, joined
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
 PART = 300  # fewest nodes for a thread of their own
@@ -69,7 +69,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     several = np.bincount(source[:used], minlength=count) > 1
     ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
     twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
-    for a, b in grid.lines.tolist():
+    for a, b in inner_lines(grid).tolist():
         for v, u in ((a, b), (b, a)):
             kernels.mark_line(net, v, u)
             net.kind[v] = REST

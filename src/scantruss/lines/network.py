@@ -27,6 +27,7 @@ class Lines:
     curves: tuple[np.ndarray, ...]  #: (K, 3) each, on the scan
     ends: np.ndarray  #: (S, 2) int64 stops at the ends of each curve, -1 for a ring without stops
     sharp: np.ndarray  #: (S,) bool, a ridge: the local surface would round it off
+    along: tuple[np.ndarray, ...] = ()  #: (K, 3) each, parts of lines that run along the boundary or another line
 
     @cached_property
     def rim(self) -> Rim:
@@ -88,6 +89,7 @@ class Network:
         self.length = length
         self.places: list[np.ndarray] = []
         self.tracks: list[Track] = []
+        self.along: list[np.ndarray] = []
         for number, (points, corners) in enumerate(loops):
             track = Track(points, True, number)
             for i in corners.tolist():
@@ -145,6 +147,7 @@ class Network:
             tuple(curves),
             number[np.array(ends, np.int64).reshape(-1, 2)],
             np.array(sharp, np.bool_),
+            tuple(self.along),
         )
 
     def _new_stop(self, place: np.ndarray) -> int:
@@ -190,6 +193,7 @@ class Network:
                     for at in (begin, end - 1):
                         found.append((-1.0, at, self._stop_on(track, foot[at])))
                     dropped.add((begin, end - 1))
+                    self.along.append(points[begin:end])
         kept: list[tuple[int, int]] = []
         for _, at, stop in sorted(found):
             if all(
