@@ -77,6 +77,11 @@ class Settings:
         "polylines that become chains of members, in the scan's own frame; closed where the last point is the first",
         unit="scan unit",
     )
+    ridge_angle: float = _setting(
+        40.0,
+        "where the scan bends by more than this at once it has a ridge, a chain of members; 0: none",
+        unit="degree",
+    )
     max_deviation: float | None = _setting(
         None,
         "smoothing stops when the nodes have moved by more than this on average; none: length / 4",
@@ -134,7 +139,8 @@ class Settings:
             ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
             ("stray_distance", 0, math.inf),
             ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
-            ("corner_angle", 10, 180), ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
+            ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
+            ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float):
