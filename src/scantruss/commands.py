@@ -157,6 +157,8 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed:
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed)
+    if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
+        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     note_strays(bars, cloud, settings)
     return grid
 

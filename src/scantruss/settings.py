@@ -79,7 +79,7 @@ class Settings:
     )
     ridge_angle: float = _setting(
         40.0,
-        "where the scan bends by more than this at once it has a ridge, a chain of members; 0: none",
+        "where the scan bends by more than this at once it has a ridge, a chain of members; 0: none; default method only",
         unit="degree",
     )
     max_deviation: float | None = _setting(

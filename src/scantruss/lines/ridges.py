@@ -31,6 +31,10 @@ BRIDGE = 4.0  # ends of ridges that face each other are joined over a gap of so 
 STRAIGHT = 0.94  # if both are headed for the other (cosine)
 TOUCH = 0.6  # or, so near to each other, only headed so
 CORNER = 1.6  # ends of ridges whose continuations meet within so many lengths are led there
+EVEN = 2.4  # direction and half the angle of an even ridge change by less from place to place [degree]
+UNSURE = (1.0, 0.45)  # ... or by so many times what the noise explains, angle and direction,
+WIGGLE = 3.5  # if the direction changes by less than this [degree]
+MOST = 4000  # sites that are looked at, the sharpest first
 PATIENCE = 40  # places that look folded and are no ridge before no more are looked at: a rough scan
 ROUGH = 0.02  # where the points lie farther from their planes all of them count, in lengths
 MISSED = 2  # places in a row at which a ridge is not seen, and still goes on
@@ -67,19 +71,19 @@ class Tracer:
         bends = np.empty(len(self.surface.mean))
         bends_of_sites(self.surface, bends)
         likely = np.flatnonzero(bends < np.cos(BEND * self.angle))
-        likely = likely[np.argsort(bends[likely], kind="stable")]
+        likely = likely[np.argsort(bends[likely], kind="stable")[:MOST]]
         if not len(likely):
             return likely
         note = np.zeros(len(likely), np.int64)
         least, apart = LIKELY * self.angle, APART * self.length
         return likely[: keep_folded(self.surface, likely, self.radius, least, apart, self.buffer, note)]
 
-    def trace(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """All ridges: places (K, 3) a stride apart and the angle (K,) at each."""
+    def trace(self) -> list[np.ndarray]:
+        """All ridges: the folds (K, FOUND) a stride apart along each."""
         seeds = self.seeds()
         fresh = np.ones(len(seeds), bool)
         places = self.surface.mean[seeds]
-        ridges: list[tuple[np.ndarray, np.ndarray]] = []
+        ridges: list[np.ndarray] = []
         misses = 0
         for k, site in enumerate(seeds.tolist()):
             if not fresh[k]:
@@ -89,20 +93,15 @@ class Tracer:
             if misses > PATIENCE:
                 break
             if fold is not None and fold[6] > self.angle and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length:
-                ridge = self._follow(site, fold, [r for r, _ in ridges])
-                if self._is_ridge(ridge[1]):
-                    ridges.append(ridge)
+                folds = self._follow(site, fold, [ridge[:, :3] for ridge in ridges])
+                if is_ridge(folds, self.angle):
+                    ridges.append(folds)
                     misses = 0
-                for place in ridge[0]:
+                for place in folds[:, :3]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * APART * self.length) ** 2
         return ridges
 
-    def _is_ridge(self, angles: np.ndarray) -> bool:
-        """Whether a row of folds with these angles (K,) is a ridge."""
-        full = (angles >= self.angle).sum()
-        return bool(len(angles) * STRIDE >= LONG and full * STRIDE >= FULL and angles.max() < np.radians(SHARPEST))
-
-    def _follow(self, site: int, fold: np.ndarray, others: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _follow(self, site: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
         """Go along a ridge to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
         sides = []
         for sign in (1.0, -1.0):
@@ -115,7 +114,8 @@ class Tracer:
         if len(sides) == 1:
             steps.append(fold)
         folds = np.array(steps)
-        return _smoothed(folds[:, :3]), folds[:, 6]
+        folds[:, :3] = _smoothed(folds[:, :3])
+        return folds
 
     def _march(
         self, site: int, fold: np.ndarray, sign: float, others: list[np.ndarray]
@@ -153,6 +153,24 @@ class Tracer:
         )
 
 
+def is_ridge(folds: np.ndarray, angle: float) -> bool:
+    """Whether a row of folds (K, FOUND), a stride apart, is a ridge: long, sharp, and as even as one that was made.
+
+    Natural crests turn and change their angle all the way. What noise explains does not count: it makes the angle uncertain by
+    about the angle over the root of the F statistic, and the direction by one over that root.
+    """
+    angles = folds[:, 6]
+    if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < FULL or angles.max() >= np.radians(SHARPEST):
+        return False
+    ahead = np.diff(folds[:, :3], axis=0)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
+    wiggle = float(np.arccos(np.clip((ahead[1:] * ahead[:-1]).sum(axis=1), -1.0, 1.0)).mean())
+    jitter = float(np.abs(np.diff(angles, 2)).mean())
+    noise = 1.0 / np.sqrt(float(np.median(folds[:, 7])))
+    by_noise = jitter <= UNSURE[0] * noise * float(np.median(angles)) and wiggle <= UNSURE[1] * noise
+    return wiggle + 0.5 * jitter <= np.radians(EVEN) or (by_noise and wiggle <= np.radians(WIGGLE))
+
+
 def _smoothed(places: np.ndarray) -> np.ndarray:
     """Places (K, 3) along a ridge with less of their noise; the ends stay."""
     smooth = places.copy()
@@ -166,7 +184,7 @@ def _smoothed(places: np.ndarray) -> np.ndarray:
 
 def find_ridges(sites: Sites, settings: Settings) -> list[tuple[np.ndarray, bool]]:
     """Return the ridges of a scan: places (K, 3) along each, and whether it is a ring; the longest first, rings last."""
-    found = [places for places, _ in Tracer(sites, settings).trace()]
+    found = [folds[:, :3] for folds in Tracer(sites, settings).trace()]
     rings = [len(r) > 8 and bool((r[0] == r[-1]).all()) for r in found]
     opened = join_ends([r for r, ring in zip(found, rings, strict=True) if not ring], settings.length)
     opened.sort(key=len, reverse=True)
