@@ -30,7 +30,8 @@ FULL = 1.5  # and so long with its full angle, in lengths
 BRIDGE = 4.0  # ends of ridges that face each other are joined over a gap of so many lengths,
 STRAIGHT = 0.94  # if both are headed for the other (cosine)
 TOUCH = 0.6  # or, so near to each other, only headed so
-CORNER = 1.6  # ends of ridges whose continuations meet within so many lengths are led there
+CORNER = 2.0  # ends of ridges whose continuations meet within so many lengths are led there,
+CLEAR = 3  # from so many places before, which are clear of the third side
 EVEN = 2.4  # direction and half the angle of an even ridge change by less from place to place [degree]
 UNSURE = (1.0, 0.45)  # ... or by so many times what the noise explains, angle and direction,
 WIGGLE = 3.5  # if the direction changes by less than this [degree]
@@ -162,6 +163,8 @@ def is_ridge(folds: np.ndarray, angle: float) -> bool:
     angles = folds[:, 6]
     if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < FULL or angles.max() >= np.radians(SHARPEST):
         return False
+    if len(folds) >= 16:  # what lies at the ends may be blurred by a third side
+        folds, angles = folds[CLEAR:-CLEAR], angles[CLEAR:-CLEAR]
     ahead = np.diff(folds[:, :3], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     wiggle = float(np.arccos(np.clip((ahead[1:] * ahead[:-1]).sum(axis=1), -1.0, 1.0)).mean())
@@ -207,7 +210,9 @@ def join_ends(ridges: list[np.ndarray], length: float) -> list[np.ndarray]:
         first = lines[i] if at_i == -1 else lines[i][::-1]
         second = lines[j] if at_j == 0 else lines[j][::-1]
         lines = [line for k, line in enumerate(lines) if k not in (i, j)] + [np.concatenate([first, second])]
-    ends = [(i, at, *_end(line, at)) for i, line in enumerate(lines) for at in (0, -1)]
+    cut = [line[CLEAR:-CLEAR] if len(line) > 2 * CLEAR + 4 else line for line in lines]
+    ends = [(i, at, *_end(line, at)) for i, line in enumerate(cut) for at in (0, -1)]
+    led: dict[tuple[int, int], np.ndarray] = {}
     for i, at, place, ahead in ends:
         near = [
             (other, way)
@@ -217,9 +222,19 @@ def join_ends(ridges: list[np.ndarray], length: float) -> list[np.ndarray]:
         if near:
             meeting = _meeting([(place, ahead), *near])
             if (meeting - place) @ ahead > 0.0 and np.linalg.norm(meeting - place) < CORNER * length:
-                parts = [meeting[None], lines[i]] if at == 0 else [lines[i], meeting[None]]
-                lines[i] = np.concatenate(parts)
-    return lines
+                led[i, at] = meeting
+    return [
+        _led(line, short, led.get((i, 0)), led.get((i, -1)))
+        for i, (line, short) in enumerate(zip(lines, cut, strict=True))
+    ]
+
+
+def _led(line: np.ndarray, short: np.ndarray, first: np.ndarray | None, last: np.ndarray | None) -> np.ndarray:
+    """A ridge with its ends led to corners, from where other sides do not yet blur it; an end without a corner stays."""
+    gone = (len(line) - len(short)) // 2
+    before = line[:gone] if first is None else first[None]
+    after = line[len(line) - gone :] if last is None else last[None]
+    return np.concatenate([before, short, after])
 
 
 def _end(line: np.ndarray, at: int) -> tuple[np.ndarray, np.ndarray]:
