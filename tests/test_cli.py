@@ -347,7 +347,7 @@ def test_the_report_holds_every_figure(place):
         "shape_mean shape_std shape_min length_mean length_std length_cv angle_min angle_max valence6"
         " node_deviation_mean node_deviation_max"
     )
-    names = "points nodes members triangles quality before topology certificate seconds settings version"
+    names = "points nodes members triangles line_members quality before topology certificate seconds settings version"
     assert set(report) == set(names.split())
     assert set(report["quality"]) == set(report["before"]) == set(figures.split())
     assert set(report["topology"]) == set("components boundary_loops euler manifold orientable".split())

@@ -11,9 +11,9 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("settings", "machine"),
     ("scan",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
-    ("corners",),
+    ("corners", "lines"),
     ("boundary",),
-    ("rows",),
+    ("rows", "slits"),
     ("front",),
     ("grid",),
     ("several",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from .kernels import boundary as kernels
 from .kernels.field import lengths_along
 from .kernels.rim import Rim
 from .kernels.surface import Surface
+from .lines.find import find_lines
+from .lines.network import NO_LINES, Lines
 from .scan.cloud import PointCloud
 from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites
 from .settings import Settings
@@ -35,20 +37,29 @@ class Loop:
     external: bool  #: the outer boundary of its piece; False: a hole
     length: float  #: [scan unit]
     piece: int  #: number of the piece of the cloud it bounds
-    field: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None where it is the same for all
+    desired: np.ndarray | None = (
+        None  #: (M,) desired length at each point, in lengths; None where it is the same for all
+    )
+    line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
 
     @property
     def corners(self) -> np.ndarray:
         """(C, 3) the corners."""
         return self.points[self.corner_at]
 
+    @property
+    def stop_at(self) -> np.ndarray:
+        """(S,) int64, points of the curve that become nodes and stay: corners and ends of lines."""
+        return np.union1d(self.corner_at, self.line_at) if len(self.line_at) else self.corner_at
+
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """All boundary loops of a cloud, and the sites they were found in."""
+    """All boundary loops of a cloud, the lines between them, and the sites they were found in."""
 
     loops: tuple[Loop, ...]
     sites: Sites
+    lines: Lines = NO_LINES  #: fixed lines and ridges
 
     @property
     def external(self) -> tuple[Loop, ...]:
@@ -64,6 +75,11 @@ class Boundary:
     def corners(self) -> np.ndarray:
         """(C, 3) the corners of all loops."""
         return np.concatenate([np.zeros((0, 3)), *(loop.corners for loop in self.loops)])
+
+    @property
+    def stops(self) -> np.ndarray:
+        """(S, 3) the places on all loops that become nodes and stay: corners and ends of lines."""
+        return np.concatenate([np.zeros((0, 3)), *(loop.points[loop.stop_at] for loop in self.loops)])
 
     @property
     def rim(self) -> Rim:
@@ -118,7 +134,29 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     loops = [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings, surface)) is not None]
     if progress:
         progress("boundary", 1.0)
-    return Boundary(_external_first(loops), sites)
+    ordered = _external_first(loops)
+    lines = find_lines(cloud, [(loop.points, loop.corner_at) for loop in ordered], sites, settings)
+    with_stops = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(ordered))
+    return Boundary(with_stops, sites, lines)
+
+
+def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
+    """Return a loop with places (K, 3) on it, the ends of lines, among its points."""
+    points, corner_at, line_at, desired = loop.points, loop.corner_at, loop.line_at, loop.desired
+    for place in places:
+        ahead = np.roll(points, -1, axis=0) - points
+        share = ((place - points) * ahead).sum(axis=1) / np.maximum((ahead**2).sum(axis=1), 1e-300)
+        share = np.clip(share, 0.0, 1.0)
+        i = int(((points + share[:, None] * ahead - place) ** 2).sum(axis=1).argmin())
+        if share[i] * np.linalg.norm(ahead[i]) < 1e-9 * loop.length:
+            line_at = np.append(line_at, i)
+        elif (1.0 - share[i]) * np.linalg.norm(ahead[i]) < 1e-9 * loop.length:
+            line_at = np.append(line_at, (i + 1) % len(points))
+        else:
+            points = np.insert(points, i + 1, place, axis=0)
+            desired = None if desired is None else np.insert(desired, i + 1, desired[i])
+            corner_at, line_at = corner_at + (corner_at > i), np.append(line_at + (line_at > i), i + 1)
+    return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
 
 
 def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: float) -> list[tuple[np.ndarray, int]]:
@@ -359,15 +397,16 @@ def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
 def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Characteristic points of a loop: nodes about `length` apart, equally between corners, corners being nodes.
 
-    With a length field they are equally far apart in desired lengths: in the integral of ds / l.
+    With a length field they are equally far apart in desired lengths: in the integral of ds / l. The ends of lines are nodes too.
 
     Returns
     -------
     nodes : (H, 3), at least three
-    is_corner : (H,) bool
+    is_corner : (H,) bool, corners and ends of lines
     """
     count = len(loop.points)
-    ends = loop.corner_at if len(loop.corner_at) else np.zeros(1, np.int64)
+    stops = loop.stop_at
+    ends = stops if len(stops) else np.zeros(1, np.int64)
     least = 3 if len(ends) == 1 else (2 if len(ends) == 2 else 1)
     nodes, is_corner = [], []
     for i, begin in enumerate(ends):
@@ -375,11 +414,11 @@ def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
         at_curve = np.arange(begin, end + 1) % count
         part = loop.points[at_curve]
         steps = np.linalg.norm(np.diff(part, axis=0), axis=1)
-        if loop.field is not None:
-            steps /= 0.5 * (loop.field[at_curve[1:]] + loop.field[at_curve[:-1]])
+        if loop.desired is not None:
+            steps /= 0.5 * (loop.desired[at_curve[1:]] + loop.desired[at_curve[:-1]])
         arc = np.concatenate([[0.0], np.cumsum(steps)])
         pieces = max(int(round(arc[-1] / length)), least)
         at = np.arange(pieces) * (arc[-1] / pieces)
         nodes.append(np.stack([np.interp(at, arc, part[:, c]) for c in range(3)], axis=1))
-        is_corner += [len(loop.corner_at) > 0] + [False] * (pieces - 1)
+        is_corner += [len(stops) > 0] + [False] * (pieces - 1)
     return np.concatenate(nodes), np.array(is_corner, bool)

@@ -123,6 +123,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     inputs = [(values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
     if isinstance(length := vars(values).get("length"), str) and not length.startswith(CURVATURE):
         inputs.append((length, "file of lengths"))
+    inputs += [(name, "fixed line") for name in getattr(values, "fixed_lines", ())]
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)
@@ -161,6 +162,8 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed:
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed)
+    if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
+        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     note_strays(bars, cloud, settings)
     return grid
 

@@ -15,12 +15,14 @@ from .kernels import boxes as boxing
 from .kernels import front as lists
 from .kernels import gaps
 from .kernels.boxes import new_boxes
+from .kernels.seat import nearest_site
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
 from .rows import STRAIGHT, Rows, lay_rows, nodes_at
 from .scan.cloud import PointCloud
 from .scan.sites import Sites, local_field
 from .settings import Settings
+from .slits import add_half_edges, chain_places, check_kept, line_members, link_around
 
 Progress = Callable[[str, float], None]
 
@@ -59,6 +61,7 @@ def advance_front(
     else:
         positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
         front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
+    members = line_members(front)
     numbers = np.array(
         [
             settings.length,
@@ -83,6 +86,7 @@ def advance_front(
         front = run(front, sites, numbers, progress, kernels.advance_by_cases if by_cases else kernels.advance)
     close_gaps(front, sites, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
+    check_kept(members, triangles, front.nodes)
     used, numbered = np.unique(triangles, return_inverse=True)
     desired = settings.length * sites.surface.field[front.site[used]] if sites.graded else None
     return Grid(
@@ -92,6 +96,7 @@ def advance_front(
         cloud.origin,
         cloud.unit,
         desired=desired,
+        lines=np.searchsorted(used, members),
         settings=settings,
     )
 
@@ -161,7 +166,7 @@ def start_front(
     rows: Rows | None = None,
     positions: np.ndarray | None = None,
 ) -> lists.Front:
-    """Put the initial front into the lists: the boundary loops, nodes that it may come to, a seed triangle on every closed piece.
+    """Put the initial front into the lists: the boundary loops, the lines, nodes that it may come to, a seed triangle on closed pieces.
 
     Those nodes are the appointed positions (K, 3) and the nodes of rows.
     """
@@ -170,6 +175,7 @@ def start_front(
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
         add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
+    add_lines(front, boundary, settings)
     for place in positions if positions is not None else ():
         length = settings.length * local_field(surface, place)
         front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
@@ -177,6 +183,7 @@ def start_front(
         front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
     piece = boundary.sites.piece
+    bounded |= {int(piece[nearest_site(surface, *curve[0].tolist())]) for curve in boundary.lines.curves}
     for number in boundary.sites.pieces:
         if number not in bounded:
             site = int(np.flatnonzero(piece == number)[0])
@@ -196,9 +203,45 @@ def offer(front: lists.Front, surface: Surface, nodes: lists.RowNodes, clear: fl
 
 def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarray, state: int) -> None:
     """Add a closed loop of boundary nodes and segments."""
+    ids = add_nodes(front, surface, nodes)
+    segments = [lists.add_segment(front, ids[i], ids[(i + 1) % len(ids)], state) for i in range(len(ids))]
+    for i, s in enumerate(segments):
+        lists.link(front, s, segments[(i + 1) % len(ids)])
+
+
+def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> None:
+    """Add the lines to a front that holds the boundary loops."""
+    lines, surface = boundary.lines, boundary.sites.surface
+    if not lines.curves:
+        return
+    count = int(front.count[lists.NODES])
+    at_stop = {}
+    for stop, place in enumerate(lines.stops):
+        if lines.on_loop[stop] >= 0:
+            at_stop[stop] = int(((front.nodes[:count] - place) ** 2).sum(axis=1).argmin())
+        else:
+            at_stop[stop] = add_nodes(front, surface, place[None])[0]
+    node_stop = {node: stop for stop, node in at_stop.items()}
+    heads = front.head[: front.count[lists.SEGMENTS]].tolist()
+    rim = zip(front.tail[: len(heads)].tolist(), heads, strict=True)
+    beside = ((node_stop[a], node_stop[b]) for a, b in rim if a in node_stop and b in node_stop)
+    taken = {(min(pair), max(pair)) for pair in beside}
+    chains = []
+    divided = chain_places(lines, surface, settings.length, taken)
+    for places, (first, last) in zip(divided, lines.ends.tolist(), strict=True):
+        middle = add_nodes(front, surface, places)
+        chain = [at_stop[first], *middle, at_stop[last]] if first >= 0 else [*middle, middle[0]]
+        add_half_edges(front, chain)
+        chains.append(chain)
+    for node in sorted({node for chain in chains for node in chain}):
+        link_around(front, node)
+
+
+def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
+    """Add nodes (K, 3) that stay in place: of the boundary or of lines, each near the one before; returns their numbers."""
     patch = np.zeros(PATCH)
-    ids = []
-    site = int(np.argmin(((surface.mean - nodes[0]) ** 2).sum(axis=1)))
+    ids: list[int] = []
+    site = int(np.argmin(((surface.mean - nodes[0]) ** 2).sum(axis=1))) if len(nodes) else 0
     for place in nodes:
         site = walk(surface, site, tuple(place))
         if np.linalg.norm(surface.mean[site] - place) > 2.0 * surface.scale[4]:
@@ -207,9 +250,7 @@ def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarr
         normal = patch_normal(patch, tuple(place))
         ids.append(lists.propose_node(front, tuple(place), normal, int(patch[15]), True))
         lists.add_node(front)
-    segments = [lists.add_segment(front, ids[i], ids[(i + 1) % len(ids)], state) for i in range(len(ids))]
-    for i, s in enumerate(segments):
-        lists.link(front, s, segments[(i + 1) % len(ids)])
+    return ids
 
 
 def add_seed(front: lists.Front, ids: list[int]) -> None:

@@ -120,18 +120,41 @@ def read_positions(path: str | Path) -> list[Position]:
     FormatError
         The file cannot be read, or a line holds no position.
     """
+    return [place for part in _read_parts(path, "fixed nodes") for place in part]
+
+
+def read_lines(path: str | Path) -> list[list[Position]]:
+    """Return the polylines in a text file: their points as `read_positions` takes them, an empty line between two of them.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, a line holds no position, or a polyline has fewer than two points.
+    """
+    found = _read_parts(path, "fixed lines")
+    for number, part in enumerate(found, 1):
+        if len(set(part)) < 2:
+            which = f"polyline {number} of {path}" if len(found) > 1 else path
+            raise FormatError(f"{which} has {len(set(part))} point; a fixed line needs at least two different ones")
+    return found
+
+
+def _read_parts(path: str | Path, what: str) -> list[list[Position]]:
+    """Return the positions in a text file, in parts that empty lines divide."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except OSError as error:
-        raise FormatError(f"cannot read fixed nodes {path}: {error.strerror}") from None
+        raise FormatError(f"cannot read {what} {path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"{path} is not a text file; fixed nodes need a CSV file with three numbers a line") from None
-    found: list[Position] = []
+        raise FormatError(f"{path} is not a text file; {what} need a CSV file with three numbers a line") from None
+    found: list[list[Position]] = []
     columns = [0, 1, 2]
     header = False
+    begins = True
     for count, line in enumerate(lines, 1):
         words = _words(line)
         if not words:
+            begins = begins or not line.strip()
             continue
         try:
             x, y, z = (float(words[column]) for column in columns)
@@ -142,9 +165,12 @@ def read_positions(path: str | Path) -> list[Position]:
             header = True
             columns = [names.index(axis) for axis in "xyz"] if {"x", "y", "z"} <= set(names) else columns
             continue
-        found.append((x, y, z))
+        if begins:
+            found.append([])
+        begins = False
+        found[-1].append((x, y, z))
     if not found:
-        raise FormatError(f"{path} holds no fixed nodes; it needs three numbers X,Y,Z a line")
+        raise FormatError(f"{path} holds no {what}; it needs three numbers X,Y,Z a line")
     return found
 
 
@@ -167,7 +193,7 @@ _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
 
 def option_of(name: str) -> str:
     """Return the option of a field; a length field is a value of ``--length``."""
-    return "--" + name.removesuffix("_field").replace("_", "-")
+    return "--" + {"fixed_lines": "fixed_line"}.get(name, name).removesuffix("_field").replace("_", "-")
 
 
 def describe(spec: Field[Any]) -> str:
@@ -194,6 +220,9 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
             options["help"] += "; repeatable"
         elif spec.name == "length":
             options |= {"type": length_or_field, "metavar": "NUMBER|FILE|curvature:MIN:MAX"}
+        elif spec.name == "fixed_lines":
+            options |= {"action": "append", "metavar": "FILE"}
+            options["help"] += "; a text file of points X,Y,Z, an empty line between two polylines; repeatable"
         elif spec.type == "bool":
             options["action"] = argparse.BooleanOptionalAction
         else:
@@ -217,6 +246,8 @@ def settings_of(values: argparse.Namespace) -> Settings:
         named = explicit.pop("length")
         explicit["length_field"] = named if named.startswith(CURVATURE) else read_lengths(named)
         kept.pop("length", None)
+    if "fixed_lines" in explicit:
+        explicit["fixed_lines"] = tuple(line for path in explicit["fixed_lines"] for line in read_lines(path))
     merged = kept | explicit
     if "length" not in merged and not merged.get("length_field"):
         raise UsageError(

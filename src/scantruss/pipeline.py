@@ -91,6 +91,11 @@ def grid_from_cloud(
         Return a grid that fails its certificate too.
     read_seconds : float
         What reading took [s], for the table of times.
+
+    Returns
+    -------
+    Grid
+        Where no grid with the ridges of the scan passes the checks, one without; its settings say `ridge_angle` 0.
     """
     started = perf_counter()
     check_length(cloud, settings)
@@ -106,8 +111,12 @@ def grid_from_cloud(
     try:
         front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
         before = grid.before or front.quality
-    except CertificateError as error:
-        if not keep_failed or len(error.grid.triangles) == 0:
+    except FrontError as error:
+        if boundary.lines.sharp.any():  # rather a grid without the ridges than none
+            plain = settings.replace(ridge_angle=0.0)
+            grid = grid_from_cloud(cloud, plain, progress=progress, keep_failed=keep_failed)
+            return grid.replace(seconds=grid.seconds | {"total": read_seconds + perf_counter() - started})
+        if not isinstance(error, CertificateError) or not keep_failed or len(error.grid.triangles) == 0:
             raise
         grid, before, advanced = error.grid, error.grid.before, found
     ended = perf_counter()

@@ -35,6 +35,21 @@ def _setting(
     )
 
 
+def _line(line: Any) -> tuple[tuple[float, ...], ...]:
+    """Return a fixed line as tuples of numbers."""
+    try:
+        points = tuple(tuple(float(c) for c in position) for position in line)
+    except (TypeError, ValueError):
+        raise InputError(f"fixed_lines must be polylines of positions of three numbers, got {line!r}") from None
+    for position in points:
+        if len(position) != 3 or not all(map(math.isfinite, position)):
+            raise InputError(f"a fixed line needs points of three finite coordinates, got {position}")
+    points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
+    if len(points) < 2:
+        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
+    return points
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """One record of all settings; unknown or impossible values raise InputError."""
@@ -64,6 +79,16 @@ class Settings:
     )
     fixed: tuple[tuple[float, float, float], ...] = _setting(
         (), "positions that must become nodes, in the scan's own frame", unit="scan unit", source="Sec. 4.2"
+    )
+    fixed_lines: tuple[tuple[tuple[float, float, float], ...], ...] = _setting(
+        (),
+        "polylines that become chains of members, in the scan's own frame; closed where the last point is the first",
+        unit="scan unit",
+    )
+    ridge_angle: float = _setting(
+        40.0,
+        "where the scan bends by more than this at once it has a ridge, a chain of members; 0: none; default method only",
+        unit="degree",
     )
     max_deviation: float | None = _setting(
         None,
@@ -125,7 +150,8 @@ class Settings:
             ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
             ("stray_distance", 0, math.inf),
             ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
-            ("corner_angle", 10, 180), ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
+            ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
+            ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float):
@@ -136,6 +162,7 @@ class Settings:
             isinstance(self.max_deviation, int | float) and self.max_deviation > 0
         ):
             raise InputError(f"max_deviation must be positive, got {self.max_deviation}")
+        object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
         try:
             fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)
         except (TypeError, ValueError):

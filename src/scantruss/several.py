@@ -12,6 +12,7 @@ from .errors import FrontError
 from .front import advance_front
 from .grid.equalize import energy_of_node, equalize
 from .grid.fixed import check_positions, hold_nodes
+from .grid.on_lines import with_rim_members
 from .grid.optimize import improve_further
 from .grid.relief import Relief
 from .machine import processors
@@ -75,7 +76,7 @@ def several_grids(
 
     def improve(front: Grid) -> Relief:
         surface = with_own_scratch(boundary.sites.surface)
-        relief = Relief.from_grid(front, surface, boundary.rim, boundary.corners, settings.length)
+        relief = Relief.from_grid(front, surface, boundary.rim, boundary.stops, settings.length, boundary.lines)
         hold_nodes(relief, positions)
         equalize(relief)
         return relief
@@ -83,7 +84,8 @@ def several_grids(
     def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
             improve_further(relief, boundary.sites, positions, settings)
-            return check(relief.to_grid(fronts[number]).replace(settings=settings, before=fronts[number].quality))
+            grid = with_rim_members(relief.to_grid(fronts[number]), boundary.lines, settings.length)
+            return check(grid.replace(settings=settings, before=fronts[number].quality))
 
         return _passed(faults, number, work)
 

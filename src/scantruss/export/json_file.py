@@ -1,6 +1,6 @@
 """Our own format: JSON that holds a grid without loss.
 
-What a grid is (nodes, triangles, fixed nodes, origin, unit, deviation, settings, quality before the optimization) and its
+What a grid is (nodes, triangles, fixed nodes, members along lines, origin, unit, deviation, settings, quality before) and its
 certificate, which needs the scan, are read back to the last bit. What follows from it (members, boundary loops, quality,
 topology) is written for other programs and not read back. No dates and no names are written: the same grid gives the same
 bytes.
@@ -41,6 +41,7 @@ def encode_json(grid: Grid) -> bytes:
         "topology": grid.topology.to_dict(),
         "certificate": None if grid.certificate is None else grid.certificate.to_dict(),
         "fixed": np.flatnonzero(grid.fixed).tolist(),
+        "lines": grid.lines.tolist(),
         "boundary_loops": [loop.tolist() for loop in grid.boundary_loops],
         "nodes": np.asarray(grid.nodes, np.float64).tolist(),
         "members": grid.edges.tolist(),
@@ -53,7 +54,7 @@ def encode_json(grid: Grid) -> bytes:
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
 
-ROWS = ("nodes", "members", "triangles", "boundary_loops")
+ROWS = ("nodes", "members", "triangles", "boundary_loops", "lines")
 
 
 def _number(value: Any) -> Any:
@@ -136,6 +137,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         nodes=nodes,
         triangles=triangles,
         fixed=fixed,
+        lines=_ids(values.get("lines", []), "lines", len(nodes), 2),
         origin=_floats([values["origin"]], "origin", 3)[0],
         unit=unit,
         deviation=deviation,

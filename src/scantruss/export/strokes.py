@@ -160,7 +160,7 @@ def grid_strokes(grid: Grid, cloud: PointCloud | None, view: View) -> list[Strok
 
 
 def _member_strokes(grid: Grid, view: View) -> Strokes:
-    """Return the members as lines just in front of their triangles, those on a boundary bolder."""
+    """Return the members as lines just in front of their triangles, those on a boundary or line bolder."""
     flat, near = view.camera.project(grid.nodes)
     ends = grid.edges
     pair = grid.edge_triangles
@@ -169,8 +169,9 @@ def _member_strokes(grid: Grid, view: View) -> Strokes:
     length = np.linalg.norm(flat[ends[:, 0]] - flat[ends[:, 1]], axis=1)
     width = float(np.clip(0.055 * np.quantile(length, 0.75), 0.4, 2.4))
     fade = view.fade(near[ends].mean(axis=1))
-    colour = np.where(boundary[:, None], _hazy(RIM, fade, 0.45), _hazy(INK, fade, 0.60))
-    widths = np.where(boundary, 1.9 * width, width)
+    bold = boundary | grid.edge_on_line
+    colour = np.where(bold[:, None], _hazy(RIM, fade, 0.45), _hazy(INK, fade, 0.60))
+    widths = np.where(bold, 1.9 * width, width)
     return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
 
 

@@ -41,7 +41,7 @@ def new_scratch(relief: Relief) -> Scratch:
         note=np.zeros((capacity, 2), np.int64),
         around=np.zeros(capacity, np.int64),
         nodes=np.zeros((capacity, 4)),
-        ring=np.zeros((capacity, width + 1), np.int64),
+        ring=np.zeros((capacity, width + 2), np.int64),
         counter=np.zeros(3, np.int64),
     )
 

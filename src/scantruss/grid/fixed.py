@@ -13,7 +13,7 @@ from ..kernels.seat import nearest_site
 from ..kernels.surface import Surface
 from ..kernels.trial import TRIED, Scratch, total_energy
 from ..scan.cloud import PointCloud
-from ..scan.sites import local_field
+from ..scan.sites import distance_from_scan, local_field
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
@@ -41,7 +41,7 @@ def check_positions(
     unit = f" {cloud.unit}" if cloud.unit else ""
     relative = places - cloud.origin
     for k, place in enumerate(relative):
-        distance = _distance_from_scan(surface, place)
+        distance = distance_from_scan(surface, place)
         local = length * local_field(surface, place)
         if distance > 0.5 * local:
             raise InputError(
@@ -62,19 +62,8 @@ def _text(place: np.ndarray) -> str:
     return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
 
 
-def _distance_from_scan(surface: Surface, place: np.ndarray) -> float:
-    """Distance of a place from the nearest point of the scan."""
-    squares = ((surface.mean - place) ** 2).sum(axis=1)
-    reach = np.sqrt(squares.min()) + 2.0 * surface.scale[1]
-    best = np.inf
-    for site in np.flatnonzero(squares <= reach * reach):
-        points = surface.points[surface.start[site] : surface.start[site + 1]]
-        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
-    return float(np.sqrt(best))
-
-
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
-    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary if the place is at it.
+    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary or line that it is at.
 
     A place nearer to a corner than that is the corner: between two nodes so near to each other no triangle is sound.
     """
@@ -86,8 +75,12 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
     local = relief.length * local_field(relief.surface, place)
-    if curve >= 0 and distance <= AT_RIM * local and np.any(free & (net.kind == RIM)):
-        free &= net.kind == RIM
+    on_line = (net.kind == RIM) & (net.is_open == 0)
+    near = (net.kind == RIM) & (~on_line | (net.curve == curve))
+    if curve >= 0 and distance <= AT_RIM * local and np.any(free & near):
+        free &= near
+    else:
+        free &= ~on_line  # a line is bent by no more than that
     nodes = np.flatnonzero(free)
     order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")
     return nodes[order]

@@ -23,6 +23,9 @@ class Grid:
     fixed: np.ndarray  #: (V,) bool, nodes at positions that the user appointed
     origin: np.ndarray  #: (3,) float64 [scan unit]
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    lines: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 2), np.int64)
+    )  #: (K, 2) members along fixed lines, ridges
     deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
     desired: np.ndarray | None = (
         None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
@@ -55,6 +58,14 @@ class Grid:
     def edge_uses(self) -> np.ndarray:
         """(E,) the number of triangles at each member."""
         return np.bincount(self.half_edge_edges, minlength=len(self.edges))
+
+    @cached_property
+    def edge_on_line(self) -> np.ndarray:
+        """(E,) bool, the members along fixed lines and ridges."""
+        count = max(len(self.nodes), 1)
+        low, high = np.sort(self.lines, axis=1).T
+        found: np.ndarray = np.isin(self.edges[:, 0] * count + self.edges[:, 1], low * count + high)
+        return found
 
     @property
     def edges(self) -> np.ndarray:

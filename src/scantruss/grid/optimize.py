@@ -12,6 +12,7 @@ from .equalize import equalize, finish, search_widely
 from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import FOLD, ROUNDS
 from .grid import Grid
+from .on_lines import with_rim_members
 from .relief import Relief
 from .smoothing import smooth
 
@@ -70,7 +71,7 @@ def optimize_grid(
         return grid.replace(settings=settings, before=grid.quality)
     if boundary is None:
         boundary = find_boundary(cloud, settings)
-    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
+    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.stops, settings.length, boundary.lines)
     before = relief.to_grid(grid).quality
     report = (lambda share: progress("optimize", share)) if progress else None
     if report:
@@ -78,7 +79,8 @@ def optimize_grid(
     improve(relief, sites, positions, settings, report)
     if report:
         report(1.0)
-    return relief.to_grid(grid).replace(settings=settings, before=before)
+    better = with_rim_members(relief.to_grid(grid), boundary.lines, settings.length)
+    return better.replace(settings=settings, before=before)
 
 
 def improve(

@@ -7,19 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
+from ..errors import FrontError
 from ..kernels import grid as kernels
 from ..kernels import seat
 from ..kernels.grid import LOCKED, REST, RIM, Net
 from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim, nearest_on_rim
 from ..kernels.surface import PATCH, Surface
+from ..lines.network import NO_LINES, Lines
 from ..machine import in_parts
 from ..scan.sites import is_graded, with_own_scratch
 from .grid import Grid
+from .on_lines import find_on_lines, inner_lines, joined
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
 PART = 300  # fewest nodes for a thread of their own
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
+MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
 
 
 def no_rim() -> Rim:
@@ -31,7 +35,8 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     """Take a grid apart into rings of neighbours.
 
     A node whose triangles are several fans becomes several nodes of the net; these and the nodes of seams (edges that do
-    not have two triangles of one orientation, yet are no boundary) are LOCKED. Boundary nodes and fixed nodes are at REST.
+    not have two triangles of one orientation, yet are no boundary) are LOCKED. Boundary nodes, fixed nodes and those of lines are
+    at REST.
 
     Returns
     -------
@@ -46,12 +51,14 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     net = Net(
         nodes=np.zeros((capacity, 3)),
         ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
-        state=np.zeros((capacity, 5), np.int64),
+        state=np.zeros((capacity, kernels.COLUMNS), np.int64),
         arc=np.zeros(capacity),
         free=np.zeros(capacity + 2, np.int64),
         desired=np.ones(capacity),
     )
     net.curve[:] = -1
+    if len(grid.lines) and net.ring.shape[1] > MOST:
+        raise FrontError(f"a node came out with {valence} members; use another length", grid)
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
     used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.state, source, count)
@@ -64,6 +71,10 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     several = np.bincount(source[:used], minlength=count) > 1
     ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
     twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
+    for a, b in inner_lines(grid).tolist():
+        for v, u in ((a, b), (b, a)):
+            kernels.mark_line(net, v, u)
+            net.kind[v] = REST
     net.kind[:used][several[source[:used]] | twice] = LOCKED
     return net, source
 
@@ -89,9 +100,20 @@ def close_net(
         nodes=np.ascontiguousarray(net.nodes[kept]),
         triangles=inverse.reshape(-1, 3).astype(np.int64),
         fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
+        lines=_lines_of(net, merged, kept),
         deviation=None if deviation is None else deviation[kept],
         desired=None if desired is None else desired[kept],
     )
+
+
+def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Members of lines (K, 2) between the nodes kept, smaller first, sorted."""
+    pairs = set()
+    for v in np.flatnonzero((net.line[: net.used] != 0) & (net.degree[: net.used] > 0)).tolist():
+        for i, u in enumerate(net.ring[v, : net.degree[v]].tolist()):
+            if net.line[v] >> i & 1:
+                pairs.add(tuple(sorted(np.searchsorted(kept, merged[[v, u]]).tolist())))
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +128,16 @@ class Relief:
     rim: Rim
     length: float  #: desired member length, that of the length field's 1 [scan unit]
     landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
+    sharp: np.ndarray  #: (N,) bool for each curve of the rim, whether it is a ridge, which the local surface rounds off
 
     @classmethod
-    def from_grid(cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float) -> Relief:
-        """Take a grid apart; every node finds its place on the scan and on the boundary curves.
+    def from_grid(
+        cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float, lines: Lines = NO_LINES
+    ) -> Relief:
+        """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
 
-        Boundary nodes slide along the nearest curve; corners and nodes far from every curve stay at rest.
+        Boundary nodes and those of lines slide along the nearest curve; corners, ends and meetings of lines and nodes far from
+        every curve stay at rest.
 
         Parameters
         ----------
@@ -120,6 +146,7 @@ class Relief:
         rim : Rim
         corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
+        lines : the lines that the grid was made with
         """
         net, source = open_net(grid)
         rim = Rim(*(np.ascontiguousarray(array) for array in rim))
@@ -132,25 +159,30 @@ class Relief:
                 continue
             net.curve[v], net.arc[v] = curve, arc
             at_corner = len(corners) and np.min(((corners - net.nodes[v]) ** 2).sum(axis=1)) <= (1e-6 * length) ** 2
-            if not at_corner and not fixed[v]:
+            if not at_corner and not fixed[v] and net.line[v] == 0:
                 net.kind[v] = RIM
+        sharp = np.zeros(len(rim.total), np.bool_)
+        if len(lines.curves):
+            find_on_lines(net, lines, len(rim.total), fixed, length)
+            rim, sharp = joined(rim, lines.rim), np.concatenate([sharp, lines.sharp])
         patches = np.zeros((len(net.degree), PATCH))
         queue, seated = np.zeros((2, len(net.degree)), np.int64)
         seat.seat_nodes(net, surface, patches, length, queue, seated)
-        relief = cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan))
+        relief = cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan), sharp)
         relief.renew(0.0)
         return relief
 
     def land(self, fine: Surface, middle: Surface, broad: Surface) -> None:
-        """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes stay."""
+        """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes and those of ridges stay."""
         self.landed[:] = 0.0
+        stay = self.fixed | self._on_ridge()
 
         def land_part(part: int, begin: int, end: int) -> None:
             own = self._scratch(part)
             narrow, wider, widest = (
                 each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle, broad)
             )
-            land_nodes(self.net, narrow, wider, widest, self.patches, self.fixed, self.landed, begin, end)
+            land_nodes(self.net, narrow, wider, widest, self.patches, stay, self.landed, begin, end)
 
         in_parts(self.net.used, PART, land_part)
 
@@ -158,6 +190,16 @@ class Relief:
     def graded(self) -> bool:
         """Whether the desired length differs from node to node."""
         return is_graded(self.surface)
+
+    def _on_ridge(self) -> np.ndarray:
+        """Which nodes slide on a ridge or stand at an end of one, (C,) bool."""
+        net, stay = self.net, np.zeros(len(self.fixed), np.bool_)
+        if self.sharp.any():
+            sliding = (net.degree > 0) & (net.line != 0) & (net.kind == RIM)
+            stay[sliding] = self.sharp[net.curve[sliding]]
+            for v in np.flatnonzero(stay).tolist():
+                stay[[u for u in net.ring[v, : net.degree[v]].tolist() if kernels.is_line(net, v, u)]] = True
+        return stay
 
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""

@@ -45,9 +45,10 @@ TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # numbers of the 
 def case_of(front: Front, s: int, alpha: float, beta: float, limit: float) -> int:
     """Which of the six cases of Table 1 a segment is in; alpha, beta and their limit in radians."""
     before, after = front.previous[s], front.next[s]
-    if front.next[after] == before:
+    at_end = front.tail[before] == front.head[s] or front.head[after] == front.tail[s]  # of a line
+    if front.next[after] == before and not at_end:
         return TRIANGLE
-    if front.next[front.next[after]] == before:
+    if front.next[front.next[after]] == before and not at_end:
         return QUAD
     if alpha < limit and beta < limit:
         return BOTH

@@ -276,6 +276,8 @@ def left_angle(front: Front, s: int) -> float:
     """Angle alpha of Table 1: at the tail, from the segment to its previous neighbour across the unmeshed area."""
     a = row(front.nodes, front.tail[s])
     c = row(front.nodes, front.tail[front.previous[s]])
+    if front.tail[front.previous[s]] == front.head[s]:
+        return 2.0 * math.pi  # the end of a line
     return angle_from(subtract(row(front.nodes, front.head[s]), a), subtract(c, a), row(front.normals, front.tail[s]))
 
 
@@ -284,6 +286,8 @@ def right_angle(front: Front, s: int) -> float:
     """Angle beta of Table 1: at the head, between the segment and its next neighbour across the unmeshed area."""
     b = row(front.nodes, front.head[s])
     d = row(front.nodes, front.head[front.next[s]])
+    if front.head[front.next[s]] == front.tail[s]:
+        return 2.0 * math.pi
     return angle_from(subtract(d, b), subtract(row(front.nodes, front.tail[s]), b), row(front.normals, front.head[s]))
 
 

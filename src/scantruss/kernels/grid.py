@@ -2,6 +2,7 @@
 
 Each node has the ring of its neighbours, anticlockwise seen from outside. Triangle i of node v is (v, ring[v, i], ring[v, i + 1]);
 the ring of an interior node closes, that of a boundary node is open: first and last neighbour lie on the boundary with it.
+Members along lines (fixed lines, ridges) are marked at both ends: they are never flipped, and a line stays a chain of members.
 """
 
 from __future__ import annotations
@@ -13,12 +14,13 @@ import numpy as np
 from .compile import kernel
 
 INTERIOR = 0  # slides on the scanned surface
-RIM = 1  # slides on its boundary curve
+RIM = 1  # slides on its curve: of the boundary, or, for a node that is not open, of a line
 REST = 2  # corner or fixed node: never moved, never removed
 LOCKED = 3  # at a defect of the grid (pinch, seam): nothing near it changes
 
 
-DEGREE, OPEN, KIND, CURVE, IDEAL = 0, 1, 2, 3, 4  # columns of `Net.state`
+DEGREE, OPEN, KIND, CURVE, IDEAL, LINE = 0, 1, 2, 3, 4, 5  # columns of `Net.state`
+COLUMNS = 6
 
 
 class Net(NamedTuple):
@@ -29,7 +31,7 @@ class Net(NamedTuple):
 
     nodes: np.ndarray  #: (C, 3) positions
     ring: np.ndarray  #: (C, W) int64 neighbours, anticlockwise
-    state: np.ndarray  #: (C, 5) int64, see the properties
+    state: np.ndarray  #: (C, 6) int64, see the properties
     arc: np.ndarray  #: (C,) place of a boundary node on its curve, as arc length from the start
     free: np.ndarray  #: (C + 2,) int64 stack of free nodes; last but one their number, last the nodes in use
     desired: np.ndarray  #: (C,) desired member length at each node, in lengths: ones where there is one length
@@ -51,13 +53,18 @@ class Net(NamedTuple):
 
     @property
     def curve(self) -> np.ndarray:
-        """(C,) boundary curve of the node, -1 none."""
+        """(C,) curve of the boundary or of a line on which the node slides, -1 none."""
         return self.state[:, CURVE]
 
     @property
     def ideal(self) -> np.ndarray:
         """(C,) number of neighbours that suits the node: 6 inside, on the boundary by its angle."""
         return self.state[:, IDEAL]
+
+    @property
+    def line(self) -> np.ndarray:
+        """(C,) bit i is set where the member to neighbour i of the ring is part of a line."""
+        return self.state[:, LINE]
 
     @property
     def used(self) -> int:
@@ -160,8 +167,24 @@ def place_of(net: Net, v: int, u: int) -> int:
 
 
 @kernel
+def is_line(net: Net, v: int, u: int) -> bool:
+    """Whether the member between two neighbours is part of a line."""
+    return net.state[v, LINE] != 0 and (net.state[v, LINE] >> place_of(net, v, u)) & 1 == 1
+
+
+@kernel
+def mark_line(net: Net, v: int, u: int) -> None:
+    """Make the member between two neighbours part of a line, as seen from node v."""
+    net.state[v, LINE] |= 1 << place_of(net, v, u)
+
+
+@kernel
 def put_in(net: Net, v: int, i: int, u: int) -> None:
     """Insert node u into the ring of node v before position i."""
+    line = net.state[v, LINE]
+    if line != 0:
+        below = line & ((1 << i) - 1)
+        net.state[v, LINE] = below | ((line - below) << 1)
     for j in range(net.state[v, DEGREE], i, -1):
         net.ring[v, j] = net.ring[v, j - 1]
     net.ring[v, i] = u
@@ -172,6 +195,9 @@ def put_in(net: Net, v: int, i: int, u: int) -> None:
 def take_out(net: Net, v: int, u: int) -> None:
     """Remove node u from the ring of node v."""
     i = place_of(net, v, u)
+    line = net.state[v, LINE]
+    if line != 0:
+        net.state[v, LINE] = (line & ((1 << i) - 1)) | ((line >> (i + 1)) << i)
     net.state[v, DEGREE] -= 1
     for j in range(i, net.state[v, DEGREE]):
         net.ring[v, j] = net.ring[v, j + 1]
@@ -196,7 +222,7 @@ def lowest_degree(net: Net, v: int) -> int:
 def may_flip(net: Net, a: int, b: int) -> bool:
     """Whether the edge a-b can become the other diagonal of its quadrangle."""
     right, left = wings(net, a, b)
-    if right < 0 or left < 0 or right == left:
+    if right < 0 or left < 0 or right == left or is_line(net, a, b):
         return False
     most = net.ring.shape[1] - 1
     for v in (a, b, right, left):
@@ -227,6 +253,10 @@ def may_collapse(net: Net, a: int, b: int) -> bool:
     if net.state[b, KIND] >= REST or net.state[a, KIND] == LOCKED or net.state[b, KIND] > net.state[a, KIND]:
         return False
     right, left = wings(net, a, b)
+    if net.state[b, LINE] != 0 and not (
+        is_line(net, a, b) and not (right >= 0 and is_line(net, b, right)) and not (left >= 0 and is_line(net, b, left))
+    ):
+        return False  # a line stays a chain: its nodes go along it, and not where it turns back at once
     common = 0
     for i in range(net.state[b, DEGREE]):
         u = net.ring[b, i]
@@ -253,6 +283,7 @@ def collapse(net: Net, a: int, b: int) -> None:
     """Draw node b into node a; b becomes free."""
     right, left = wings(net, a, b)
     d = net.state[b, DEGREE]
+    line = net.state[b, LINE]
     if net.state[b, OPEN] == 1:  # along the rim: the ring of b without a stands in order
         begin = 1 if left < 0 else 0
         others = d - 1
@@ -268,10 +299,19 @@ def collapse(net: Net, a: int, b: int) -> None:
         else:
             net.ring[u, place_of(net, u, b)] = a
             put_in(net, a, i, u)
+            if (line >> ((begin + step) % d)) & 1 == 1:
+                net.state[a, LINE] |= 1 << i
             i += 1
     net.state[b, DEGREE] = 0
+    net.state[b, LINE] = 0
     net.free[net.free[-2]] = b
     net.free[-2] += 1
+
+
+@kernel
+def slides_on_line(net: Net, v: int) -> bool:
+    """Whether a node slides on the curve of a line."""
+    return net.state[v, KIND] == RIM and net.state[v, OPEN] == 0
 
 
 @kernel
@@ -284,6 +324,8 @@ def may_split(net: Net, a: int, b: int) -> bool:
             return False
     if (right >= 0 and net.state[right, DEGREE] >= most) or (left >= 0 and net.state[left, DEGREE] >= most):
         return False
+    if is_line(net, a, b):
+        return net.free[-2] > 0 and (slides_on_line(net, a) or slides_on_line(net, b))
     if (right < 0 or left < 0) and (net.state[a, CURVE] < 0 or net.state[a, CURVE] != net.state[b, CURVE]):
         return False
     return net.free[-2] > 0
@@ -293,12 +335,13 @@ def may_split(net: Net, a: int, b: int) -> bool:
 def split(net: Net, a: int, b: int) -> int:
     """Put a free node on the edge a-b; returns it. The caller gives it its place."""
     right, left = wings(net, a, b)
+    line = is_line(net, a, b)
     net.free[-2] -= 1
     m = net.free[net.free[-2]]
     net.free[-1] = max(net.free[-1], m + 1)
     net.ring[a, place_of(net, a, b)] = m
     net.ring[b, place_of(net, b, a)] = m
-    net.state[m, DEGREE] = 0
+    net.state[m, DEGREE] = net.state[m, LINE] = 0
     rim = right < 0 or left < 0
     net.state[m, OPEN], net.state[m, KIND] = (1, RIM) if rim else (0, INTERIOR)
     net.state[m, CURVE] = net.state[a, CURVE] if rim else -1
@@ -311,4 +354,9 @@ def split(net: Net, a: int, b: int) -> int:
     for u in around:
         if u >= 0:
             put_in(net, m, net.state[m, DEGREE], u)
+    if line:
+        net.state[m, KIND] = RIM
+        net.state[m, CURVE] = net.state[a, CURVE] if slides_on_line(net, a) else net.state[b, CURVE]
+        mark_line(net, m, a)
+        mark_line(net, m, b)
     return m

@@ -31,7 +31,7 @@ class Area(NamedTuple):
     around: np.ndarray  #: (A,) int64 the nodes
     nodes: np.ndarray  #: (A, 5) their places, arcs and desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
-    state: np.ndarray  #: (A, 5) int64 their states
+    state: np.ndarray  #: (A, 6) int64 their states
     free: np.ndarray  #: (KEPT + 2,) int64 the top of the stack of free nodes; their number, and how many are here
     counter: np.ndarray  #: (4,) int64 kicks; nodes of the area; chance; kicks that paid
 

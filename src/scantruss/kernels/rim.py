@@ -10,7 +10,10 @@ from .compile import kernel
 
 
 class Rim(NamedTuple):
-    """Closed polylines, one a boundary loop; the last point of each joins its first."""
+    """Polylines: closed ones, one a boundary loop, the last point of each joins its first; and those of lines, which may be open.
+
+    An open one is as long as the arc length of its last point.
+    """
 
     points: np.ndarray  #: (M, 3) points of all curves
     arc: np.ndarray  #: (M,) arc length of each point from the start of its curve
@@ -45,6 +48,12 @@ def foot_on_segment(
 
 
 @kernel
+def is_open(rim: Rim, curve: int) -> bool:
+    """Whether a curve ends at its last point."""
+    return rim.total[curve] <= rim.arc[rim.start[curve + 1] - 1]
+
+
+@kernel
 def segment_at(rim: Rim, curve: int, arc: float) -> int:
     """Segment of a curve in which an arc length (0 to total) lies, by halving."""
     low, high = rim.start[curve], rim.start[curve + 1]
@@ -64,7 +73,7 @@ def at_arc(rim: Rim, curve: int, arc: float) -> tuple[float, float, float, float
     if total <= 0.0:
         i = rim.start[curve]
         return 0.0, rim.points[i, 0], rim.points[i, 1], rim.points[i, 2]
-    arc = arc % total
+    arc = min(max(arc, 0.0), total) if is_open(rim, curve) else arc % total
     i = segment_at(rim, curve, arc)
     j = i + 1
     end = rim.arc[j] if j < rim.start[curve + 1] else total
@@ -86,7 +95,7 @@ def slide(
 ) -> tuple[float, float, float, float]:
     """Place on a curve nearest to a position, within `reach` of arc length to both sides: (arc, x, y, z)."""
     first, last = rim.start[curve], rim.start[curve + 1]
-    home = segment_at(rim, curve, arc)
+    home, ends = segment_at(rim, curve, arc), is_open(rim, curve)
     best, found = np.inf, arc
     for way in (1, -1):
         i, begin = home, rim.arc[home] - arc  # the segment and where it starts, seen from `arc`
@@ -99,10 +108,10 @@ def slide(
             if way == 1:
                 begin = end
                 i = i + 1 if i + 1 < last else first
-                if begin >= reach:
+                if begin >= reach or (ends and i == first):
                     break
             else:
-                if begin <= -reach:
+                if begin <= -reach or (ends and i == first):
                     break
                 i = i - 1 if i > first else last - 1
                 begin -= (rim.arc[i + 1] if i + 1 < last else rim.total[curve]) - rim.arc[i]

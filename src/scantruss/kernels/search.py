@@ -21,10 +21,12 @@ from .grid import (
     may_collapse,
     may_flip,
     may_split,
+    slides_on_line,
     split,
     target_length,
     wings,
 )
+from .lines import arc_on_line, halfway
 from .rim import Rim, at_arc
 from .trial import MARK, TRIED, Scratch, gather, local_energy, put_back
 from .vectors import cross, dot, norm, row, subtract
@@ -44,7 +46,11 @@ FLIPS = 4  # most of these flips
 @kernel
 def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
     """Put node v halfway between a and b: along their curve if it is on the rim."""
-    if net.state[v, KIND] == RIM:
+    if slides_on_line(net, v):
+        first = arc_on_line(net, rim, v, a, b)
+        middle = halfway(rim, net.state[v, CURVE], first, arc_on_line(net, rim, v, b, a))
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.state[v, CURVE], middle)
+    elif net.state[v, KIND] == RIM:
         total = rim.total[net.state[v, CURVE]]
         ahead = (net.arc[b] - net.arc[a]) % total if total > 0.0 else 0.0
         if ahead > 0.5 * total:

@@ -8,13 +8,13 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT
-from .grid import DEGREE, INTERIOR, KIND, OPEN, RIM, Net
+from .grid import DEGREE, INTERIOR, KIND, LINE, OPEN, RIM, Net, slides_on_line
 from .vectors import cross, dot, norm, row, subtract
 
 
 @kernel
 def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
-    """Move every free node by `factor` of the way to the middle of its neighbours; on the rim, of its two neighbours there.
+    """Move every free node by `factor` of the way to the middle of its neighbours; on the rim or a line, of its two neighbours there.
 
     Neighbours weigh as much as their members are long beside what is desired there, so that long members become shorter: with equal
     weights a grid keeps the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from
@@ -27,9 +27,12 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
         d = net.state[v, DEGREE]
         if d == 0 or net.state[v, KIND] > RIM:
             continue
-        step = 1 if net.state[v, KIND] == INTERIOR else d - 1
+        along_line = slides_on_line(net, v)
+        step = 1 if net.state[v, KIND] == INTERIOR or along_line else d - 1
         x = y = z = total = 0.0
         for i in range(0, d, step):
+            if along_line and (net.state[v, LINE] >> i) & 1 == 0:
+                continue
             arm = subtract(row(before, net.ring[v, i]), row(before, v))
             weight = norm(arm) / (net.desired[v] + net.desired[net.ring[v, i]])
             total += weight

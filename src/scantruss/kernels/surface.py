@@ -98,7 +98,7 @@ def _queued(surface: Surface, site: int, count: int) -> bool:
 
 
 @kernel
-def _solve(matrix: np.ndarray, size: int) -> bool:
+def solve(matrix: np.ndarray, size: int) -> bool:
     """Solve the symmetric system in matrix[:size, :size + 1] in place; the last column gets the solution."""
     for i in range(size):
         pivot = matrix[i, i]
@@ -225,7 +225,7 @@ def _heights(
             for c in range(r):
                 matrix[r, c] = matrix[c, r]
             matrix[r, r] += 1e-9 * matrix[0, 0]
-        solved = _solve(matrix, size)
+        solved = solve(matrix, size)
         if not solved:
             size = 3 if size == 6 else (1 if size == 3 else 0)
     for c in range(6):

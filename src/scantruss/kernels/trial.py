@@ -9,7 +9,7 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT
-from .grid import DEGREE, OPEN, Net, target_length, wings
+from .grid import DEGREE, LINE, OPEN, Net, target_length, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
 
 MARK, TRIED = 0, 1  # columns of `Scratch.note`
@@ -21,7 +21,7 @@ class Scratch(NamedTuple):
     note: np.ndarray  #: (C, 2) int64 trial that holds the node; 1 where nothing has changed since it was tried
     around: np.ndarray  #: (C,) int64 nodes that may move
     nodes: np.ndarray  #: (C, 4) their places and arcs before
-    ring: np.ndarray  #: (C, W + 1) int64 their rings before; last the number of neighbours
+    ring: np.ndarray  #: (C, W + 2) int64 their rings before; last but one the lines, last the number of neighbours
     counter: np.ndarray  #: (3,) int64 trials made; nodes around; trials that paid
 
 
@@ -53,7 +53,7 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
             net.nodes[v, 2],
         )
         scratch.nodes[i, 3] = net.arc[v]
-        scratch.ring[i, -1] = net.state[v, DEGREE]
+        scratch.ring[i, -1], scratch.ring[i, -2] = net.state[v, DEGREE], net.state[v, LINE]
         for j in range(net.state[v, DEGREE]):
             scratch.ring[i, j] = net.ring[v, j]
     scratch.counter[1] = count
@@ -67,7 +67,7 @@ def put_back(net: Net, scratch: Scratch) -> None:
         for c in range(3):
             net.nodes[v, c] = scratch.nodes[i, c]
         net.arc[v] = scratch.nodes[i, 3]
-        net.state[v, DEGREE] = scratch.ring[i, -1]
+        net.state[v, DEGREE], net.state[v, LINE] = scratch.ring[i, -1], scratch.ring[i, -2]
         for j in range(scratch.ring[i, -1]):
             net.ring[v, j] = scratch.ring[i, j]
 

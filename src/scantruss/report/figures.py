@@ -30,6 +30,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
         "nodes": len(grid.nodes),
         "members": len(grid.edges),
         "triangles": len(grid.triangles),
+        "line_members": len(grid.lines),
         "quality": grid.quality.to_dict(),
         "before": grid.before.to_dict() if grid.before is not None else None,
         "topology": grid.topology.to_dict(),
@@ -98,6 +99,8 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
             else "closed"
         ),
     ]
+    if len(grid.lines):
+        lines.append(f"{len(grid.lines)} members along lines and ridges")
     if quality.node_deviation_mean is not None and quality.node_deviation_max is not None:
         lines.append(
             f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the scan on average,"

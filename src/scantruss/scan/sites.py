@@ -91,6 +91,17 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     return surface._replace(scale=scale)
 
 
+def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
+    """Distance of a place from the nearest point of the scan."""
+    squares = ((surface.mean - place) ** 2).sum(axis=1)
+    reach = np.sqrt(squares.min()) + 2.0 * surface.scale[1]
+    best = np.inf
+    for site in np.flatnonzero(squares <= reach * reach):
+        points = surface.points[surface.start[site] : surface.start[site + 1]]
+        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
+    return float(np.sqrt(best))
+
+
 def with_own_scratch(surface: Surface) -> Surface:
     """Return the same surface with room of its own for look-ups, so that threads do not meet."""
     return surface._replace(
