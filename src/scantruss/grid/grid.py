@@ -23,7 +23,7 @@ class Grid:
     fixed: np.ndarray  #: (V,) bool, nodes at positions that the user appointed
     origin: np.ndarray  #: (3,) float64 [scan unit]
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
-    deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
+    deviation: np.ndarray | None = None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)
     certificate: Certificate | None = None  #: what was checked against the scan
@@ -42,6 +42,11 @@ class Grid:
         key = low * max(len(self.nodes), 1) + high
         _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
         return ends, np.stack([low[first], high[first]], axis=1), inverse.ravel()
+
+    @property
+    def measured_deviation(self) -> np.ndarray:
+        """(K,) distances from the scan of all nodes that are not over closed holes; none before they are measured."""
+        return np.zeros(0) if self.deviation is None else self.deviation[~np.isnan(self.deviation)]
 
     @property
     def half_edge_edges(self) -> np.ndarray:

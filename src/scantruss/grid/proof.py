@@ -35,7 +35,7 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     boundary : Boundary
         Boundary loops of the scan, and the sites they were found in.
     settings : Settings
-        `length` is the desired member length, `smallest_hole` tells which holes are closed, `fixed` where nodes must be.
+        `length` is the desired member length, `fill_holes` tells which holes are closed, `fixed` where nodes must be.
 
     Returns
     -------

@@ -95,7 +95,7 @@ class Relief:
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
     length: float  #: desired member length [scan unit]
-    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
+    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before and over closed holes [scan unit]
 
     @classmethod
     def from_grid(cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float) -> Relief:
@@ -144,6 +144,10 @@ class Relief:
 
         in_parts(self.net.used, PART, land_part)
 
+    def tell_apart(self, measured: int) -> None:
+        """Forget the distance from the scan of nodes over closed holes, whose site is none of the first `measured`."""
+        self.landed[self.patches[:, 15] >= measured] = np.nan
+
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
         return self.surface if part == 0 else with_own_scratch(self.surface)
@@ -163,7 +167,7 @@ class Relief:
 
     def deviation(self) -> np.ndarray:
         """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
-        if not np.isnan(self.landed).any():
+        if not np.isnan(self.landed).all():
             return self.landed
         values = np.zeros(len(self.net.degree))
         self.renew(0.05)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class Sites:
     area: float  #: rough area of the scanned surface [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
+    measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
 
 
 _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float], Sites]] = weakref.WeakKeyDictionary()
@@ -54,6 +55,14 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
         kept.clear()
         kept[key] = _prepare(cloud.points, cloud.spacing, *key)
     return kept[key]
+
+
+def sites_with(sites: Sites, added: np.ndarray, settings: Settings) -> Sites:
+    """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
+    points = sites.surface.points
+    both = np.concatenate([points, added])
+    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, len(points))
+    return replace(prepared, strays=sites.strays)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -91,7 +100,14 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float, stray_distance: float) -> Sites:
+def _prepare(
+    points: np.ndarray,
+    spacing: float,
+    length: float,
+    box_size: float,
+    stray_distance: float,
+    measured: int | None = None,
+) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
     strays = 0
     while True:
@@ -106,12 +122,14 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float,
         if not strays:
             break
         points = np.ascontiguousarray(points[~stray])
+    measured = len(chosen) if measured is None else int((chosen < measured).sum())
     rough = ROUGH * length
     if (thickness > rough).mean() > 0.002:
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
         joined, chosen, boxes = _thin(settled, radius)
         grouped, start, _ = _group(points, joined[owner], len(chosen))
+        measured = int((chosen < measured).sum())
         place = mean = settled[chosen]
         neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
     kernels.cut_steep_links(mean, normals, neighbors, 0.75)
@@ -128,9 +146,8 @@ def _prepare(points: np.ndarray, spacing: float, length: float, box_size: float,
     surface = Surface(grouped, start, mean, smoothed, neighbors, scale, scratch, scratch.copy(), np.zeros(1, np.int64))
     piece = _number(piece)
     area = _site_areas(surface)
-    return Sites(
-        surface, boxes, piece, thickness, spacing, float(area.sum()), _large_pieces(piece, area, length), strays
-    )
+    large = _large_pieces(piece, area, length)
+    return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), large, strays, measured)
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
