@@ -125,7 +125,7 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
             continue
         if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
             continue
-        curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
+        curve = cut_spikes(surface, resample(points, STEP * length), SPIKE * length, STEP * length)
         if len(curve) >= 8:
             found.append((curve, piece))
     return [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings)) is not None]
@@ -276,16 +276,17 @@ def resample(points: np.ndarray, step: float) -> np.ndarray:
     return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
 
 
-def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
+def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
     """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
 
     Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
     joined directly.
     """
     while True:
-        at, gap = kernels.widest_spike(
-            curve, width, int(2.5 * width / step), min(len(curve) // 2, int(30.0 * width / step))
-        )
+        normals = np.empty_like(curve)
+        kernels.normals_along(surface, curve, nearest_site(surface, *curve[0].tolist()), normals)
+        high = min(len(curve) // 2, int(30.0 * width / step))
+        at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
         if gap == 0:
             return curve
         curve = np.roll(curve, -at, axis=0)

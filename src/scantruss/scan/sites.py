@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,11 @@ from .strays import find_strays, has_strays
 NEIGHBORS = 12  # links of a site
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
+STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
+SOME_ROUGH = 0.002  # share of such sites from which on that is done
+FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
+FINEST = 2.0  # spacings between the finest sites
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,30 +114,32 @@ def _prepare(
     measured: int | None = None,
 ) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
+    found = _linked(points, radius, length, spacing)
     strays = 0
-    while True:
-        owner, chosen, boxes = _thin(points, radius)
-        grouped, start, mean = _group(points, owner, len(chosen))
-        place = points[chosen]
-        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
-        if strays or not stray_distance or not has_strays(neighbors):
-            break
+    if stray_distance and has_strays(found.neighbors):
         stray = find_strays(points, stray_distance)
         strays = int(stray.sum())
-        if not strays:
-            break
-        points = np.ascontiguousarray(points[~stray])
-    measured = len(chosen) if measured is None else int((chosen < measured).sum())
+        if strays:
+            points = np.ascontiguousarray(points[~stray])
+            found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
-    if (thickness > rough).mean() > 0.002:
+    if _is_rough(found, rough):
+        fine = _linked_finer(points, radius, length, spacing)
+        if fine is not None:
+            found, radius = fine
+    measured = len(found.chosen) if measured is None else int((found.chosen < measured).sum())
+    owner, _, boxes, mean, neighbors, normals, thickness = found
+    grouped, start, _ = _group(points, owner, len(mean))
+    if _is_rough(found, rough):
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
         joined, chosen, boxes = _thin(settled, radius)
         grouped, start, _ = _group(points, joined[owner], len(chosen))
         measured = int((chosen < measured).sum())
-        place = mean = settled[chosen]
-        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
-    kernels.cut_steep_links(mean, normals, neighbors, 0.75)
+        mean = settled[chosen]
+        neighbors, normals, thickness = _link(mean, mean, boxes, length, radius, spacing)
+    kernels.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
+    kernels.cut_steep_links(mean, normals, neighbors, STEEP)
     weights = np.empty(neighbors.shape)
     kernels.link_weights(mean, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
@@ -148,6 +155,45 @@ def _prepare(
     area = _site_areas(surface)
     large = _large_pieces(piece, area, length)
     return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), large, strays, measured)
+
+
+class _Linked(NamedTuple):
+    """Sites of one thinning radius, linked; their normals of either sign."""
+
+    owner: np.ndarray  #: (N,) int64 site of each point
+    chosen: np.ndarray  #: (S,) int64 point of each site
+    boxes: SearchBoxes
+    mean: np.ndarray  #: (S, 3)
+    neighbors: np.ndarray  #: (S, NEIGHBORS) int64
+    normals: np.ndarray  #: (S, 3)
+    thickness: np.ndarray  #: (S,)
+
+
+def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
+    """Return the sites of points for one thinning radius."""
+    owner, chosen, boxes = _thin(points, radius)
+    _, _, mean = _group(points, owner, len(chosen))
+    return _Linked(owner, chosen, boxes, mean, *_link(points[chosen], mean, boxes, length, radius, spacing))
+
+
+def _linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[_Linked, float] | None:
+    """Return finer sites, and their radius, where these form smooth sheets; None where they do not.
+
+    Sheets that lie side by side, a few sites apart, look like one rough layer. They come apart as soon as the sites are finer.
+    """
+    for _ in range(FINER):
+        radius *= 0.5
+        if radius < FINEST * spacing:
+            return None
+        found = _linked(points, radius, length, spacing)
+        if not _is_rough(found, ROUGH * length):
+            return found, radius
+    return None
+
+
+def _is_rough(found: _Linked, rough: float) -> bool:
+    """Whether the sites form a thick layer, no sheet."""
+    return bool((found.thickness > rough).mean() > SOME_ROUGH)
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
