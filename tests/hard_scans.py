@@ -225,3 +225,8 @@ HARD: dict[str, Callable[[int], Shape]] = {
         shadows, tiny, huge, thin_wall,
     )
 }  # fmt: skip
+
+
+def hard(name: str, seed: int = 0) -> Shape:
+    """One of these scans."""
+    return HARD[name](seed)

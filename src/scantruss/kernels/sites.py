@@ -169,7 +169,9 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
             xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
             yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
     v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-    square = v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+    square = (
+        v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+    )
     return v, math.sqrt(max(square, 0.0) / count)
 
 
@@ -179,6 +181,46 @@ def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, t
     for s in range(len(mean)):
         v, thickness[s] = _plane_at(mean, neighbors, s)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
+
+
+@kernel
+def distances_from_planes(points: np.ndarray, neighbors: np.ndarray, off: np.ndarray, thickness: np.ndarray) -> None:
+    """Distance (N,) of each point from the plane of its neighbours, and theirs (rms), a quarter of them, the farthest off, left out.
+
+    Both stay as they are where not all neighbours are there.
+    """
+    count = neighbors.shape[1]
+    keep = count - count // 4
+    aside = np.empty(count)
+    for p in range(len(points)):
+        if neighbors[p, count - 1] < 0:
+            continue
+        limit, cx, cy, cz, v, square = 1e300, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), 0.0
+        for turn in range(2):
+            taken, sx, sy, sz = 0, 0.0, 0.0, 0.0
+            xx = xy = xz = yy = yz = zz = 0.0
+            for k in range(count):
+                if turn == 0 or aside[k] <= limit:
+                    x, y, z = subtract(row(points, neighbors[p, k]), row(points, p))
+                    taken, sx, sy, sz = taken + 1, sx + x, sy + y, sz + z
+                    xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+                    yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+            cx, cy, cz = sx / taken, sy / taken, sz / taken
+            xx, xy, xz = xx - taken * cx * cx, xy - taken * cx * cy, xz - taken * cx * cz
+            yy, yz, zz = yy - taken * cy * cy, yz - taken * cy * cz, zz - taken * cz * cz
+            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+            square = 0.0
+            for k in range(count):
+                d = subtract(row(points, neighbors[p, k]), row(points, p))
+                rise = abs(dot(subtract(d, (cx, cy, cz)), v))
+                square += rise * rise if turn == 0 or aside[k] <= limit else 0.0
+                if turn == 0:
+                    aside[k] = rise
+            if turn == 0:
+                limit = np.sort(aside)[keep - 1]
+            else:
+                thickness[p] = math.sqrt(square / taken)
+        off[p] = abs(dot((cx, cy, cz), v))
 
 
 @kernel

@@ -117,7 +117,7 @@ def _prepare(
     found = _linked(points, radius, length, spacing)
     strays = 0
     if stray_distance and has_strays(found.neighbors):
-        stray = find_strays(points, stray_distance)
+        stray = find_strays(points, stray_distance, length)
         strays = int(stray.sum())
         if strays:
             points = np.ascontiguousarray(points[~stray])
