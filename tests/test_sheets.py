@@ -44,7 +44,7 @@ def test_a_roll_is_covered_by_one_grid(method, share):
 
 def test_a_grid_of_one_sheet_does_not_cover_the_next():
     """Two plates half a member apart; the nodes of the one are near the other, but not on it."""
-    plate = sheet(8, 8, 0.1, seed=1)
+    plate = sheet(8, 8, 0.1, seed=1, noise=0.01)
     cloud = st.PointCloud.from_array(np.concatenate([plate, plate + [0, 0, 0.5]]))
     settings = st.Settings(length=1.0, effort="quick")
     both = grid_from_cloud(cloud, settings)
@@ -87,3 +87,16 @@ def test_a_spike_of_a_rim_is_on_one_sheet(rise, normal, found):
     normals[len(x) :] *= normal
     _, gap = kernels.widest_spike(curve, normals, 0.6, 15, 60)
     assert (gap > 0) == found
+
+
+def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
+    """The members across a line are gone; nodes on both sides are near in space, far in the grid."""
+    settings = st.Settings(length=1.0, effort="quick")
+    cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
+    grid, sites = grid_from_cloud(cloud, settings), prepare_sites(cloud, settings)
+    check_cover(grid, sites, settings)
+    x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
+    slit = (abs(x) < 0.6) & (y < 1.5)
+    with pytest.raises(FrontError, match="is torn where the scan is whole") as caught:
+        check_cover(grid.replace(triangles=grid.triangles[~slit]), sites, settings)
+    assert abs(caught.value.where[0]) < 1.5 and caught.value.where[1] < 2.5

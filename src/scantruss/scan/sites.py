@@ -23,8 +23,9 @@ HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet he
 STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
 SOME_ROUGH = 0.002  # share of such sites from which on that is done
+SHEETS = 0.12  # sites thicker than this may be several sheets
 FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
-FINEST = 2.0  # spacings between the finest sites
+FINEST = 1.0  # spacings between the finest sites
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ def _prepare(
             points = np.ascontiguousarray(points[~stray])
             found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
-    if _is_rough(found, rough):
+    if _is_rough(found, SHEETS * length):
         fine = _linked_finer(points, radius, length, spacing)
         if fine is not None:
             found, radius = fine
