@@ -8,10 +8,10 @@ from small_clouds import sheet
 
 import scantruss as st
 from scantruss.boundary import find_boundary
-from scantruss.errors import FrontError
+from scantruss.grid.sheets import faults_on_sheets
 from scantruss.kernels import boundary as kernels
 from scantruss.kernels import sites as site_kernels
-from scantruss.pipeline import check_cover, grid_from_cloud
+from scantruss.pipeline import grid_from_cloud
 from scantruss.scan.sites import prepare_sites
 
 
@@ -50,13 +50,12 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next():
     both = grid_from_cloud(cloud, settings)
     assert both.topology.components == 2
     sites = prepare_sites(cloud, settings)
-    check_cover(both, sites, settings)
+    assert faults_on_sheets(both, sites, 1.0) == []
     lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
     used, numbered = np.unique(lower, return_inverse=True)
     half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
-    with pytest.raises(FrontError, match="leaves out 50% of the scan") as caught:
-        check_cover(half, sites, settings)
-    assert caught.value.where is not None
+    (fault,) = faults_on_sheets(half, sites, 1.0)
+    assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
 def test_thick_sites_give_up_thin_ones_that_stand_over_them():
@@ -94,9 +93,8 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
     grid, sites = grid_from_cloud(cloud, settings), prepare_sites(cloud, settings)
-    check_cover(grid, sites, settings)
+    assert faults_on_sheets(grid, sites, 1.0) == []
     x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
     slit = (abs(x) < 0.6) & (y < 1.5)
-    with pytest.raises(FrontError, match="is torn where the scan is whole") as caught:
-        check_cover(grid.replace(triangles=grid.triangles[~slit]), sites, settings)
-    assert abs(caught.value.where[0]) < 1.5 and caught.value.where[1] < 2.5
+    (fault,) = faults_on_sheets(grid.replace(triangles=grid.triangles[~slit]), sites, 1.0)
+    assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5

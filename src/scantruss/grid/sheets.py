@@ -49,12 +49,12 @@ def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | No
     """
     links = sites.surface.neighbors
     other = np.where(links >= 0, nearest[links], -1)
-    site, column = np.nonzero((other >= 0) & (nearest[:, None] >= 0) & (other != nearest[:, None]))
+    site, column = np.nonzero((other > nearest[:, None]) & (nearest[:, None] >= 0))
     a, b = nearest[site], other[site, column]
     count = len(grid.nodes)
-    keys, inverse = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)
+    keys, inverse = np.unique(a * count + b, return_inverse=True)
     apart = ~np.isin(keys, grid.edges[:, 0] * count + grid.edges[:, 1])
-    around = _neighbors(grid)
+    around = _neighbors(grid) if apart.any() else []
     for k in np.flatnonzero(apart).tolist():
         apart[k] = not _are_near(around, int(keys[k]) // count, int(keys[k]) % count)
     torn = np.flatnonzero(apart[inverse.ravel()])
