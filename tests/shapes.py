@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scans import SCANS
@@ -129,8 +130,15 @@ def _plants(truth: Truth, points: Floats, rng: np.random.Generator) -> Floats:
     return points
 
 
-def make(
+def make(name: str, count: int | None = None, **options: Any) -> Shape:
+    """Return a cloud of SHAPES[name] with its truth; options as of `sampled`."""
+    return sampled(name, *_truth(name), count, **options)
+
+
+def sampled(
     name: str,
+    truth: Truth,
+    surface: Surface,
     count: int | None = None,
     *,
     noise: float | None = None,
@@ -144,12 +152,14 @@ def make(
     duplicates: float = 0.0,
     scan_lines: float = 0.0,
 ) -> Shape:
-    """Return a cloud with its truth.
+    """Return a cloud of a shape with its truth.
 
     Parameters
     ----------
     name : str
-        A key of SHAPES.
+        Also a part of the seed.
+    truth, surface
+        The shape, and its true surface.
     count : int
         Number of points on the surface; none: as many as the twin of the shape has.
     noise : float
@@ -169,7 +179,6 @@ def make(
     scan_lines : float
         Distance of parallel lines along x to which points are pulled, 0 for none [unit of the shape].
     """
-    truth, surface = _truth(name)
     rng = np.random.default_rng([seed, *name.encode()])
     low, size = surface.nodes.min(axis=0), np.ptp(surface.nodes, axis=0)
     weight = truth.weight if density_ratio == 1 else lambda p: density_ratio ** ((p[:, 0] - low[0]) / size[0])

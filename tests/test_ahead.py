@@ -136,7 +136,7 @@ compile_optimization(Settings(length=1.0, method=sys.argv[1]))
 ahead = {name for name, kernel in kernels().items() if kernel.alone.signatures}
 points = np.load(sys.argv[2])
 st.grid_from_points(points, Settings(length=float(sys.argv[3]), method=sys.argv[1]))
-assert {"land_nodes", "fill_rings", "lower_distances", "doubtful_pairs"} < ahead
+assert {"land_nodes", "fill_rings", "lower_distances", "doubtful_pairs", "nearest_nodes"} < ahead
 for name, kernel in kernels().items():
     assert len(kernel.alone.signatures) <= 1, name  # neither compiled for other types by the example ...
     assert len(kernel.overloads) <= 1, name  # ... nor twice by kernels

@@ -142,12 +142,12 @@ def test_external_boundaries_run_anticlockwise_internal_ones_clockwise():
 
 @pytest.mark.parametrize("radius", [1.0, 1.5])
 def test_holes_shorter_than_the_smallest_are_closed_over(radius):
-    """A rim of 2 pi r counts from `smallest_hole` members on."""
+    """A rim of 2 pi r counts from `fill_holes` on."""
     around = 2 * np.pi * radius
     points = ring(radius, 6.0, 0.12)
-    assert len(found(points, smallest_hole=0.85 * around)[0].internal) == 1
-    assert len(found(points, smallest_hole=1.15 * around)[0].internal) == 0
-    assert len(found(points, smallest_hole=1.15 * around)[0].external) == 1
+    assert len(found(points, fill_holes=0.85 * around)[0].internal) == 1
+    assert len(found(points, fill_holes=1.15 * around)[0].internal) == 0
+    assert len(found(points, fill_holes=1.15 * around)[0].external) == 1
 
 
 def test_missing_points_here_and_there_make_no_hole():

@@ -11,7 +11,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("settings", "machine"),
     ("scan",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
-    ("corners", "lines"),
+    ("corners", "fill", "lines"),
     ("boundary",),
     ("rows", "slits"),
     ("front",),

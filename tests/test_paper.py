@@ -47,7 +47,7 @@ def test_equation_1_a_box_is_larger_than_the_spacing_and_smaller_than_the_smalle
     cloud = st.PointCloud.from_array(sheet(5, 4, 0.2))
     size = prepare_sites(cloud, settings).boxes.size
     assert cloud.spacing < size.max()
-    assert size.max() < settings.smallest_hole * settings.length / math.pi  # the diameter of a hole with that rim
+    assert size.max() < settings.closed_rim / math.pi  # the diameter of a hole with that rim
 
 
 @pytest.mark.kernels

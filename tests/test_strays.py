@@ -89,3 +89,37 @@ def test_parts_of_the_sites_find_the_same_neighbours():
     for begin, end in ((0, 7), (7, 300), (300, 500)):
         kernels.nearest_sites(points, boxes, 0.1, 0.5, parts, begin, end)
     assert np.array_equal(whole, parts)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_distances_from_planes_agree_with_those_of_numpy(seed):
+    """The plane of the nearest, fitted again without the quarter that lies farthest off it."""
+    rng = np.random.default_rng(seed)
+    points = np.column_stack([rng.uniform(0, 4, (60, 2)), 0.1 * rng.normal(size=60)])
+    points[:6, 2] += 1.5
+    near = cKDTree(points).query(points, k=17)[1][:, 1:]
+    near[-1, 5:] = -1
+    off, thickness = np.full((2, 60), 7.0)
+    kernels.distances_from_planes(points, near, off, thickness)
+    for p in range(59):
+        around = points[near[p]]
+        normal = np.linalg.svd(around - around.mean(axis=0))[2][2]
+        aside = np.abs((around - around.mean(axis=0)) @ normal)
+        around = around[aside <= np.sort(aside)[11]]
+        middle = around.mean(axis=0)
+        normal = np.linalg.svd(around - middle)[2][2]
+        assert off[p] == pytest.approx(abs((points[p] - middle) @ normal))
+        assert thickness[p] == pytest.approx(np.sqrt((((around - middle) @ normal) ** 2).mean()))
+    assert off[59] == thickness[59] == 7.0
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed):
+    """What stands off the ground by more than a gap is left out, or nearly all of it; the ground stays."""
+    shape = make("terrain", 20_000, outliers=0.1, seed=seed)
+    away = shape.distance(shape.points)
+    true, far = away < 0.5, away > 1.5 * measure_gap(shape.points)
+    stray = strays.find_strays(shape.points, 3.0, shape.length)
+    assert far.sum() > 800
+    assert stray[far].mean() > 0.97
+    assert stray[true].mean() < 0.002

@@ -109,6 +109,7 @@ def compile_optimization(settings: Settings) -> None:
     from .grid.proof import certify
     from .grid.relief import Relief
     from .kernels.boxes import new_boxes
+    from .kernels.sites import put_all
     from .kernels.surface import Surface
     from .scan.sites import Sites
 
@@ -134,7 +135,8 @@ def compile_optimization(settings: Settings) -> None:
         np.ones(count),
     )
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.4, count, count)
-    sites = Sites(surface, boxes, scratch.copy(), np.zeros(count), 0.2, 5.76, 5.76, (0,))
+    put_all(boxes, places, np.arange(count))
+    sites = Sites(surface, boxes, scratch.copy(), np.zeros(count), 0.2, 5.76, 5.76, (0,), measured=count)
     angle = np.arange(6) * np.pi / 3.0
     rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
     loop = Loop(rim, np.zeros(1, np.int64), True, 6.0, 0)

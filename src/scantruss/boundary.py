@@ -8,14 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .corners import STEP, find_corners
+from .fill import fill_holes
 from .kernels import boundary as kernels
 from .kernels.field import lengths_along
 from .kernels.rim import Rim
-from .kernels.surface import Surface
+from .kernels.seat import nearest_site
+from .kernels.surface import Surface, walk
 from .lines.find import find_lines
 from .lines.network import NO_LINES, Lines
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites
+from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites, sites_with
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -24,6 +26,7 @@ SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member length
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 TRIES = 20  # of rolling the disc from one place
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
+NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
@@ -103,7 +106,7 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     ----------
     cloud : PointCloud
     settings : Settings
-        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `smallest_hole`, `length`.
+        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`.
     progress : callable, optional
         Called with ("boundary", share); may raise to stop.
 
@@ -116,11 +119,26 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     check_two_sided(sites)
     if progress:
         progress("boundary", 0.4)
+    loops = _external_first(_find_loops(sites, settings))
+    holes = [loop for loop in loops if loop.length < settings.closed_rim and _is_hole(loop, sites)]
+    if holes:
+        made_up = fill_holes(sites, [loop.points for loop in holes])
+        sites = sites_with(sites, made_up, cloud, settings)
+        loops = _external_first([loop for loop in _find_loops(sites, settings) if not _over_filling(loop, sites)])
+    if progress:
+        progress("boundary", 1.0)
+    lines = find_lines(cloud, [(loop.points, loop.corner_at) for loop in loops], sites, settings)
+    with_stops = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(loops))
+    return Boundary(with_stops, sites, lines)
+
+
+def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
+    """All loops but those of small holes, none of them external yet."""
     length = settings.length
     radius = max(settings.boundary_radius * length, 1.3 * sites.surface.scale[1], 1.9 * sites.spacing)
     found: list[tuple[np.ndarray, int]] = []
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
-    for loop, piece in boundary_loops(surface, sites.piece, radius, 0.8 * settings.smallest_hole * length):
+    for loop, piece in boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim):
         if piece not in sites.pieces:
             continue
         points = boundary_points(surface, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
@@ -128,16 +146,26 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
             continue
         if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
             continue
-        curve = cut_spikes(resample(points, STEP * length), SPIKE * length, STEP * length)
+        curve = cut_spikes(surface, resample(points, STEP * length), SPIKE * length, STEP * length)
         if len(curve) >= 8:
             found.append((curve, piece))
-    loops = [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings, surface)) is not None]
-    if progress:
-        progress("boundary", 1.0)
-    ordered = _external_first(loops)
-    lines = find_lines(cloud, [(loop.points, loop.corner_at) for loop in ordered], sites, settings)
-    with_stops = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(ordered))
-    return Boundary(with_stops, sites, lines)
+    return [kept for curve, piece in found if (kept := smooth_loop(curve, piece, settings, surface)) is not None]
+
+
+def _is_hole(loop: Loop, sites: Sites) -> bool:
+    """Whether a loop bounds a hole: any but the outer rim of a piece, and that too where the piece is nearly closed."""
+    share = float((sites.piece == loop.piece).mean())
+    return not loop.external or share * sites.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
+
+
+def _over_filling(loop: Loop, sites: Sites) -> bool:
+    """Whether a loop runs over what has been made up."""
+    surface, over = sites.surface, 0
+    site = nearest_site(surface, *loop.points[0].tolist())
+    for place in loop.points:
+        site = walk(surface, site, tuple(place))
+        over += site >= sites.measured
+    return over > 0.5 * len(loop.points)
 
 
 def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
@@ -288,16 +316,17 @@ def resample(points: np.ndarray, step: float) -> np.ndarray:
     return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
 
 
-def cut_spikes(curve: np.ndarray, width: float, step: float) -> np.ndarray:
+def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
     """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
 
     Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
     joined directly.
     """
     while True:
-        at, gap = kernels.widest_spike(
-            curve, width, int(2.5 * width / step), min(len(curve) // 2, int(30.0 * width / step))
-        )
+        normals = np.empty_like(curve)
+        kernels.normals_along(surface, curve, nearest_site(surface, *curve[0].tolist()), normals)
+        high = min(len(curve) // 2, int(30.0 * width / step))
+        at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
         if gap == 0:
             return curve
         curve = np.roll(curve, -at, axis=0)
@@ -310,7 +339,7 @@ def smooth_loop(curve: np.ndarray, piece: int, settings: Settings, surface: Surf
     smoothed, corner_at = smooth_between(curve, at, places, int(round(WINDOW / STEP)))
     length, field = _around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
-    if in_lengths < settings.smallest_hole * settings.length:
+    if (in_lengths if settings.fill_holes is None else length) < settings.bridged_rim:
         return None
     return Loop(smoothed, corner_at, False, length, piece, field)
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from .errors import InputError
 
+HOLE = 4.0  # members around the smallest hole worth framing; the front runs over smaller ones
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
@@ -123,7 +124,12 @@ class Settings:
     boundary_radius: float = _setting(
         0.4, "radius of the disc rolled along the boundary, in lengths", source="Sec. 3.3"
     )
-    smallest_hole: float = _setting(4.0, "holes with a rim shorter than this are closed, in lengths", source="Sec. 3.6")
+    fill_holes: float | None = _setting(
+        None,
+        f"holes with a rim shorter than this are closed, 0 keeps all; none: {HOLE:g} lengths",
+        unit="scan unit",
+        source="Sec. 3.6",
+    )
     corner_angle: float = _setting(
         40.0, "a boundary that turns by more than this has a corner", unit="degree", source="Sec. 3.3"
     )
@@ -149,8 +155,7 @@ class Settings:
             ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
             ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
             ("stray_distance", 0, math.inf),
-            ("boundary_radius", 0.1, 1), ("smallest_hole", 0, math.inf),
-            ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
+            ("boundary_radius", 0.1, 1), ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
             ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
@@ -163,6 +168,8 @@ class Settings:
         ):
             raise InputError(f"max_deviation must be positive, got {self.max_deviation}")
         object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
+        if self.fill_holes is not None and not (isinstance(self.fill_holes, int | float) and self.fill_holes >= 0):
+            raise InputError(f"fill_holes must be a length of 0 or more, got {self.fill_holes}")
         try:
             fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)
         except (TypeError, ValueError):
@@ -171,6 +178,16 @@ class Settings:
             if len(position) != 3 or not all(map(math.isfinite, position)):
                 raise InputError(f"a fixed node needs three finite coordinates, got {position}")
         object.__setattr__(self, "fixed", fixed)
+
+    @property
+    def closed_rim(self) -> float:
+        """Holes with a rim shorter than this are closed [scan unit]."""
+        return HOLE * self.length if self.fill_holes is None else self.fill_holes
+
+    @property
+    def bridged_rim(self) -> float:
+        """Of these, the front just runs over those with a rim shorter than this; the others are filled [scan unit]."""
+        return min(HOLE * self.length, self.closed_rim)
 
     def replace(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""

@@ -27,8 +27,8 @@ def encode_csv(grid: Grid, path: Path) -> dict[Path, bytes]:
 
 
 def _table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> bytes:
-    """Return the text of a table; numbers with every digit of a float64."""
-    lines = [",".join(header), *(",".join(map(repr, row)) for row in rows)]
+    """Return the text of a table; numbers with every digit of a float64, nothing for None."""
+    lines = [",".join(header), *(",".join("" if value is None else repr(value) for value in row) for row in rows)]
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 
@@ -57,7 +57,7 @@ def _nodes(grid: Grid) -> bytes:
     columns = [*own_frame(grid).T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
     if grid.deviation is not None:
         header += _with_unit("deviation", grid.unit)
-        columns.append(np.asarray(grid.deviation, float).tolist())
+        columns.append([None if value != value else value for value in np.asarray(grid.deviation, float).tolist()])
     if grid.desired is not None:
         header += _with_unit("desired_length", grid.unit)
         columns.append(np.asarray(grid.desired, float).tolist())

@@ -20,7 +20,7 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    kind: str  #: empty manifold orientable pieces loops crossing folded uneven cover astray fixed
+    kind: str  #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit]
 

@@ -93,7 +93,7 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         faults.append(
             Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
         )
-    gone = ASTRAY + settings.smallest_hole / (2 * math.pi)
+    gone = ASTRAY + settings.bridged_rim / (2 * math.pi * settings.length)
     for worst in (found.farthest_triangle, found.node_deviation):
         if worst and worst.value > gone * _length_at(grid, worst.where, settings):
             faults.append(Fault("astray", "covers what the scan does not", worst.where))

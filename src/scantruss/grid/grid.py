@@ -26,7 +26,7 @@ class Grid:
     lines: np.ndarray = field(
         default_factory=lambda: np.zeros((0, 2), np.int64)
     )  #: (K, 2) members along fixed lines, ridges
-    deviation: np.ndarray | None = None  #: (V,) distance of each node from the scanned surface [scan unit]
+    deviation: np.ndarray | None = None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     desired: np.ndarray | None = (
         None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
     )
@@ -48,6 +48,11 @@ class Grid:
         key = low * max(len(self.nodes), 1) + high
         _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
         return ends, np.stack([low[first], high[first]], axis=1), inverse.ravel()
+
+    @property
+    def measured_deviation(self) -> np.ndarray:
+        """(K,) distances from the scan of all nodes that are not over closed holes; none before they are measured."""
+        return np.zeros(0) if self.deviation is None else self.deviation[~np.isnan(self.deviation)]
 
     @property
     def half_edge_edges(self) -> np.ndarray:

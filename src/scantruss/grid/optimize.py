@@ -62,15 +62,14 @@ def optimize_grid(
         A fixed position is farther than half a member from the scan or closer than that to another.
     """
     from ..boundary import find_boundary
-    from ..scan.sites import prepare_sites
 
-    sites = prepare_sites(cloud, settings) if boundary is None else boundary.sites
+    if boundary is None:
+        boundary = find_boundary(cloud, settings)
+    sites = boundary.sites
     surface = sites.surface
     positions = check_positions(settings.fixed if fixed is None else fixed, cloud, surface, settings.length)
     if len(grid.triangles) == 0:
         return grid.replace(settings=settings, before=grid.quality)
-    if boundary is None:
-        boundary = find_boundary(cloud, settings)
     relief = Relief.from_grid(grid, surface, boundary.rim, boundary.stops, settings.length, boundary.lines)
     before = relief.to_grid(grid).quality
     report = (lambda share: progress("optimize", share)) if progress else None
@@ -123,3 +122,4 @@ def land(relief: Relief, sites: Sites) -> None:
     from ..scan.sites import narrow_surface
 
     relief.land(*(narrow_surface(sites, points) for points in (40.0, 120.0, np.inf)))
+    relief.tell_apart(sites.measured)

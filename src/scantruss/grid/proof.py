@@ -16,6 +16,7 @@ from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
 from .quality import corner_angles
+from .sheets import faults_on_sheets
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
@@ -35,7 +36,7 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     boundary : Boundary
         Boundary loops of the scan, and the sites they were found in.
     settings : Settings
-        `length` is the desired member length, `smallest_hole` tells which holes are closed, `fixed` where nodes must be.
+        `length` is the desired member length, `fill_holes` tells which holes are closed, `fixed` where nodes must be.
 
     Returns
     -------
@@ -62,9 +63,8 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         return replace(told, faults=(Fault("empty", "has nodes that are nowhere"),))
     cuts = find_crossings(grid.nodes, grid.triangles)
     told = replace(told, crossings=len(cuts), **_cover(grid, boundary, settings.length), **_extremes(grid, settings))
-    return replace(
-        told, faults=(*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings))
-    )
+    faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
+    return replace(told, faults=(*faults, *faults_on_sheets(grid, boundary.sites, settings.length)))
 
 
 def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
     away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
     astray, off = away[: len(middles)], away[len(middles) :]
     if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
-        off = np.fmin(off, grid.deviation)
+        off = np.where(np.isnan(grid.deviation), np.nan, np.fmin(off, grid.deviation))  # not over closed holes
     return {
         "scan_within_reach": float((left <= REACH * local).mean()),
         "farthest_scan": _worst(left, places, grid, length / local),

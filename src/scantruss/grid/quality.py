@@ -108,9 +108,8 @@ def measure_quality(grid: Grid) -> GridQuality:
     interior = valence > 0
     interior[edges[grid.edge_uses != 2].ravel()] = False
     mean = float(lengths.mean())
-    deviation = grid.deviation
+    deviation = grid.measured_deviation
     stretches = grid.stretches(1.0) if grid.desired is not None and some else None
-    measured = deviation is not None and len(deviation) > 0
     return GridQuality(
         shape_mean=float(shape.mean()),
         shape_std=float(shape.std()),
@@ -121,8 +120,8 @@ def measure_quality(grid: Grid) -> GridQuality:
         angle_min=float(angles.min()),
         angle_max=float(angles.max()),
         valence6=_mean(valence[interior] == 6),
-        node_deviation_mean=float(np.mean(deviation)) if measured and deviation is not None else None,
-        node_deviation_max=float(np.max(deviation)) if measured and deviation is not None else None,
+        node_deviation_mean=float(deviation.mean()) if len(deviation) else None,
+        node_deviation_max=float(deviation.max()) if len(deviation) else None,
         unit=grid.unit,
         stretch_mean=None if stretches is None else float(stretches.mean()),
         stretch_cv=None if stretches is None else float(stretches.std() / stretches.mean()),

@@ -127,7 +127,7 @@ class Relief:
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
     rim: Rim
     length: float  #: desired member length, that of the length field's 1 [scan unit]
-    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before [scan unit]
+    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before and over closed holes [scan unit]
     sharp: np.ndarray  #: (N,) bool for each curve of the rim, whether it is a ridge, which the local surface rounds off
 
     @classmethod
@@ -201,6 +201,10 @@ class Relief:
                 stay[[u for u in net.ring[v, : net.degree[v]].tolist() if kernels.is_line(net, v, u)]] = True
         return stay
 
+    def tell_apart(self, measured: int) -> None:
+        """Forget the distance from the scan of nodes over closed holes, whose site is none of the first `measured`."""
+        self.landed[self.patches[:, 15] >= measured] = np.nan
+
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
         return self.surface if part == 0 else with_own_scratch(self.surface)
@@ -223,7 +227,7 @@ class Relief:
 
     def deviation(self) -> np.ndarray:
         """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
-        if not np.isnan(self.landed).any():
+        if not np.isnan(self.landed).all():
             return self.landed
         values = np.zeros(len(self.net.degree))
         self.renew(0.05)

@@ -18,6 +18,8 @@ from .vectors import Vector, across, along, cross, dot, row, subtract, unit
 
 DIRECTIONS = 64
 BINS = 240
+OVER = 0.4  # sine of the angle over the mean plane of two places from which on they lie on two sheets
+APART = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
 FACING = 0.2  # sites whose normals have a smaller cosine are another sheet, or a plant
 
 
@@ -232,8 +234,29 @@ def touch_points(
 
 
 @kernel
-def widest_spike(curve: np.ndarray, width: float, low: int, high: int) -> tuple[int, int]:
+def normals_along(surface: Surface, curve: np.ndarray, site: int, normals: np.ndarray) -> None:
+    """Normal of the scan at each place of a curve, from site to site on its sheet; `site` is near the first place."""
+    for m in range(len(curve)):
+        site = walk(surface, site, row(curve, m))
+        normals[m, 0], normals[m, 1], normals[m, 2] = row(surface.normals, site)
+
+
+@kernel
+def _beside(d: Vector, a: Vector, b: Vector) -> bool:
+    """Whether two places at a distance d with normals a and b may lie side by side on one sheet, not one over the other.
+
+    A bend lets the chord dip below the plane at one end and come up through that at the other: only their mean tells.
+    """
+    rise = dot(d, a) + dot(d, b)
+    facing = dot(a, b)
+    return facing > APART and rise * rise <= OVER * OVER * dot(d, d) * 2.0 * (1.0 + facing)
+
+
+@kernel
+def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int, high: int) -> tuple[int, int]:
     """Two places of a closed curve nearer than `width` with the most steps between them, more than `low`, at most `high`.
+
+    Places one over the other, by the normals (M, 3) of the scan there, are on different sheets and do not count.
 
     Returns
     -------
@@ -243,10 +266,13 @@ def widest_spike(curve: np.ndarray, width: float, low: int, high: int) -> tuple[
     at, gap = 0, 0
     for i in range(count):
         for k in range(high, max(low, gap), -1):
-            d = subtract(row(curve, (i + k) % count), row(curve, i))
-            if dot(d, d) < width * width:
-                at, gap = i, k
-                break
+            j = (i + k) % count
+            d = subtract(row(curve, j), row(curve, i))
+            dd = dot(d, d)
+            if dd < width * width:
+                if _beside(d, row(normals, i), row(normals, j)):
+                    at, gap = i, k
+                    break
     return at, gap
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .boxes import SearchBoxes, box_index, put, search, slot_of
 from .compile import kernel
-from .vectors import dot, row, smallest_eigenvector, subtract, unit
+from .vectors import Vector, dot, row, smallest_eigenvector, subtract, unit
 
 
 @kernel
@@ -148,33 +148,106 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 
 
 @kernel
+def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, float]:
+    """Unit normal of the least-squares plane of a site and its neighbours, and their rms distance from it."""
+    cx = cy = cz = 0.0
+    count = 1
+    o = row(mean, s)
+    for k in range(neighbors.shape[1]):
+        n = neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(mean, n), o)
+            cx, cy, cz = cx + d[0], cy + d[1], cz + d[2]
+            count += 1
+    cx, cy, cz = cx / count, cy / count, cz / count
+    xx, xy, xz, yy, yz, zz = cx * cx, cx * cy, cx * cz, cy * cy, cy * cz, cz * cz
+    for k in range(neighbors.shape[1]):
+        n = neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(mean, n), o)
+            dx, dy, dz = d[0] - cx, d[1] - cy, d[2] - cz
+            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
+            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
+    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+    square = (
+        v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+    )
+    return v, math.sqrt(max(square, 0.0) / count)
+
+
+@kernel
 def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray) -> None:
     """Normal of the least-squares plane of each site and its neighbours, and their rms distance from it; sign not settled yet."""
     for s in range(len(mean)):
-        cx = cy = cz = 0.0
-        count = 1
-        o = row(mean, s)
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n >= 0:
-                d = subtract(row(mean, n), o)
-                cx, cy, cz = cx + d[0], cy + d[1], cz + d[2]
-                count += 1
-        cx, cy, cz = cx / count, cy / count, cz / count
-        xx, xy, xz, yy, yz, zz = cx * cx, cx * cy, cx * cz, cy * cy, cy * cz, cz * cz
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n >= 0:
-                d = subtract(row(mean, n), o)
-                dx, dy, dz = d[0] - cx, d[1] - cy, d[2] - cz
-                xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-                yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-        v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+        v, thickness[s] = _plane_at(mean, neighbors, s)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
-        square = (
-            v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
-        )
-        thickness[s] = math.sqrt(max(square, 0.0) / count)
+
+
+@kernel
+def distances_from_planes(points: np.ndarray, neighbors: np.ndarray, off: np.ndarray, thickness: np.ndarray) -> None:
+    """Distance (N,) of each point from the plane of its neighbours, and theirs (rms), a quarter of them, the farthest off, left out.
+
+    Both stay as they are where not all neighbours are there.
+    """
+    count = neighbors.shape[1]
+    keep = count - count // 4
+    aside = np.empty(count)
+    for p in range(len(points)):
+        if neighbors[p, count - 1] < 0:
+            continue
+        limit, cx, cy, cz, v, square = 1e300, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), 0.0
+        for turn in range(2):
+            taken, sx, sy, sz = 0, 0.0, 0.0, 0.0
+            xx = xy = xz = yy = yz = zz = 0.0
+            for k in range(count):
+                if turn == 0 or aside[k] <= limit:
+                    x, y, z = subtract(row(points, neighbors[p, k]), row(points, p))
+                    taken, sx, sy, sz = taken + 1, sx + x, sy + y, sz + z
+                    xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+                    yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+            cx, cy, cz = sx / taken, sy / taken, sz / taken
+            xx, xy, xz = xx - taken * cx * cx, xy - taken * cx * cy, xz - taken * cx * cz
+            yy, yz, zz = yy - taken * cy * cy, yz - taken * cy * cz, zz - taken * cz * cz
+            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+            square = 0.0
+            for k in range(count):
+                d = subtract(row(points, neighbors[p, k]), row(points, p))
+                rise = abs(dot(subtract(d, (cx, cy, cz)), v))
+                square += rise * rise if turn == 0 or aside[k] <= limit else 0.0
+                if turn == 0:
+                    aside[k] = rise
+            if turn == 0:
+                limit = np.sort(aside)[keep - 1]
+            else:
+                thickness[p] = math.sqrt(square / taken)
+        off[p] = abs(dot((cx, cy, cz), v))
+
+
+@kernel
+def trust_thin_sites(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
+) -> None:
+    """Drop the links of a thick site to thin ones over whose plane it stands, and fit its normal anew.
+
+    At the rim of a sheet the nearest sites may be those of the next sheet; they tilt the plane of the one, not of the other.
+    """
+    for s in range(len(mean)):
+        if thickness[s] <= rough:
+            continue
+        held, count = 0, 0
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            count += 1
+            if thickness[n] > rough or abs(dot(unit(subtract(row(mean, n), row(mean, s))), row(normals, n))) <= steep:
+                neighbors[s, held] = n
+                held += 1
+        for k in range(held, count):
+            neighbors[s, k] = -1
+        if held < count:
+            v, thickness[s] = _plane_at(mean, neighbors, s)
+            normals[s, 0], normals[s, 1], normals[s, 2] = v
 
 
 @kernel

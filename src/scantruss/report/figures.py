@@ -106,6 +106,9 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
             f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the scan on average,"
             f" {quality.node_deviation_max:.3g}{unit} at most"
         )
+    bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
+    if bridging:
+        lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
     if grid.certificate is not None:
         lines.append(f"certificate: {grid.certificate}")
     if grid.seconds:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,12 @@ from .strays import find_strays, has_strays
 NEIGHBORS = 12  # links of a site
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
+STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
+SOME_ROUGH = 0.002  # share of such sites from which on that is done
+SHEETS = 0.12  # sites thicker than this may be several sheets
+FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
+FINEST = 1.0  # spacings between the finest sites
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +42,7 @@ class Sites:
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
+    measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
 
     @property
     def graded(self) -> bool:
@@ -74,6 +81,15 @@ def is_graded(surface: Surface) -> bool:
 def local_field(surface: Surface, place: np.ndarray) -> float:
     """Desired length at a place, in lengths: that of the nearest site."""
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
+
+
+def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Settings) -> Sites:
+    """Return the sites of the same points of a cloud and of made-up ones (F, 3) [scan unit]."""
+    points = sites.surface.points
+    both = np.concatenate([points, added])
+    wish = wish_of(settings, cloud.origin)
+    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, wish, len(points))
+    return replace(prepared, strays=sites.strays)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -125,31 +141,41 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
 
 
 def _prepare(
-    points: np.ndarray, spacing: float, length: float, box_size: float, stray_distance: float, wish: Wish | None
+    points: np.ndarray,
+    spacing: float,
+    length: float,
+    box_size: float,
+    stray_distance: float,
+    wish: Wish | None,
+    measured: int | None = None,
 ) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
+    found = _linked(points, radius, length, spacing)
     strays = 0
-    while True:
-        owner, chosen, boxes = _thin(points, radius)
-        grouped, start, mean = _group(points, owner, len(chosen))
-        place = points[chosen]
-        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
-        if strays or not stray_distance or not has_strays(neighbors):
-            break
-        stray = find_strays(points, stray_distance)
+    if stray_distance and has_strays(found.neighbors):
+        stray = find_strays(points, stray_distance, length)
         strays = int(stray.sum())
-        if not strays:
-            break
-        points = np.ascontiguousarray(points[~stray])
+        if strays:
+            points = np.ascontiguousarray(points[~stray])
+            found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
-    if (thickness > rough).mean() > 0.002:
+    if _is_rough(found, SHEETS * length):
+        fine = _linked_finer(points, radius, length, spacing)
+        if fine is not None:
+            found, radius = fine
+    measured = len(found.chosen) if measured is None else int((found.chosen < measured).sum())
+    owner, _, boxes, mean, neighbors, normals, thickness = found
+    grouped, start, _ = _group(points, owner, len(mean))
+    if _is_rough(found, rough):
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
         joined, chosen, boxes = _thin(settled, radius)
         grouped, start, _ = _group(points, joined[owner], len(chosen))
-        place = mean = settled[chosen]
-        neighbors, normals, thickness = _link(place, mean, boxes, length, radius, spacing)
-    kernels.cut_steep_links(mean, normals, neighbors, 0.75)
+        measured = int((chosen < measured).sum())
+        mean = settled[chosen]
+        neighbors, normals, thickness = _link(mean, mean, boxes, length, radius, spacing)
+    kernels.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
+    kernels.cut_steep_links(mean, normals, neighbors, STEEP)
     weights = np.empty(neighbors.shape)
     kernels.link_weights(mean, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
@@ -176,8 +202,48 @@ def _prepare(
     piece = _number(piece)
     area = _site_areas(surface)
     graded = area / surface.field**2
-    pieces = _large_pieces(piece, area, graded, length)
-    return Sites(surface, boxes, piece, thickness, spacing, float(area.sum()), float(graded.sum()), pieces, strays)
+    large = _large_pieces(piece, area, graded, length)
+    total, scaled = float(area.sum()), float(graded.sum())
+    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured)
+
+
+class _Linked(NamedTuple):
+    """Sites of one thinning radius, linked; their normals of either sign."""
+
+    owner: np.ndarray  #: (N,) int64 site of each point
+    chosen: np.ndarray  #: (S,) int64 point of each site
+    boxes: SearchBoxes
+    mean: np.ndarray  #: (S, 3)
+    neighbors: np.ndarray  #: (S, NEIGHBORS) int64
+    normals: np.ndarray  #: (S, 3)
+    thickness: np.ndarray  #: (S,)
+
+
+def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
+    """Return the sites of points for one thinning radius."""
+    owner, chosen, boxes = _thin(points, radius)
+    _, _, mean = _group(points, owner, len(chosen))
+    return _Linked(owner, chosen, boxes, mean, *_link(points[chosen], mean, boxes, length, radius, spacing))
+
+
+def _linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[_Linked, float] | None:
+    """Return finer sites, and their radius, where these form smooth sheets; None where they do not.
+
+    Sheets that lie side by side, a few sites apart, look like one rough layer. They come apart as soon as the sites are finer.
+    """
+    for _ in range(FINER):
+        radius *= 0.5
+        if radius < FINEST * spacing:
+            return None
+        found = _linked(points, radius, length, spacing)
+        if not _is_rough(found, ROUGH * length):
+            return found, radius
+    return None
+
+
+def _is_rough(found: _Linked, rough: float) -> bool:
+    """Whether the sites form a thick layer, no sheet."""
+    return bool((found.thickness > rough).mean() > SOME_ROUGH)
 
 
 def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,80 @@
+"""Whether a grid hangs together as its scan does: a handle that was cut off or a sheet that was joined to another shows here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.parts import nearest_nodes
+from .certificate import Fault, place_of
+from .faults import LEFT_OUT
+
+if TYPE_CHECKING:
+    from ..scan.sites import Sites
+    from .grid import Grid
+
+COVER = 1.2  #: members from the nearest node on its sheet at which a part of the scan counts as left out
+TORN = 4  #: members from node to node at which their parts of the scan, side by side, count as torn apart
+LINKS = 3  #: so many links between such parts are no chance
+
+
+def faults_on_sheets(grid: Grid, sites: Sites, length: float) -> list[Fault]:
+    """Return what is wrong with how a grid covers each sheet of the scan, desired member length given [scan unit]."""
+    surface, nearest = sites.surface, np.empty(len(sites.piece), np.int64)
+    nearest_nodes(surface, sites.boxes, grid.nodes, COVER * length, nearest)
+    left = np.flatnonzero((nearest < 0) & np.isin(sites.piece, sites.pieces))
+    share = len(left) / max(int(np.isin(sites.piece, sites.pieces).sum()), 1)
+    faults = []
+    if share > LEFT_OUT:
+        where = place_of(surface.mean[left[0]] + grid.origin)
+        faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
+    torn = torn_place(grid, sites, nearest)
+    if torn is not None:
+        words = "is torn where the scan is whole, as at a handle thinner than its members"
+        faults.append(Fault("torn", words, place_of(torn + grid.origin)))
+    return faults
+
+
+def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | None:
+    """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
+
+    Each node has a part of the scan, the sites nearest to it. Where two parts meet, their nodes must be near each other in the grid:
+    joined by fewer than `TORN` members one after the other.
+
+    Parameters
+    ----------
+    nearest : (S,) int64
+        Node of each site, -1 for none, as `kernels.parts.nearest_nodes`.
+    """
+    links = sites.surface.neighbors
+    other = np.where(links >= 0, nearest[links], -1)
+    site, column = np.nonzero((other > nearest[:, None]) & (nearest[:, None] >= 0))
+    a, b = nearest[site], other[site, column]
+    count = len(grid.nodes)
+    keys, inverse = np.unique(a * count + b, return_inverse=True)
+    apart = ~np.isin(keys, grid.edges[:, 0] * count + grid.edges[:, 1])
+    around = _neighbors(grid) if apart.any() else []
+    for k in np.flatnonzero(apart).tolist():
+        apart[k] = not _are_near(around, int(keys[k]) // count, int(keys[k]) % count)
+    torn = np.flatnonzero(apart[inverse.ravel()])
+    return sites.surface.mean[site[torn[0]]] if len(torn) >= LINKS else None
+
+
+def _neighbors(grid: Grid) -> list[list[int]]:
+    """The nodes at the other end of each node's members."""
+    around: list[list[int]] = [[] for _ in range(len(grid.nodes))]
+    for a, b in grid.edges.tolist():
+        around[a].append(b)
+        around[b].append(a)
+    return around
+
+
+def _are_near(around: list[list[int]], a: int, b: int) -> bool:
+    """Whether fewer than `TORN` members one after the other lead from node a to node b."""
+    reached = {a}
+    for _ in range(TORN - 1):
+        reached |= {n for r in reached for n in around[r]}
+        if b in reached:
+            return True
+    return False

@@ -1,0 +1,24 @@
+"""Scans with the faults of real ones, at default settings: the right topology, on the true surface."""
+
+import numpy as np
+import pytest
+from hard_scans import HARD, hard
+from rough import compiled_only
+
+import scantruss as st
+
+
+@compiled_only
+@pytest.mark.parametrize("name", HARD)
+def test_topology_and_distance(name):
+    """Nodes off the rim lie within half the noise of the true surface on average (.003 members where there is hardly any)."""
+    shape = hard(name, 0)
+    settings = st.Settings(length=shape.length, effort="quick", method="paper" if len(name) % 2 else "default")
+    grid = st.grid_from_points(shape.points, settings)
+    assert grid.topology.manifold and grid.topology.orientable
+    assert (grid.topology.boundary_loops, grid.topology.euler) == (len(shape.loops), shape.euler)
+    assert grid.topology.components == shape.components
+    inner = np.ones(len(grid.nodes), bool)
+    inner[grid.edges[grid.edge_uses == 1].ravel()] = False
+    off = shape.distance(grid.nodes[inner][::3] + grid.origin).mean()
+    assert off <= max(0.5 * shape.noise, 0.003 * shape.length)

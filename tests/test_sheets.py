@@ -1,0 +1,100 @@
+"""Sheets side by side, a fraction of a member apart, are told apart by links, rims and cover."""
+
+import numpy as np
+import pytest
+from hard_scans import hard
+from rough import compiled_only
+from small_clouds import sheet
+
+import scantruss as st
+from scantruss.boundary import find_boundary
+from scantruss.grid.sheets import faults_on_sheets
+from scantruss.kernels import boundary as kernels
+from scantruss.kernels import sites as site_kernels
+from scantruss.pipeline import grid_from_cloud
+from scantruss.scan.sites import prepare_sites
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed):
+    """Turns .5 to .9 members apart."""
+    shape = hard("rolled", seed)
+    cloud = st.PointCloud.from_array(shape.points)
+    boundary = find_boundary(cloud, st.Settings(length=shape.length))
+    surface = boundary.sites.surface
+    site, place = np.nonzero(surface.neighbors >= 0)
+    middle = 0.5 * (surface.mean[site] + surface.mean[surface.neighbors[site, place]]) + cloud.origin
+    assert shape.distance(middle[::7]).max() < 0.1 * shape.length
+    (loop,), (true,) = boundary.loops, shape.loops
+    assert len(loop.corners) == 4
+    around = np.linalg.norm(np.roll(true, -1, axis=0) - true, axis=1).sum()
+    assert loop.length == pytest.approx(around, rel=0.01)
+
+
+@compiled_only
+@pytest.mark.parametrize(("method", "share"), [("default", 1.0), ("paper", 1.0), ("default", 1.6)])
+def test_a_roll_is_covered_by_one_grid(method, share):
+    shape = hard("rolled", 1)
+    grid = st.grid_from_points(shape.points, st.Settings(length=share * shape.length, method=method, effort="quick"))
+    assert (grid.topology.boundary_loops, grid.topology.euler) == (1, 1)
+    corners = grid.nodes[grid.triangles]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    assert area == pytest.approx(shape.area, rel=0.04)
+
+
+def test_a_grid_of_one_sheet_does_not_cover_the_next():
+    """Two plates half a member apart; the nodes of the one are near the other, but not on it."""
+    plate = sheet(8, 8, 0.1, seed=1, noise=0.01)
+    cloud = st.PointCloud.from_array(np.concatenate([plate, plate + [0, 0, 0.5]]))
+    settings = st.Settings(length=1.0, effort="quick")
+    both = grid_from_cloud(cloud, settings)
+    assert both.topology.components == 2
+    sites = prepare_sites(cloud, settings)
+    assert faults_on_sheets(both, sites, 1.0) == []
+    lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
+    used, numbered = np.unique(lower, return_inverse=True)
+    half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
+    (fault,) = faults_on_sheets(half, sites, 1.0)
+    assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
+
+
+def test_thick_sites_give_up_thin_ones_that_stand_over_them():
+    """Site 0 is linked to its own plate and to one site of a plate above: that link goes, and its normal is upright again."""
+    flat = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
+    low, high = np.column_stack([flat, np.zeros(16)]), np.column_stack([flat, np.full(16, 1.2)])
+    mean = np.concatenate([low, high])
+    neighbors = np.full((32, 4), -1)
+    neighbors[0] = (1, 4, 5, 16)
+    normals, thickness = np.tile([0.0, 0.0, 1.0], (32, 1)), np.zeros(32)
+    normals[0], thickness[0] = (0.6, 0.0, 0.8), 0.5
+    site_kernels.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    assert neighbors[0].tolist() == [1, 4, 5, -1]
+    assert abs(normals[0]) == pytest.approx([0, 0, 1]) and thickness[0] == pytest.approx(0)
+    thickness[:] = 0.5  # none of them is thin
+    neighbors[0] = (1, 4, 5, 16)
+    site_kernels.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    assert neighbors[0].tolist() == [1, 4, 5, 16]
+
+
+@pytest.mark.parametrize(("rise", "normal", "found"), [(0.0, 1.0, True), (0.5, 1.0, False), (0.0, -1.0, False)])
+def test_a_spike_of_a_rim_is_on_one_sheet(rise, normal, found):
+    """A long tongue .4 wide is a spike; where its sides lie one over the other, or face opposite sides, it is two sheets."""
+    x = np.arange(0, 6, 0.1)
+    out, back = np.column_stack([x, 0 * x, 0 * x]), np.column_stack([x, 0 * x + 0.4 * (rise == 0), 0 * x + rise])[::-1]
+    curve = np.concatenate([out, back])
+    normals = np.tile([0.0, 0.0, 1.0], (len(curve), 1))
+    normals[len(x) :] *= normal
+    _, gap = kernels.widest_spike(curve, normals, 0.6, 15, 60)
+    assert (gap > 0) == found
+
+
+def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
+    """The members across a line are gone; nodes on both sides are near in space, far in the grid."""
+    settings = st.Settings(length=1.0, effort="quick")
+    cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
+    grid, sites = grid_from_cloud(cloud, settings), prepare_sites(cloud, settings)
+    assert faults_on_sheets(grid, sites, 1.0) == []
+    x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
+    slit = (abs(x) < 0.6) & (y < 1.5)
+    (fault,) = faults_on_sheets(grid.replace(triangles=grid.triangles[~slit]), sites, 1.0)
+    assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5
