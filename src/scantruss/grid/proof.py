@@ -64,7 +64,9 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     cuts = find_crossings(grid.nodes, grid.triangles)
     told = replace(told, crossings=len(cuts), **_cover(grid, boundary, settings.length), **_extremes(grid, settings))
     faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
-    return replace(told, faults=(*faults, *faults_on_sheets(grid, boundary.sites, settings.length)))
+    known = {fault.kind for fault in faults}
+    faults += [f for f in faults_on_sheets(grid, boundary.sites, settings.length) if f.kind not in known]
+    return replace(told, faults=tuple(faults))
 
 
 def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
