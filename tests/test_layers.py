@@ -11,7 +11,8 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("settings", "machine"),
     ("scan",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
-    ("corners", "fill", "lines"),
+    ("curves",),
+    ("rolls", "corners", "fill", "lines"),
     ("boundary",),
     ("rows", "slits"),
     ("front",),

@@ -10,7 +10,7 @@ import scantruss as st
 from scantruss.boundary import find_boundary
 from scantruss.grid.sheets import faults_on_sheets
 from scantruss.kernels import boundary as kernels
-from scantruss.kernels import sites as site_kernels
+from scantruss.kernels import normals as facing
 from scantruss.pipeline import grid_from_cloud
 from scantruss.scan.sites import prepare_sites
 
@@ -67,12 +67,12 @@ def test_thick_sites_give_up_thin_ones_that_stand_over_them():
     neighbors[0] = (1, 4, 5, 16)
     normals, thickness = np.tile([0.0, 0.0, 1.0], (32, 1)), np.zeros(32)
     normals[0], thickness[0] = (0.6, 0.0, 0.8), 0.5
-    site_kernels.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    facing.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
     assert neighbors[0].tolist() == [1, 4, 5, -1]
     assert abs(normals[0]) == pytest.approx([0, 0, 1]) and thickness[0] == pytest.approx(0)
     thickness[:] = 0.5  # none of them is thin
     neighbors[0] = (1, 4, 5, 16)
-    site_kernels.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    facing.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
     assert neighbors[0].tolist() == [1, 4, 5, 16]
 
 

@@ -12,17 +12,8 @@ from small_clouds import ball, cap, sheet, sites_of, tire, turn_of
 
 from scantruss import InputError, PointCloud, Settings, find_boundary
 from scantruss.kernels.boxes import new_boxes
-from scantruss.kernels.sites import (
-    cut_steep_links,
-    group_points,
-    link_weights,
-    nearest_sites,
-    orient_normals,
-    put_all,
-    site_normals,
-    smooth_normals,
-    thin_points,
-)
+from scantruss.kernels.normals import cut_steep_links, link_weights, orient_normals, site_normals, smooth_normals
+from scantruss.kernels.sites import group_points, nearest_sites, put_all, thin_points
 from scantruss.scan.sites import prepare_sites
 
 

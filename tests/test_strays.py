@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from shapes import make
 
 import scantruss as st
+from scantruss.kernels import normals as facing
 from scantruss.kernels import sites as kernels
 from scantruss.scan import strays
 from scantruss.scan.cloud import measure_gap
@@ -100,7 +101,7 @@ def test_distances_from_planes_agree_with_those_of_numpy(seed):
     near = cKDTree(points).query(points, k=17)[1][:, 1:]
     near[-1, 5:] = -1
     off, thickness = np.full((2, 60), 7.0)
-    kernels.distances_from_planes(points, near, off, thickness)
+    facing.distances_from_planes(points, near, off, thickness)
     for p in range(59):
         around = points[near[p]]
         normal = np.linalg.svd(around - around.mean(axis=0))[2][2]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .corners import STEP, find_corners
+from .curves import cut_spikes, length_around, resample, smooth_between, smooth_turns
 from .fill import fill_holes
 from .kernels import boundary as kernels
 from .kernels.field import lengths_along
@@ -16,6 +17,7 @@ from .kernels.seat import nearest_site
 from .kernels.surface import Surface, walk
 from .lines.find import find_lines
 from .lines.network import NO_LINES, Lines
+from .rolls import boundary_loops
 from .scan.cloud import PointCloud
 from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites, sites_with
 from .settings import Settings
@@ -24,8 +26,6 @@ Progress = Callable[[str, float], None]
 
 SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member lengths
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
-TRIES = 20  # of rolling the disc from one place
-TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
 NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
@@ -187,89 +187,9 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
     return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
 
 
-def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: float) -> list[tuple[np.ndarray, int]]:
-    """Return the sites of each loop (H,) in order, as the rolled disc touches them, and the piece that they bound.
-
-    Loops shorter than `least` are left out.
-    """
-    free = np.empty(len(surface.mean))
-    radii = disc_radii(surface, radius)
-    kernels.free_directions(surface, radii, np.radians(75.0), free)
-    rolls = _Rolls(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
-    loops = []
-    for site in np.flatnonzero(free < 9.0).tolist():
-        if rolls.following[site] >= 0:
-            continue
-        loop = rolls.loop_at(site, free[site], radius)
-        if len(loop) < 3 or _around(surface.mean[loop]) <= least:
-            continue  # a small gap is closed over
-        loop = np.roll(loop, -int(loop.argmin()))  # wherever the disc began
-        fresh = rolls.following[loop] < 0
-        rolls.following[loop], rolls.preceding[loop] = np.roll(loop, -1), np.roll(loop, 1)
-        if fresh.mean() > 0.5:
-            loops.append((loop, int(piece[loop[0]])))
-    return loops
-
-
-class _Rolls:
-    """The disc rolled from one site after the other, and what it has touched."""
-
-    def __init__(self, surface: Surface, radii: np.ndarray, room: int) -> None:
-        count = len(surface.mean)
-        self.surface, self.radii = surface, radii
-        self.mirrored = surface._replace(normals=-surface.normals)
-        self.path = np.empty(room, np.int64)
-        self.following, self.preceding, self.visit = (np.full(count, -1, np.int64) for _ in range(3))
-        self.banned = np.zeros(count, np.bool_)
-
-    def loop_at(self, site: int, direction: float, radius: float) -> np.ndarray:
-        """Sites of the loop that comes back to its start, empty where there is none.
-
-        A disc that crosses from sheet to sheet may be caught in another loop. Rolled the other way round it seldom crosses at the
-        same place, so that way is tried next; then the sites that have caught it are left out.
-        """
-        centre = kernels.site_disc(self.surface, site, direction, self.radii[site])
-        means = self.surface.mean
-        for _ in range(TRIES):
-            ahead = self._roll(self.surface, site, centre, self.following)
-            if self._is_near(ahead, site, radius):
-                return ahead
-            touched = np.flatnonzero(self.following >= 0)
-            if len(ahead) == 0 and self._is_near(touched, site, radius):
-                break
-            back = self._roll(self.mirrored, site, centre, self.preceding)[::-1]
-            if self._is_near(back, site, radius):
-                return back
-            if len(ahead) == 0 or _around(means[ahead]) > TRAP * radius:
-                return ahead
-            self.banned[ahead[ahead != site]] = True
-        return np.zeros(0, np.int64)
-
-    def _roll(self, surface: Surface, site: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
-        """Sites of the loop that the disc comes into, empty where it falls off or comes to an earlier loop."""
-        first, last = kernels.roll_disc(surface, site, centre, self.radii, self.path, seen, self.visit, self.banned)
-        return self.path[first:last].copy()
-
-    def _is_near(self, sites: np.ndarray, site: int, radius: float) -> bool:
-        """Whether any of the sites lies within two radii of a site."""
-        away = self.surface.mean[sites] - self.surface.mean[site]
-        return len(sites) > 0 and float(np.linalg.norm(away, axis=1).min()) < 2.0 * radius
-
-
-def disc_radii(surface: Surface, radius: float) -> np.ndarray:
-    """Radius of the disc at each site (S,): larger where the scan is sparse, so that it does not fall between the points."""
-    sixth = surface.neighbors[:, 5]
-    gap = np.linalg.norm(surface.mean[sixth] - surface.mean, axis=1)
-    radii = np.where(sixth >= 0, np.maximum(radius, 0.75 * gap), radius)
-    wide = np.flatnonzero(radii > radius)
-    around = surface.neighbors[wide]
-    np.maximum.at(radii, around[around >= 0], np.repeat(radii[wide], (around >= 0).sum(axis=1)))
-    return radii
-
-
 def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: float) -> np.ndarray:
     """Return the boundary points (M, 3) along a loop of sites: what a disc slid from outside touches, in order."""
-    turns = _smooth_turns(surface.mean[loop])
+    turns = smooth_turns(surface.mean[loop])
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
     places = resample(turns, step)
     at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
@@ -278,7 +198,7 @@ def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: flo
     for reach in (8, 4):
         ahead = np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
         kernels.touch_points(surface, places, ahead, near, radius, touched)
-        places = _smooth_turns(touched)
+        places = smooth_turns(touched)
     touched = touched[_onwards(touched)]
     forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
     return touched[forward]
@@ -297,47 +217,11 @@ def _onwards(touched: np.ndarray) -> list[int]:
     return kept
 
 
-def _around(turns: np.ndarray) -> float:
-    """Length of a closed polyline."""
-    return float(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1).sum())
-
-
-def _smooth_turns(turns: np.ndarray) -> np.ndarray:
-    """A closed polyline with half its zigzag."""
-    return 0.5 * turns + 0.25 * (np.roll(turns, 1, axis=0) + np.roll(turns, -1, axis=0))
-
-
-def resample(points: np.ndarray, step: float) -> np.ndarray:
-    """Return places at equal arc length along a closed polyline, about `step` apart."""
-    closed = np.concatenate([points, points[:1]])
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    count = max(int(round(arc[-1] / step)), 3)
-    at = np.arange(count) * (arc[-1] / count)
-    return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
-
-
-def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
-    """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
-
-    Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
-    joined directly.
-    """
-    while True:
-        normals = np.empty_like(curve)
-        kernels.normals_along(surface, curve, nearest_site(surface, *curve[0].tolist()), normals)
-        high = min(len(curve) // 2, int(30.0 * width / step))
-        at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
-        if gap == 0:
-            return curve
-        curve = np.roll(curve, -at, axis=0)
-        curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
-
-
 def smooth_loop(curve: np.ndarray, piece: int, settings: Settings, surface: Surface) -> Loop | None:
     """Find the corners of a closed curve of equal steps, smooth it between them; None where it is too short to keep."""
     at, places = find_corners(curve, settings)
     smoothed, corner_at = smooth_between(curve, at, places, int(round(WINDOW / STEP)))
-    length, field = _around(smoothed), field_along(surface, smoothed)
+    length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
     if (in_lengths if settings.fill_holes is None else length) < settings.bridged_rim:
         return None
@@ -361,56 +245,6 @@ def _steps(curve: np.ndarray) -> np.ndarray:
 def _between(field: np.ndarray) -> np.ndarray:
     """Mean of each value along a closed curve and the next (M,)."""
     return 0.5 * (field + np.roll(field, -1))
-
-
-def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
-    """Smooth a closed curve by local quadratics (Savitzky-Golay), corners kept exactly.
-
-    Returns
-    -------
-    smoothed : (M, 3)
-    corner_at : (C,) indices of the corners in it
-    """
-    offsets = np.arange(-half, half + 1)
-    weights = (1 - (np.abs(offsets) / (half + 1)) ** 3) ** 3
-    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
-    filter_ = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
-    if len(at) == 0:
-        return sum(f * np.roll(curve, -o, axis=0) for f, o in zip(filter_, offsets, strict=True)), at
-    parts, corner_at, size = [], [], 0
-    for i in range(len(at)):
-        begin, end = at[i], at[(i + 1) % len(at)] + (len(curve) if i + 1 == len(at) else 0)
-        middle = curve[np.arange(begin + 1, end) % len(curve)]
-        part = np.concatenate([places[i : i + 1], middle, places[(i + 1) % len(at)][None]])
-        part = _drop_backsteps(part)
-        n = len(part)
-        reach = min(half, n - 1)
-        mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
-        taken = filter_ if reach == half else _narrow(filter_, half - reach)
-        smooth = sum(f * mirrored[o : o + n] for o, f in enumerate(taken))
-        smooth[0], smooth[-1] = part[0], part[-1]
-        corner_at.append(size)
-        parts.append(smooth[:-1])
-        size += n - 1
-    return np.concatenate(parts), np.array(corner_at, np.int64)
-
-
-def _narrow(filter_: np.ndarray, cut: int) -> np.ndarray:
-    """A smoothing filter cut at both ends, its sum kept at one."""
-    inner = filter_[cut : len(filter_) - cut]
-    return inner / inner.sum()
-
-
-def _drop_backsteps(part: np.ndarray) -> np.ndarray:
-    """Leave out places next to the ends that the exact corner has overtaken."""
-    keep = np.ones(len(part), bool)
-    for end, order in ((0, range(1, len(part) - 1)), (len(part) - 1, range(len(part) - 2, 0, -1))):
-        for i in order:
-            inward = part[i + 1 if end == 0 else i - 1] - part[i]
-            if np.dot(part[i] - part[end], inward) > 0.25 * np.dot(inward, inward):
-                break
-            keep[i] = False
-    return part[keep]
 
 
 def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:

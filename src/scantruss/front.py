@@ -15,6 +15,7 @@ from .kernels import boxes as boxing
 from .kernels import front as lists
 from .kernels import gaps
 from .kernels.boxes import new_boxes
+from .kernels.offers import RowNodes, offer_nodes
 from .kernels.seat import nearest_site
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
@@ -193,11 +194,11 @@ def start_front(
     return front
 
 
-def offer(front: lists.Front, surface: Surface, nodes: lists.RowNodes, clear: float) -> lists.Front:
+def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -> lists.Front:
     """Offer nodes to a front, which grows until there is room for them."""
     while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
         front = grown(front)
-    lists.offer_nodes(front, surface, nodes, clear)
+    offer_nodes(front, surface, nodes, clear)
     return front
 
 

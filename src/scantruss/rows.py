@@ -8,7 +8,7 @@ import numpy as np
 
 from .boundary import Boundary, Loop, boundary_nodes
 from .kernels import rows as kernels
-from .kernels.front import RowNodes
+from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector

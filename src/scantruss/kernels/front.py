@@ -13,7 +13,7 @@ import numpy as np
 
 from .boxes import SearchBoxes, put, search
 from .compile import kernel
-from .surface import Surface, linked, walk
+from .surface import Surface, linked
 from .triangles import (
     angle_from,
     distance_to_segment,
@@ -60,15 +60,6 @@ class Front(NamedTuple):
     boxes: SearchBoxes  #: the nodes by box
 
 
-class RowNodes(NamedTuple):
-    """Nodes of the rows that the scan is laid out in, for the front to come to."""
-
-    places: np.ndarray  #: (K, 3)
-    normals: np.ndarray  #: (K, 3) outer normals of the surface there
-    sites: np.ndarray  #: (K,) int64 a site near each
-    length: float
-
-
 @kernel
 def propose_node(front: Front, place: Vector, normal: Vector, site: int, on_boundary: bool) -> int:
     """Write down the node that may come next, without adding it; returns its number."""
@@ -89,29 +80,6 @@ def add_node(front: Front) -> None:
     n = front.count[NODES]
     front.count[NODES] += 1
     put(front.boxes, n, front.nodes[n, 0], front.nodes[n, 1], front.nodes[n, 2])
-
-
-@kernel
-def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) -> None:
-    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
-    found = np.empty(NEAR, np.int64)
-    begun = front.count[NODES]
-    for i in range(len(rows.places)):
-        place, normal = row(rows.places, i), row(rows.normals, i)
-        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
-        room = True
-        for k in range(near):
-            q = found[k]
-            if q < begun and dot(normal, row(front.normals, q)) > 0.0:
-                room = room and norm(subtract(place, row(front.nodes, q))) > clear
-                s = front.out[q]
-                while s >= 0:
-                    away = distance_to_segment(place, row(front.nodes, q), row(front.nodes, front.head[s]))
-                    room = room and away > clear
-                    s = front.out_next[s]
-        if room:
-            propose_node(front, place, normal, walk(surface, rows.sites[i], place), False)
-            add_node(front)
 
 
 @kernel

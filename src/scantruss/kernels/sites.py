@@ -7,13 +7,11 @@ a second sheet nearby.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from .boxes import SearchBoxes, box_index, put, search, slot_of
 from .compile import kernel
-from .vectors import Vector, dot, row, smallest_eigenvector, subtract, unit
+from .vectors import dot, row, smallest_eigenvector, subtract
 
 
 @kernel
@@ -148,109 +146,6 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 
 
 @kernel
-def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, float]:
-    """Unit normal of the least-squares plane of a site and its neighbours, and their rms distance from it."""
-    cx = cy = cz = 0.0
-    count = 1
-    o = row(mean, s)
-    for k in range(neighbors.shape[1]):
-        n = neighbors[s, k]
-        if n >= 0:
-            d = subtract(row(mean, n), o)
-            cx, cy, cz = cx + d[0], cy + d[1], cz + d[2]
-            count += 1
-    cx, cy, cz = cx / count, cy / count, cz / count
-    xx, xy, xz, yy, yz, zz = cx * cx, cx * cy, cx * cz, cy * cy, cy * cz, cz * cz
-    for k in range(neighbors.shape[1]):
-        n = neighbors[s, k]
-        if n >= 0:
-            d = subtract(row(mean, n), o)
-            dx, dy, dz = d[0] - cx, d[1] - cy, d[2] - cz
-            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
-            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
-    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-    square = (
-        v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
-    )
-    return v, math.sqrt(max(square, 0.0) / count)
-
-
-@kernel
-def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray) -> None:
-    """Normal of the least-squares plane of each site and its neighbours, and their rms distance from it; sign not settled yet."""
-    for s in range(len(mean)):
-        v, thickness[s] = _plane_at(mean, neighbors, s)
-        normals[s, 0], normals[s, 1], normals[s, 2] = v
-
-
-@kernel
-def distances_from_planes(points: np.ndarray, neighbors: np.ndarray, off: np.ndarray, thickness: np.ndarray) -> None:
-    """Distance (N,) of each point from the plane of its neighbours, and theirs (rms), a quarter of them, the farthest off, left out.
-
-    Both stay as they are where not all neighbours are there.
-    """
-    count = neighbors.shape[1]
-    keep = count - count // 4
-    aside = np.empty(count)
-    for p in range(len(points)):
-        if neighbors[p, count - 1] < 0:
-            continue
-        limit, cx, cy, cz, v, square = 1e300, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), 0.0
-        for turn in range(2):
-            taken, sx, sy, sz = 0, 0.0, 0.0, 0.0
-            xx = xy = xz = yy = yz = zz = 0.0
-            for k in range(count):
-                if turn == 0 or aside[k] <= limit:
-                    x, y, z = subtract(row(points, neighbors[p, k]), row(points, p))
-                    taken, sx, sy, sz = taken + 1, sx + x, sy + y, sz + z
-                    xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-                    yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
-            cx, cy, cz = sx / taken, sy / taken, sz / taken
-            xx, xy, xz = xx - taken * cx * cx, xy - taken * cx * cy, xz - taken * cx * cz
-            yy, yz, zz = yy - taken * cy * cy, yz - taken * cy * cz, zz - taken * cz * cz
-            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-            square = 0.0
-            for k in range(count):
-                d = subtract(row(points, neighbors[p, k]), row(points, p))
-                rise = abs(dot(subtract(d, (cx, cy, cz)), v))
-                square += rise * rise if turn == 0 or aside[k] <= limit else 0.0
-                if turn == 0:
-                    aside[k] = rise
-            if turn == 0:
-                limit = np.sort(aside)[keep - 1]
-            else:
-                thickness[p] = math.sqrt(square / taken)
-        off[p] = abs(dot((cx, cy, cz), v))
-
-
-@kernel
-def trust_thin_sites(
-    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
-) -> None:
-    """Drop the links of a thick site to thin ones over whose plane it stands, and fit its normal anew.
-
-    At the rim of a sheet the nearest sites may be those of the next sheet; they tilt the plane of the one, not of the other.
-    """
-    for s in range(len(mean)):
-        if thickness[s] <= rough:
-            continue
-        held, count = 0, 0
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n < 0:
-                break
-            count += 1
-            if thickness[n] > rough or abs(dot(unit(subtract(row(mean, n), row(mean, s))), row(normals, n))) <= steep:
-                neighbors[s, held] = n
-                held += 1
-        for k in range(held, count):
-            neighbors[s, k] = -1
-        if held < count:
-            v, thickness[s] = _plane_at(mean, neighbors, s)
-            normals[s, 0], normals[s, 1], normals[s, 2] = v
-
-
-@kernel
 def settle_sites(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
@@ -317,122 +212,7 @@ def settle_sites(
 
 
 @kernel
-def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float) -> None:
-    """Drop neighbours that stand over a site rather than beside it: they lie on another sheet."""
-    for s in range(len(mean)):
-        held = 0
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n < 0:
-                break
-            e = unit(subtract(row(mean, n), row(mean, s)))
-            if abs(dot(e, row(normals, s))) <= steep or abs(dot(e, row(normals, n))) <= steep:
-                neighbors[s, held] = n
-                held += 1
-        for k in range(held, neighbors.shape[1]):
-            neighbors[s, k] = -1
-
-
-@kernel
-def link_weights(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray) -> None:
-    """How much the normals of neighbours disagree when one is mirrored to the other, 0 (agree) to 1; (S, K), 2 = no link.
-
-    Mirroring at the plane half-way follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
-    """
-    for s in range(len(mean)):
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            weights[s, k] = 2.0
-            if n >= 0:
-                e = unit(subtract(row(mean, n), row(mean, s)))
-                a, b = row(normals, s), row(normals, n)
-                weights[s, k] = 1.0 - abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b))
-
-
-@kernel
-def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
-    """Root of a site in the union, and its sign against that root; shortens the path."""
-    total = 1
-    while piece[s] != s:
-        parent = piece[s]
-        if piece[parent] != parent:
-            sign[s] *= sign[parent]
-            piece[s] = piece[parent]
-        total *= sign[s]
-        s = piece[s]
-    return s, total
-
-
-@kernel
-def orient_normals(
-    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, order: np.ndarray, piece: np.ndarray
-) -> None:
-    """Turn all normals of a connected piece to the same side, along the spanning tree of the most certain links.
-
-    order : links as s * K + k, most certain first. piece : (S,) filled with the smallest site of each connected piece.
-    """
-    k_most = neighbors.shape[1]
-    sign = np.ones(len(mean), np.int64)
-    for s in range(len(mean)):
-        piece[s] = s
-    for i in range(len(order)):
-        s, n = order[i] // k_most, neighbors[order[i] // k_most, order[i] % k_most]
-        root_s, sign_s = _root(piece, sign, s)
-        root_n, sign_n = _root(piece, sign, n)
-        if root_s == root_n:
-            continue
-        e = unit(subtract(row(mean, n), row(mean, s)))
-        a, b = row(normals, s), row(normals, n)
-        agree = 1 if dot(a, b) - 2.0 * dot(e, a) * dot(e, b) >= 0.0 else -1
-        if root_n < root_s:
-            piece[root_s] = root_n
-            sign[root_s] = sign_s * sign_n * agree
-        else:
-            piece[root_n] = root_s
-            sign[root_n] = sign_s * sign_n * agree
-    for s in range(len(mean)):  # parents have smaller numbers, so they are settled first
-        if piece[s] != s:
-            sign[s] *= sign[piece[s]]
-            piece[s] = piece[piece[s]]
-        for c in range(3):
-            normals[s, c] *= sign[s]
-
-
-@kernel
-def smooth_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray) -> None:
-    """Mean normal of each site and of those neighbours whose normals have a cosine over `facing` with its own."""
-    for s in range(len(normals)):
-        a = row(normals, s)
-        x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n >= 0:
-                b = row(normals, n)
-                if dot(a, b) > facing:
-                    x, y, z = x + b[0], y + b[1], z + b[2]
-        smoothed[s, 0], smoothed[s, 1], smoothed[s, 2] = unit((x, y, z))
-
-
-@kernel
 def put_all(boxes: SearchBoxes, points: np.ndarray, chosen: np.ndarray) -> None:
     """Put the chosen points into boxes, in their order."""
     for s in range(len(chosen)):
         put(boxes, s, points[chosen[s], 0], points[chosen[s], 1], points[chosen[s], 2])
-
-
-@kernel
-def head_on_links(
-    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, smooth: float
-) -> int:
-    """Number of links between sites thinner than `smooth` that lie side by side and yet face opposite sides."""
-    count = 0
-    for s in range(len(mean)):
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n < 0 or dot(row(normals, s), row(normals, n)) >= -0.9 or max(thickness[s], thickness[n]) >= smooth:
-                continue
-            d = subtract(row(mean, n), row(mean, s))
-            rise = max(abs(dot(d, row(normals, s))), abs(dot(d, row(normals, n))))
-            if rise < 0.3 * math.sqrt(max(dot(d, d), 1e-300)):
-                count += 1
-    return count

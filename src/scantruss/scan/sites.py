@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..kernels import normals as facing
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import Surface
@@ -130,7 +131,7 @@ def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
     normals = surface.normals
     for _ in range(passes):
         smoothed = np.empty_like(normals)
-        kernels.smooth_normals(normals, surface.neighbors, 0.0, smoothed)
+        facing.smooth_normals(normals, surface.neighbors, 0.0, smoothed)
         normals = smoothed
     return normals
 
@@ -174,15 +175,15 @@ def _prepare(
         measured = int((chosen < measured).sum())
         mean = settled[chosen]
         neighbors, normals, thickness = _link(mean, mean, boxes, length, radius, spacing)
-    kernels.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
-    kernels.cut_steep_links(mean, normals, neighbors, STEEP)
+    facing.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
+    facing.cut_steep_links(mean, normals, neighbors, STEEP)
     weights = np.empty(neighbors.shape)
-    kernels.link_weights(mean, normals, neighbors, weights)
+    facing.link_weights(mean, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
-    kernels.orient_normals(mean, normals, neighbors, order, piece)
+    facing.orient_normals(mean, normals, neighbors, order, piece)
     smoothed = np.empty_like(normals)
-    kernels.smooth_normals(normals, neighbors, 0.7, smoothed)
+    facing.smooth_normals(normals, neighbors, 0.7, smoothed)
     _face_outside(mean, smoothed, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
@@ -266,7 +267,7 @@ def _link(
     )
     kernels.link_back(place, neighbors)
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
-    kernels.site_normals(mean, neighbors, normals, thickness)
+    facing.site_normals(mean, neighbors, normals, thickness)
     return neighbors, normals, thickness
 
 
@@ -339,7 +340,7 @@ def check_two_sided(sites: Sites) -> None:
     """
     surface = sites.surface
     smooth = 0.15 * surface.scale[4]
-    if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, sites.thickness, smooth) >= HEAD_ON:
+    if facing.head_on_links(surface.mean, surface.normals, surface.neighbors, sites.thickness, smooth) >= HEAD_ON:
         raise InputError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
         )

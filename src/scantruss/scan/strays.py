@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kernels import normals as facing
 from ..kernels import sites as kernels
 from ..kernels.boxes import new_boxes
 from ..machine import in_parts
@@ -68,7 +69,7 @@ def _off_surface(points: np.ndarray) -> np.ndarray:
     """One round of `find_strays`, by the plane of the nearest points."""
     neighbors, gap = _nearest(points, PLANE, FAR)
     off, thickness = np.zeros(len(points)), np.zeros(len(points))
-    kernels.distances_from_planes(points, neighbors, off, thickness)
+    facing.distances_from_planes(points, neighbors, off, thickness)
     return (off > gap) & (off > OFF * thickness)
 
 

@@ -1,0 +1,95 @@
+"""Closed curves: length, equal steps, spikes cut off, smoothed between corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import boundary as kernels
+from .kernels.seat import nearest_site
+from .kernels.surface import Surface
+
+
+def length_around(turns: np.ndarray) -> float:
+    """Length of a closed polyline."""
+    return float(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1).sum())
+
+
+def smooth_turns(turns: np.ndarray) -> np.ndarray:
+    """A closed polyline with half its zigzag."""
+    return 0.5 * turns + 0.25 * (np.roll(turns, 1, axis=0) + np.roll(turns, -1, axis=0))
+
+
+def resample(points: np.ndarray, step: float) -> np.ndarray:
+    """Return places at equal arc length along a closed polyline, about `step` apart."""
+    closed = np.concatenate([points, points[:1]])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    count = max(int(round(arc[-1] / step)), 3)
+    at = np.arange(count) * (arc[-1] / count)
+    return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
+
+
+def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
+    """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
+
+    Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
+    joined directly.
+    """
+    while True:
+        normals = np.empty_like(curve)
+        kernels.normals_along(surface, curve, nearest_site(surface, *curve[0].tolist()), normals)
+        high = min(len(curve) // 2, int(30.0 * width / step))
+        at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
+        if gap == 0:
+            return curve
+        curve = np.roll(curve, -at, axis=0)
+        curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
+
+
+def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """Smooth a closed curve by local quadratics (Savitzky-Golay), corners kept exactly.
+
+    Returns
+    -------
+    smoothed : (M, 3)
+    corner_at : (C,) indices of the corners in it
+    """
+    offsets = np.arange(-half, half + 1)
+    weights = (1 - (np.abs(offsets) / (half + 1)) ** 3) ** 3
+    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
+    filter_ = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
+    if len(at) == 0:
+        return sum(f * np.roll(curve, -o, axis=0) for f, o in zip(filter_, offsets, strict=True)), at
+    parts, corner_at, size = [], [], 0
+    for i in range(len(at)):
+        begin, end = at[i], at[(i + 1) % len(at)] + (len(curve) if i + 1 == len(at) else 0)
+        middle = curve[np.arange(begin + 1, end) % len(curve)]
+        part = np.concatenate([places[i : i + 1], middle, places[(i + 1) % len(at)][None]])
+        part = _drop_backsteps(part)
+        n = len(part)
+        reach = min(half, n - 1)
+        mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
+        taken = filter_ if reach == half else _narrow(filter_, half - reach)
+        smooth = sum(f * mirrored[o : o + n] for o, f in enumerate(taken))
+        smooth[0], smooth[-1] = part[0], part[-1]
+        corner_at.append(size)
+        parts.append(smooth[:-1])
+        size += n - 1
+    return np.concatenate(parts), np.array(corner_at, np.int64)
+
+
+def _narrow(filter_: np.ndarray, cut: int) -> np.ndarray:
+    """A smoothing filter cut at both ends, its sum kept at one."""
+    inner = filter_[cut : len(filter_) - cut]
+    return inner / inner.sum()
+
+
+def _drop_backsteps(part: np.ndarray) -> np.ndarray:
+    """Leave out places next to the ends that the exact corner has overtaken."""
+    keep = np.ones(len(part), bool)
+    for end, order in ((0, range(1, len(part) - 1)), (len(part) - 1, range(len(part) - 2, 0, -1))):
+        for i in order:
+            inward = part[i + 1 if end == 0 else i - 1] - part[i]
+            if np.dot(part[i] - part[end], inward) > 0.25 * np.dot(inward, inward):
+                break
+            keep[i] = False
+    return part[keep]

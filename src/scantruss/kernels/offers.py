@@ -1,0 +1,46 @@
+"""Nodes offered to the front before it starts: it comes to them as it does to nodes of its own."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .boxes import search
+from .compile import kernel
+from .front import NEAR, NODES, Front, add_node, propose_node
+from .surface import Surface, walk
+from .triangles import distance_to_segment
+from .vectors import dot, norm, row, subtract
+
+
+class RowNodes(NamedTuple):
+    """Nodes of the rows that the scan is laid out in, for the front to come to."""
+
+    places: np.ndarray  #: (K, 3)
+    normals: np.ndarray  #: (K, 3) outer normals of the surface there
+    sites: np.ndarray  #: (K,) int64 a site near each
+    length: float
+
+
+@kernel
+def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) -> None:
+    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
+    found = np.empty(NEAR, np.int64)
+    begun = front.count[NODES]
+    for i in range(len(rows.places)):
+        place, normal = row(rows.places, i), row(rows.normals, i)
+        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
+        room = True
+        for k in range(near):
+            q = found[k]
+            if q < begun and dot(normal, row(front.normals, q)) > 0.0:
+                room = room and norm(subtract(place, row(front.nodes, q))) > clear
+                s = front.out[q]
+                while s >= 0:
+                    away = distance_to_segment(place, row(front.nodes, q), row(front.nodes, front.head[s]))
+                    room = room and away > clear
+                    s = front.out_next[s]
+        if room:
+            propose_node(front, place, normal, walk(surface, rows.sites[i], place), False)
+            add_node(front)
