@@ -47,15 +47,16 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, relief, scratch, area = settled
     net = relief.net
-    before, free = trace(net), int(net.free[-2])
+    before, free, patches = trace(net), int(net.free[-2]), relief.patches[net.degree > 0].tobytes()
     kicked = 0
     for v in np.flatnonzero(net.degree > 0).tolist():
-        assert kernels.list_area(net, area, v)
+        assert kernels.list_area(net, relief.patches, area, v)
         kicked += kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
         kernels.search_area(net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, 0.05)
-        kernels.put_area_back(net, area)
+        kernels.put_area_back(net, relief.patches, area)
         assert int(net.free[-2]) == free and trace(net) == before
+        assert relief.patches[net.degree > 0].tobytes() == patches
     assert kicked > 20
 
 
@@ -63,7 +64,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
     _, relief, scratch, area = settled
     net = relief.net
     for v in np.flatnonzero(net.degree > 0)[::4].tolist():
-        assert kernels.list_area(net, area, v)
+        assert kernels.list_area(net, relief.patches, area, v)
         before = kernels.area_energy(net, scratch, area, relief.length, WEIGHT), energy_of(relief, scratch)
         kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
@@ -120,4 +121,4 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
 def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
     relief.net.state[:, 2] = kernels.LOCKED
-    assert not kernels.list_area(relief.net, area, int(np.flatnonzero(relief.net.degree > 0)[0]))
+    assert not kernels.list_area(relief.net, relief.patches, area, int(np.flatnonzero(relief.net.degree > 0)[0]))

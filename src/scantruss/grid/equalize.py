@@ -105,6 +105,7 @@ def new_area(relief: Relief) -> Area:
         around=np.zeros(MOST, np.int64),
         nodes=np.zeros((MOST, 5)),
         ring=np.zeros((MOST, width), np.int64),
+        patches=np.zeros((MOST, relief.patches.shape[1])),
         state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
         free=np.zeros(KEPT + 2, np.int64),
         counter=np.zeros(4, np.int64),

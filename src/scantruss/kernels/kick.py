@@ -31,6 +31,7 @@ class Area(NamedTuple):
     around: np.ndarray  #: (A,) int64 the nodes
     nodes: np.ndarray  #: (A, 5) their places, arcs and desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
+    patches: np.ndarray  #: (A, PATCH) their local surfaces: a node that is freed may come back elsewhere
     state: np.ndarray  #: (A, 6) int64 their states
     free: np.ndarray  #: (KEPT + 2,) int64 the top of the stack of free nodes; their number, and how many are here
     counter: np.ndarray  #: (4,) int64 kicks; nodes of the area; chance; kicks that paid
@@ -44,7 +45,7 @@ def chance(area: Area, choices: int) -> int:
 
 
 @kernel
-def list_area(net: Net, area: Area, v: int) -> bool:
+def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> bool:
     """List the nodes around a node as they are now; False where there are too many, or a defect is among them."""
     area.counter[STAMP] += 1
     stamp = area.counter[STAMP]
@@ -76,6 +77,8 @@ def list_area(net: Net, area: Area, v: int) -> bool:
             area.ring[k, c] = net.ring[u, c]
         for c in range(net.state.shape[1]):
             area.state[k, c] = net.state[u, c]
+        for c in range(patches.shape[1]):
+            area.patches[k, c] = patches[u, c]
     free = net.free[-2]
     area.free[-2], area.free[-1] = free, min(free, KEPT)
     for k in range(area.free[-1]):
@@ -84,7 +87,7 @@ def list_area(net: Net, area: Area, v: int) -> bool:
 
 
 @kernel
-def put_area_back(net: Net, area: Area) -> None:
+def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
     """Undo a kick."""
     free = area.free[-2]
     net.free[-2] = free
@@ -100,6 +103,8 @@ def put_area_back(net: Net, area: Area) -> None:
             net.ring[u, c] = area.ring[k, c]
         for c in range(net.state.shape[1]):
             net.state[u, c] = area.state[k, c]
+        for c in range(patches.shape[1]):
+            patches[u, c] = area.patches[k, c]
 
 
 @kernel
@@ -227,7 +232,7 @@ def kick(
 
     worth, bend : n more nodes may cost worth n - bend n^2
     """
-    if not list_area(net, area, v):
+    if not list_area(net, patches, area, v):
         return False
     before = area_energy(net, scratch, area, length, weight)
     if move_at_random(net, patches, rim, scratch, area) == 0:
@@ -243,7 +248,7 @@ def kick(
     if after - before < worth * more - bend * more * more + luck:
         area.counter[PAID] += 1
         return True
-    put_area_back(net, area)
+    put_area_back(net, patches, area)
     return False
 
 
