@@ -28,7 +28,7 @@ EVEN = {"balance": 2.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last s
 PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
-KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (80, 0.2)}  # rounds of kicks, and what they may cost at first
+KICKS = {"quick": (0, 0.0), "normal": (3, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
 HOT = 0.8  # part of the rounds in which they may cost anything
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 

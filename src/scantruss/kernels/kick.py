@@ -20,7 +20,7 @@ MOST = 400  # nodes of an area
 KEPT = 32  # free nodes at the top of the stack that are written down
 MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
-CALM = 4  # sweeps of settling in a round
+CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
 
 
