@@ -27,20 +27,33 @@ def command(*arguments: str, cache: Path | None = None) -> None:
     subprocess.run(run, check=True, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
-def warm_run(rounds: int, workers: int) -> Ratio:
+def warm_run(rounds: int, workers: int, effort: str) -> Ratio:
     """Return the whole run on points in memory against a search of 16 neighbours of each point by so many threads."""
     from scipy.spatial import cKDTree
 
     points = make("scallop", POINTS).points
-    settings = st.Settings(length=LENGTH)
+    settings = st.Settings(length=LENGTH, effort=effort)
     grid = st.grid_from_points(points, settings)  # compiles, or loads what was compiled
     return in_turn(
-        f"grid of {POINTS:,} points, {len(grid.nodes):,} nodes, warm / scipy cKDTree, {NEIGHBOURS} neighbours of each,"
+        f"grid of {POINTS:,} points, {len(grid.nodes):,} nodes, {effort}, warm / scipy cKDTree, {NEIGHBOURS} neighbours of each,"
         f" {workers} thread{'s' * (workers > 1)}",
         lambda: st.grid_from_points(points, settings),
         lambda: cKDTree(points).query(points, k=NEIGHBOURS, workers=workers),
         rounds=rounds,
         aim=1.0,
+    )
+
+
+def more_effort(rounds: int, effort: str, aim: float) -> Ratio:
+    """Return the whole run with an effort against the quick one."""
+    points = make("scallop", POINTS).points
+    quick, more = (st.Settings(length=LENGTH, effort=name) for name in ("quick", effort))
+    return in_turn(
+        f"grid of {POINTS:,} points: effort {effort} / effort quick",
+        lambda: st.grid_from_points(points, more),
+        lambda: st.grid_from_points(points, quick),
+        rounds=rounds,
+        aim=aim,
     )
 
 
@@ -77,7 +90,9 @@ def help_text(rounds: int) -> Ratio:
 def first_figures(rounds: int = 7) -> list[Ratio]:
     """Return the ratios."""
     return [
-        *(warm_run(2 * rounds + 1, workers) for workers in (1, 2)),
+        *(warm_run(2 * rounds + 1, workers, effort) for effort in ("quick", "normal") for workers in (1, 2)),
+        more_effort(rounds, "normal", 3.0),
+        more_effort(3, "best", 20.0),
         first_run(max(rounds // 2, 3)),
         help_text(rounds),
     ]
