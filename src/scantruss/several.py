@@ -39,6 +39,7 @@ SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desi
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
 }
 FINALISTS = {"quick": 1, "normal": 1, "best": 2}  # grids that are improved to the end
+BATCHES = 3  # of finalists, where none of the first passes
 
 
 def several_grids(
@@ -100,7 +101,7 @@ def several_grids(
     )
     order = sorted(reliefs, key=lambda number: energy_of_node(reliefs[number]))
     grids: dict[int, Grid] = {}
-    for begin in range(0, len(order), finalists):
+    for begin in range(0, min(len(order), BATCHES * finalists), finalists):
         jobs = {number: (number, reliefs[number]) for number in order[begin : begin + finalists]}
         grids = _side_by_side(finish, jobs, _part(progress, "optimize", 0.5, 1.0))
         if grids:
