@@ -16,6 +16,7 @@ APART = 0.5  # corners nearer to each other are one, in member lengths
 STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
 BENT = 1.3  # a corner turns at most so many times more between the sides as they seem than between quadratics
 SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
+WOBBLY = 1.8  # and so many times more than three quarters of them,
 SHARP = 70.0  # or by this angle [degree]
 
 
@@ -40,7 +41,8 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     if len(curve) < 2 * round(SIGHT[1] / STEP) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
     turn = _turns(curve)
-    enough = max(settings.corner_angle, min(SHARPER * float(np.median(turn)), SHARP))
+    usual = max(SHARPER * float(np.median(turn)), WOBBLY * float(np.quantile(turn, 0.75)))
+    enough = max(settings.corner_angle, min(usual, SHARP))
     found: list[tuple[float, int, np.ndarray]] = []
     peaks = _peaks(turn, enough)
     for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve)), strict=True):
