@@ -24,7 +24,7 @@ from .quality import shape_qualities
 from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
-EVEN = {"balance": 2.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
+EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
 PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
