@@ -9,8 +9,6 @@ from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_area, new
 from scantruss.kernels import kick as kernels
 from scantruss.kernels.trial import total_energy
 
-pytestmark = pytest.mark.kernels
-
 MAKERS = {
     "disc": lambda seed=0: rough_disc(length=0.4, seed=seed, points=1500),
     "sphere": lambda seed=0: rough_sphere(count=60, seed=seed, points=1500),
@@ -43,13 +41,14 @@ def kick(relief, scratch, area, v, worth, heat=0.0):
     )
 
 
+@pytest.mark.kernels
 def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, relief, scratch, area = settled
     net = relief.net
     before, free, patches = trace(net), int(net.free[-2]), relief.patches[net.degree > 0].tobytes()
     kicked = 0
-    for v in np.flatnonzero(net.degree > 0).tolist():
+    for v in np.flatnonzero(net.degree > 0)[::2].tolist():
         assert kernels.list_area(net, relief.patches, area, v)
         kicked += kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
@@ -60,10 +59,11 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     assert kicked > 20
 
 
+@pytest.mark.kernels
 def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
     _, relief, scratch, area = settled
     net = relief.net
-    for v in np.flatnonzero(net.degree > 0)[::4].tolist():
+    for v in np.flatnonzero(net.degree > 0)[::8].tolist():
         assert kernels.list_area(net, relief.patches, area, v)
         before = kernels.area_energy(net, scratch, area, relief.length, WEIGHT), energy_of(relief, scratch)
         kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
@@ -118,6 +118,7 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
     assert energy_of_node(relief) == pytest.approx(slow, rel=1e-9)
 
 
+@pytest.mark.kernels
 def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
     relief.net.state[:, 2] = kernels.LOCKED

@@ -14,8 +14,6 @@ from scantruss import rows as laying
 from scantruss.kernels import rows as kernels
 from scantruss.rows import Rows, first_row, lay_rows, make_levels
 
-pytestmark = pytest.mark.kernels
-
 UP = (0.0, 0.0, 1.0)
 angles = some.floats(0.0, 6.3)
 places = some.tuples(some.floats(-5, 5), some.floats(-5, 5))
@@ -36,6 +34,7 @@ def lattice(node, angle, length, reach=8):
     return np.array([np.add(node, i * u + j * v) for i in range(-reach, reach) for j in range(-reach, reach)])
 
 
+@pytest.mark.kernels
 @settings(max_examples=60, deadline=None)
 @given(places, places, angles)
 def test_the_nearest_node_is_that_of_a_search_through_all(node, place, angle):
@@ -47,6 +46,7 @@ def test_the_nearest_node_is_that_of_a_search_through_all(node, place, angle):
     assert np.linalg.norm(every - found, axis=1).min() < 1e-9
 
 
+@pytest.mark.kernels
 @settings(max_examples=60, deadline=None)
 @given(angles, angles)
 def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle, other):
@@ -55,6 +55,7 @@ def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle, other):
     assert np.dot(found, direction(other)) == pytest.approx(most, abs=1e-12)
 
 
+@pytest.mark.kernels
 @settings(max_examples=40, deadline=None)
 @given(places, angles, angles)
 def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
@@ -68,6 +69,7 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
     assert abs((middle - p) @ n) < size + 1e-9 and abs((middle - q) @ m) < size + 1e-9
 
 
+@pytest.mark.kernels
 def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side():
     _, boundary = boundary_of(sheet(12.0, 8.0, 0.2), 1.0)
     nodes = lay_rows(boundary, 1.0, Rows())
