@@ -38,8 +38,8 @@ SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desi
     "normal": (1.0, 0.97, 1.03),
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
 }
-FINALISTS = {"quick": 1, "normal": 1, "best": 2}  # grids that are improved to the end
-BATCHES = 3  # of finalists, where none of the first passes
+FINALISTS = {"quick": 1, "normal": 1, "best": 3}  # grids that are improved to the end
+BATCHES = 2  # of finalists, where none of the first passes
 
 
 def several_grids(
@@ -84,9 +84,11 @@ def several_grids(
 
     def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
-            improve_further(relief, boundary.sites, positions, settings)
-            grid = with_rim_members(relief.to_grid(fronts[number]), boundary.lines, settings.length)
-            return check(grid.replace(settings=settings, before=fronts[number].quality))
+            own = settings if number < len(ways) else settings.replace(effort="normal")
+            improve_further(relief, boundary.sites, positions, own)
+            front = fronts[number % len(ways)]
+            grid = with_rim_members(relief.to_grid(front), boundary.lines, settings.length)
+            return check(grid.replace(settings=settings, before=front.quality))
 
         return _passed(faults, number, work)
 
@@ -100,6 +102,9 @@ def several_grids(
         improve, {n: (front,) for n, front in fronts.items()}, _part(progress, "optimize", 0.0, 0.5)
     )
     order = sorted(reliefs, key=lambda number: energy_of_node(reliefs[number]))
+    if order and settings.effort == "best":  # the first once more as normal ends it: on thin parts annealing may lose
+        reliefs[order[0] + len(ways)] = improve(fronts[order[0]])
+        order.insert(finalists - 1, order[0] + len(ways))
     grids: dict[int, Grid] = {}
     for begin in range(0, min(len(order), BATCHES * finalists), finalists):
         jobs = {number: (number, reliefs[number]) for number in order[begin : begin + finalists]}
@@ -109,7 +114,7 @@ def several_grids(
     if not grids:
         raise faults[order[0] if order else 0]
     best = min(grids, key=lambda number: energy_of_node(reliefs[number]))
-    return fronts[best], grids[best], advanced
+    return fronts[best % len(ways)], grids[best], advanced
 
 
 def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:
