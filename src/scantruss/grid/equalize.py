@@ -120,7 +120,6 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
     rounds, heat = KICKS[effort]
     scratch, area = new_scratch(relief), new_area(relief)
     for done in range(rounds):
-        relief.renew(NEAR)
         if progress:
             progress(0.6 + 0.2 * done / rounds)
         strain, share = _strain_and_share(relief, scratch)
@@ -128,6 +127,7 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
         kick_all(
             relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, strain, PRICE, share, cooled
         )
+        relief.renew(FAR)
     if rounds:
         settle_again(relief)
 

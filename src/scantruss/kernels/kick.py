@@ -13,7 +13,7 @@ from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
 from .trial import MARK, Scratch, gather, local_energy
-from .vectors import dot, norm, row, subtract
+from .vectors import norm, row, subtract
 
 WIDE, SEARCHED, KICKED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
 MOST = 400  # nodes of an area
@@ -21,7 +21,6 @@ KEPT = 32  # free nodes at the top of the stack that are written down
 MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
-SURE = 0.65  # farther from the middle of its patch a node of a kick that has paid may not be, in lengths
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
 
 
@@ -216,18 +215,6 @@ def search_area(
 
 
 @kernel
-def is_sure(net: Net, patches: np.ndarray, area: Area, length: float) -> bool:
-    """Whether every node that was there before the kick is where its patch still tells where the scan is."""
-    for k in range(area.counter[COUNT]):
-        v = area.around[k]
-        if net.state[v, DEGREE] > 0:
-            d = subtract(row(net.nodes, v), row(patches, v))
-            if dot(d, d) > (SURE * length * net.desired[v]) ** 2:
-                return False
-    return True
-
-
-@kernel
 def kick(
     net: Net,
     patches: np.ndarray,
@@ -258,7 +245,7 @@ def kick(
     after = area_energy(net, scratch, area, length, weight)
     more = area.free[-2] - net.free[-2]
     luck = -heat * math.log((chance(area, 100000) + 1.0) / 100001.0) if heat > 0.0 else -1e-4
-    if after - before < worth * more - bend * more * more + luck and is_sure(net, patches, area, length):
+    if after - before < worth * more - bend * more * more + luck:
         area.counter[PAID] += 1
         return True
     put_area_back(net, patches, area)
