@@ -15,6 +15,10 @@ from .grid.fixed import check_positions, hold_nodes
 from .grid.on_lines import with_rim_members
 from .grid.optimize import improve_further
 from .grid.relief import Relief
+from .kernels import advance as advancing
+from .kernels import landing
+from .kernels import search as searching
+from .kernels.compile import is_compiled
 from .machine import processors
 from .rows import Rows
 from .scan.sites import with_own_scratch
@@ -138,7 +142,8 @@ def _side_by_side(
 ) -> dict[int, Result]:
     """Do the work for each job on all processors; return what came out, in the order of the jobs."""
     done: dict[int, Result] = {}
-    with ThreadPoolExecutor(processors()) as pool:
+    ready = is_compiled(advancing.advance, searching.search, landing.land_nodes)
+    with ThreadPoolExecutor(processors() if ready else 1) as pool:  # one thread compiles, others would only wait for it
         futures = {number: pool.submit(work, *arguments) for number, arguments in jobs.items()}
         try:
             for count, (number, future) in enumerate(futures.items(), 1):
