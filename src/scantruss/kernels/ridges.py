@@ -14,9 +14,10 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .surface import Surface, flood, solve, walk
+from .surface import Surface, flood, gather_points, solve, walk
 from .vectors import Vector, along, cross, dot, norm, row, subtract, unit
 
+EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
 TERMS = 8
 FOUND = (
     9  # numbers that `fit_fold` writes: place, direction, angle of the jump, gain over a smooth surface, rms distance
@@ -38,28 +39,6 @@ def bends_of_sites(surface: Surface, bends: np.ndarray) -> None:
                 break
             least = min(least, dot(n, row(surface.normals, m)))
         bends[s] = least
-
-
-@kernel
-def gather_points(surface: Surface, site: int, place: Vector, radius: float, most: int, buffer: np.ndarray) -> int:
-    """Points around a place on the sheet of a site, relative to it, with their weights, into buffer (B, 4); returns their number.
-
-    Of each site at most about `most`.
-    """
-    count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
-    taken = 0
-    for i in range(count):
-        s = surface.queue[i]
-        first, last = surface.start[s], surface.start[s + 1]
-        step = 1 + (last - first - 1) // most
-        for p in range(first, last, step):
-            d = subtract(row(surface.points, p), place)
-            w = 1.0 - dot(d, d) / (radius * radius)
-            if w > 0.0 and taken < len(buffer):
-                buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                buffer[taken, 3] = w * w
-                taken += 1
-    return taken
 
 
 @kernel
@@ -146,7 +125,8 @@ def is_folded(surface: Surface, site: int, radius: float, least: float, buffer: 
     """Whether a few points around a site look as if they were folded by an angle of at least `least` [radian]."""
     place = row(surface.mean, site)
     n, c = mean_normal(surface, site, place, radius)
-    taken = gather_points(surface, site, place, radius, FEW, buffer)
+    count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
+    taken = gather_points(surface, count, place, radius, FEW, n, EITHER_SIDE, buffer)
     if taken < 20 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
@@ -196,7 +176,8 @@ def fit_fold(
     n, c = mean_normal(surface, site, place, radius)
     if norm(towards) > 0.0:
         c = unit(cross(towards, n))
-    taken = gather_points(surface, site, place, radius, int(surface.scale[3]), buffer)
+    count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
+    taken = gather_points(surface, count, place, radius, int(surface.scale[3]), n, EITHER_SIDE, buffer)
     if taken < 30 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))

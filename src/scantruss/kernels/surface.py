@@ -117,6 +117,38 @@ def solve(matrix: np.ndarray, size: int) -> bool:
 
 
 @kernel
+def gather_points(
+    surface: Surface,
+    count: int,
+    place: Vector,
+    radius: float,
+    most: int,
+    facing: Vector,
+    least: float,
+    buffer: np.ndarray,
+) -> int:
+    """Points around a place, relative to it, with their weights, into buffer (B, >=4); returns their number.
+
+    Taken are the points of the first `count` sites in surface.queue whose normal has a cosine over `least` to `facing`, of each at most
+    about `most`. They weigh (1 - d^2 / R^2)^2.
+    """
+    taken = 0
+    for i in range(count):
+        s = surface.queue[i]
+        if dot(row(surface.normals, s), facing) > least:
+            first, last = surface.start[s], surface.start[s + 1]
+            step = 1 + (last - first - 1) // most
+            for p in range(first, last, step):
+                d = subtract(row(surface.points, p), place)
+                w = 1.0 - dot(d, d) / (radius * radius)
+                if w > 0.0 and taken < len(buffer):
+                    buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
+                    buffer[taken, 3] = w * w
+                    taken += 1
+    return taken
+
+
+@kernel
 def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
     """Fit the quadric of a patch (one row) to the points around a place, on the sheet of `site`; returns the points used.
 
@@ -135,19 +167,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
         if count < 1:
             count = 1
         buffer = np.empty((most * count, 5))
-        taken = 0
-        for i in range(count):
-            s = surface.queue[i]
-            if dot(row(surface.normals, s), facing) > 0.0:
-                first, last = surface.start[s], surface.start[s + 1]
-                step = 1 + (last - first - 1) // most
-                for p in range(first, last, step):
-                    d = subtract(row(surface.points, p), place)
-                    w = 1.0 - dot(d, d) / (radius * radius)
-                    if w > 0.0 and taken < len(buffer):
-                        buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                        buffer[taken, 3] = w * w
-                        taken += 1
+        taken = gather_points(surface, count, place, radius, most, facing, 0.0, buffer)
         if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]) * local:
             break
         radius *= 1.26
