@@ -8,6 +8,7 @@ from small_clouds import sheet
 
 import scantruss as st
 from scantruss.boundary import find_boundary
+from scantruss.grid.proof import certify
 from scantruss.grid.sheets import faults_on_sheets
 from scantruss.kernels import boundary as kernels
 from scantruss.kernels import normals as facing
@@ -98,3 +99,15 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     slit = (abs(x) < 0.6) & (y < 1.5)
     (fault,) = faults_on_sheets(grid.replace(triangles=grid.triangles[~slit]), sites, 1.0)
     assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5
+
+
+def test_certificates_of_one_scan_can_be_made_side_by_side():
+    """They leave alone what look-ups write to: two threads in one queue had led to nowhere."""
+    settings = st.Settings(length=1.0, effort="quick")
+    cloud = st.PointCloud.from_array(sheet(6, 6, 0.15, seed=3))
+    grid, boundary = grid_from_cloud(cloud, settings), find_boundary(cloud, settings)
+    surface = boundary.sites.surface
+    before = [array.copy() for array in (surface.stamp, surface.queue, surface.counter)]
+    assert certify(grid, boundary, settings).passed
+    for array, kept in zip((surface.stamp, surface.queue, surface.counter), before, strict=True):
+        assert (array == kept).all()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.parts import nearest_nodes
+from ..scan.sites import with_own_scratch
 from .certificate import Fault, place_of
 from .faults import LEFT_OUT
 
@@ -21,7 +22,8 @@ LINKS = 3  #: so many links between such parts are no chance
 
 def faults_on_sheets(grid: Grid, sites: Sites, length: float) -> list[Fault]:
     """Return what is wrong with how a grid covers each sheet of the scan, desired member length given [scan unit]."""
-    surface, nearest = sites.surface, np.empty(len(sites.piece), np.int64)
+    surface = with_own_scratch(sites.surface)  # grids are certified side by side
+    nearest = np.empty(len(sites.piece), np.int64)
     nearest_nodes(surface, sites.boxes, grid.nodes, COVER * length, nearest)
     left = np.flatnonzero((nearest < 0) & np.isin(sites.piece, sites.pieces))
     share = len(left) / max(int(np.isin(sites.piece, sites.pieces).sum()), 1)
