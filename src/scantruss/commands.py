@@ -164,6 +164,8 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed:
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
+    if grid.settings is not None and grid.settings.method != settings.method:
+        bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
     note_strays(bars, cloud, settings)
     return grid
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Literal
@@ -95,7 +96,8 @@ def grid_from_cloud(
     Returns
     -------
     Grid
-        Where no grid with the ridges of the scan passes the checks, one without; its settings say `ridge_angle` 0.
+        Where no grid passes the checks, one without the ridges of the scan or by the paper's method, if that passes; its
+        settings say so: `ridge_angle` 0, `method` "paper".
     """
     started = perf_counter()
     check_length(cloud, settings)
@@ -112,10 +114,11 @@ def grid_from_cloud(
         front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
         before = grid.before or front.quality
     except FrontError as error:
-        if boundary.lines.sharp.any():  # rather a grid without the ridges than none
-            plain = settings.replace(ridge_angle=0.0)
-            grid = grid_from_cloud(cloud, plain, progress=progress, keep_failed=keep_failed)
-            return grid.replace(seconds=grid.seconds | {"total": read_seconds + perf_counter() - started})
+        other = _simpler(boundary, settings)
+        if other is not None:
+            with suppress(FrontError):
+                grid = grid_from_cloud(cloud, other, progress=progress)
+                return grid.replace(seconds=grid.seconds | {"total": read_seconds + perf_counter() - started})
         if not isinstance(error, CertificateError) or not keep_failed or len(error.grid.triangles) == 0:
             raise
         grid, before, advanced = error.grid, error.grid.before, found
@@ -128,6 +131,13 @@ def grid_from_cloud(
         "total": read_seconds + ended - started,
     }
     return grid.replace(settings=settings, before=before, seconds=seconds)
+
+
+def _simpler(boundary: Boundary, settings: Settings) -> Settings | None:
+    """Settings that may lead to a grid where these do not: rather one without ridges, or a less even one, than none."""
+    if boundary.lines.sharp.any():
+        return settings.replace(ridge_angle=0.0)
+    return settings.replace(method="paper") if settings.method == "default" else None
 
 
 def _checked_grid(

@@ -11,6 +11,8 @@ from .rim import Rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
 from .vectors import norm, row, subtract
 
+ASTRAY = 0.5  # a patch that passes a node at this distance is none of its sheet, in lengths
+
 
 @kernel
 def nearest_site(surface: Surface, x: float, y: float, z: float) -> int:
@@ -60,14 +62,19 @@ def seat_nodes(
 def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, begin: int, end: int) -> int:
     """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
 
-    Returns how many.
+    Where the new one passes far from the node it is another sheet's, or follows too few points: the old one is kept. Returns how many.
     """
     count = 0
+    before = np.empty(patches.shape[1])
     for v in range(begin, end):
         if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
+                before[:] = patches[v]
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
+                local = surface.scale[0] * net.desired[v]
+                if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > ASTRAY * local:
+                    patches[v] = before
                 count += 1
     return count
 
