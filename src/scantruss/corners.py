@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from .settings import Settings
@@ -108,7 +110,7 @@ def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) 
     centre = at
     for _ in range(3):
         sides = [
-            _side(curve, centre, sign * np.arange(rounded, reach + 1))
+            _side(curve, centre, tuple(range(sign * rounded, sign * (reach + 1), sign)))
             for sign, reach in zip((-1, 1), reaches, strict=True)
         ]
         place = _meeting(sides[0][0], sides[1][0])
@@ -125,31 +127,47 @@ def _cosine(a: np.ndarray, b: np.ndarray) -> float:
     return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
 
 
-def _side(curve: np.ndarray, at: int, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _side(curve: np.ndarray, at: int, offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """The curve at some steps before or after a place: the better of line and quadratic, and the quadratic.
 
     Returns
     -------
     better, quadratic : (3, 3) coefficients of 1, s, s^2 [steps]
     """
-    places = curve[(at + offsets) % len(curve)]
-    terms = np.vander(offsets.astype(float), 3, increasing=True)
-    quadratic = np.linalg.lstsq(terms, places, rcond=None)[0]
-    line = np.zeros((3, 3))
-    line[:2] = np.linalg.lstsq(terms[:, :2], places, rcond=None)[0]
+    steps, terms, to_quadratic, to_line = _fits(offsets)
+    places = curve[(at + steps) % len(curve)]
+    quadratic, line = to_quadratic @ places, to_line @ places
     error, least = (float(((terms @ found - places) ** 2).sum()) for found in (line, quadratic))
     straight = error < STRAIGHT * least + 1e-6 * float(((places[-1] - places[0]) ** 2).sum())
     return line if straight else quadratic, quadratic
+
+
+@lru_cache(maxsize=256)
+def _fits(offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Least-squares fits at some steps (K,): the steps, terms (K, 3), and what takes places to the coefficients, (3, K) each."""
+    steps = np.array(offsets)
+    terms = np.vander(steps.astype(float), 3, increasing=True)
+    to_line = np.zeros((3, len(steps)))
+    to_line[:2] = np.linalg.pinv(terms[:, :2])
+    return steps, terms, np.linalg.pinv(terms), to_line
 
 
 def _meeting(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Place where two quadratic curves come nearest to each other, near their parameter 0 (Gauss-Newton)."""
     s = t = 0.0
     for _ in range(6):
-        p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
-        slopes = np.stack([before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])], axis=1)
-        change = np.linalg.lstsq(slopes, q - p, rcond=None)[0]
-        s, t = np.clip([s + change[0], t + change[1]], -0.6 / STEP, 0.6 / STEP)
-    p, q = before[0] + s * before[1] + s * s * before[2], after[0] + t * after[1] + t * t * after[2]
-    middle: np.ndarray = 0.5 * (p + q)
+        gap = after[0] + t * after[1] + t * t * after[2] - before[0] - s * before[1] - s * s * before[2]
+        a, b = before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])
+        aa, ab, bb, ag, bg = (float(u @ v) for u, v in ((a, a), (a, b), (b, b), (a, gap), (b, gap)))
+        room = aa * bb - ab * ab
+        if room > 1e-12 * aa * bb:
+            change = (bb * ag - ab * bg) / room, (aa * bg - ab * ag) / room
+        else:  # parallel: half the way each
+            change = 0.5 * ag / max(aa, 1e-300), 0.5 * bg / max(bb, 1e-300)
+        s, t = (min(max(p + c, -0.6 / STEP), 0.6 / STEP) for p, c in zip((s, t), change, strict=True))
+        if max(map(abs, change)) < 1e-9:
+            break
+    middle: np.ndarray = 0.5 * (
+        before[0] + s * before[1] + s * s * before[2] + after[0] + t * after[1] + t * t * after[2]
+    )
     return middle

@@ -15,7 +15,7 @@ from .kernels import boxes as boxing
 from .kernels import front as lists
 from .kernels import gaps
 from .kernels.boxes import new_boxes
-from .kernels.offers import RowNodes, offer_nodes
+from .kernels.offers import RowNodes, add_still_nodes, offer_nodes
 from .kernels.seat import nearest_site
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
@@ -240,18 +240,8 @@ def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> Non
 
 def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
     """Add nodes (K, 3) that stay in place: of the boundary or of lines, each near the one before; returns their numbers."""
-    patch = np.zeros(PATCH)
-    ids: list[int] = []
-    site = int(np.argmin(((surface.mean - nodes[0]) ** 2).sum(axis=1))) if len(nodes) else 0
-    for place in nodes:
-        site = walk(surface, site, tuple(place))
-        if np.linalg.norm(surface.mean[site] - place) > 2.0 * surface.scale[4]:
-            site = int(np.argmin(((surface.mean - place) ** 2).sum(axis=1)))
-        fit_patch(surface, patch, site, tuple(place))
-        normal = patch_normal(patch, tuple(place))
-        ids.append(lists.propose_node(front, tuple(place), normal, int(patch[15]), True))
-        lists.add_node(front)
-    return ids
+    first = add_still_nodes(front, surface, np.ascontiguousarray(nodes))
+    return list(range(first, first + len(nodes)))
 
 
 def add_seed(front: lists.Front, ids: list[int]) -> None:

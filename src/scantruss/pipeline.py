@@ -203,7 +203,7 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     InputError
         The length is larger than the scan, or smaller than about three point spacings.
     """
-    extent = extent_of(cloud)
+    extent = cloud.extent
     spacing = cloud.spacing
     unit = f" {cloud.unit}" if cloud.unit else ""
     if settings.length_field:
@@ -237,21 +237,16 @@ def _check_field(settings: Settings, extent: float, spacing: float) -> None:
         )
 
 
-def extent_of(cloud: PointCloud) -> float:
-    """Longest side of the box around the points [scan unit]."""
-    return float(np.ptp(cloud.points, axis=0).max())
-
-
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
     low = max(SPACINGS * cloud.spacing, GAPS * cloud.gap)
-    return round_length(low, "up"), round_length(extent_of(cloud) / LARGEST, "down")
+    return round_length(low, "up"), round_length(cloud.extent / LARGEST, "down")
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
     low, high = length_range(cloud)
-    wished = max(extent_of(cloud) / USUAL, USUAL_GAPS * cloud.gap)
+    wished = max(cloud.extent / USUAL, USUAL_GAPS * cloud.gap)
     return max(round_length(min(wished, high), "nearest"), low)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from time import perf_counter
 from typing import TYPE_CHECKING, TypeVar
@@ -143,18 +144,21 @@ def _side_by_side(
     """Do the work for each job on all processors; return what came out, in the order of the jobs."""
     done: dict[int, Result] = {}
     ready = is_compiled(advancing.advance, searching.search, landing.land_nodes)
-    with ThreadPoolExecutor(processors() if ready else 1) as pool:  # one thread compiles, others would only wait for it
-        futures = {number: pool.submit(work, *arguments) for number, arguments in jobs.items()}
-        try:
-            for count, (number, future) in enumerate(futures.items(), 1):
-                result = future.result()
-                if result is not None:
-                    done[number] = result
-                if report:
-                    report(count / len(jobs))
-        finally:
-            for future in futures.values():
-                future.cancel()
+    workers = min(processors() if ready else 1, len(jobs))  # one thread compiles, others would only wait for it
+    with ExitStack() as stack:
+        results: Iterable[Result | None]
+        if workers < 2:
+            results = (work(*arguments) for arguments in jobs.values())
+        else:
+            pool = stack.enter_context(ThreadPoolExecutor(workers))
+            futures = [pool.submit(work, *arguments) for arguments in jobs.values()]
+            stack.callback(lambda: [future.cancel() for future in futures])
+            results = (future.result() for future in futures)
+        for count, (number, result) in enumerate(zip(jobs, results, strict=True), 1):
+            if result is not None:
+                done[number] = result
+            if report:
+                report(count / len(jobs))
     return done
 
 

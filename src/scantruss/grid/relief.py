@@ -12,7 +12,7 @@ from ..kernels import grid as kernels
 from ..kernels import seat
 from ..kernels.grid import LOCKED, REST, RIM, Net
 from ..kernels.landing import land_nodes
-from ..kernels.rim import Rim, nearest_on_rim
+from ..kernels.rim import Rim
 from ..kernels.surface import PATCH, Surface
 from ..lines.network import NO_LINES, Lines
 from ..machine import in_parts
@@ -150,17 +150,9 @@ class Relief:
         """
         net, source = open_net(grid)
         rim = Rim(*(np.ascontiguousarray(array) for array in rim))
-        used = net.used
         fixed = np.zeros(len(net.degree), np.bool_)
         fixed[: len(grid.fixed)] = grid.fixed
-        for v in np.flatnonzero((net.is_open[:used] == 1) & (net.kind[:used] == REST)).tolist():
-            curve, arc, distance = nearest_on_rim(rim, *net.nodes[v].tolist())
-            if curve < 0 or distance > 0.5 * length:
-                continue
-            net.curve[v], net.arc[v] = curve, arc
-            at_corner = len(corners) and np.min(((corners - net.nodes[v]) ** 2).sum(axis=1)) <= (1e-6 * length) ** 2
-            if not at_corner and not fixed[v] and net.line[v] == 0:
-                net.kind[v] = RIM
+        seat.seat_on_rim(net, rim, np.ascontiguousarray(corners).reshape(-1, 3), fixed, length)
         sharp = np.zeros(len(rim.total), np.bool_)
         if len(lines.curves):
             find_on_lines(net, lines, len(rim.total), fixed, length)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.parts import nearest_nodes
+from ..kernels.parts import first_torn, nearest_nodes
 from ..scan.sites import with_own_scratch
 from .certificate import Fault, place_of
 from .faults import LEFT_OUT
@@ -49,34 +49,8 @@ def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | No
     nearest : (S,) int64
         Node of each site, -1 for none, as `kernels.parts.nearest_nodes`.
     """
-    links = sites.surface.neighbors
-    other = np.where(links >= 0, nearest[links], -1)
-    site, column = np.nonzero((other > nearest[:, None]) & (nearest[:, None] >= 0))
-    a, b = nearest[site], other[site, column]
-    count = len(grid.nodes)
-    keys, inverse = np.unique(a * count + b, return_inverse=True)
-    apart = ~np.isin(keys, grid.edges[:, 0] * count + grid.edges[:, 1])
-    around = _neighbors(grid) if apart.any() else []
-    for k in np.flatnonzero(apart).tolist():
-        apart[k] = not _are_near(around, int(keys[k]) // count, int(keys[k]) % count)
-    torn = np.flatnonzero(apart[inverse.ravel()])
-    return sites.surface.mean[site[torn[0]]] if len(torn) >= LINKS else None
-
-
-def _neighbors(grid: Grid) -> list[list[int]]:
-    """The nodes at the other end of each node's members."""
-    around: list[list[int]] = [[] for _ in range(len(grid.nodes))]
-    for a, b in grid.edges.tolist():
-        around[a].append(b)
-        around[b].append(a)
-    return around
-
-
-def _are_near(around: list[list[int]], a: int, b: int) -> bool:
-    """Whether fewer than `TORN` members one after the other lead from node a to node b."""
-    reached = {a}
-    for _ in range(TORN - 1):
-        reached |= {n for r in reached for n in around[r]}
-        if b in reached:
-            return True
-    return False
+    pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
+    first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
+    ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
+    site = first_torn(sites.surface.neighbors, nearest, first, ends, TORN - 1, LINKS)
+    return sites.surface.mean[site] if site >= 0 else None

@@ -15,12 +15,15 @@ LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on f
 
 
 @kernel
-def _fit_widest(fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
+def _fit_widest(
+    fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, narrow: np.ndarray, site: int, place: Vector
+) -> int:
     """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off.
 
     Points along one scan line tell nothing of the surface beside it: such a patch is too narrow, however near they lie.
     """
     taken = fit_patch(fine, patch, site, place)
+    narrow[:] = patch
     least = patch[17]
     kept = patch.copy()
     for turn in range(2):
@@ -56,27 +59,30 @@ def land_nodes(
         The same scan with narrow patches, which follow it, and with wider ones, which average its noise.
     patches : (C, PATCH), scratch; column 15 is the site near each node
     fixed : (C,) bool, nodes that stay where they are
-    deviation : (C,), filled with the distance of each node from the narrow patch at its place [scan unit]
+    deviation : (C,), filled with the distance of each node from the narrow patch fitted at its place or close by [scan unit]
     begin, end : the nodes from `begin` to `end` - 1
     """
+    narrow = np.empty(patches.shape[1])
     for v in range(begin, end):
         if net.state[v, DEGREE] == 0:
             continue
+        local, stayed = broad.scale[0] * net.desired[v], False
         for _ in range(2):
             place = row(net.nodes, v)
-            taken = _fit_widest(fine, middle, broad, patches[v], int(patches[v, 15]), place)
+            taken = _fit_widest(fine, middle, broad, patches[v], narrow, int(patches[v, 15]), place)
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)
             if net.state[v, KIND] != INTERIOR:
                 normal = patch_normal(patches[v], foot)
                 foot = along(place, dot(subtract(foot, place), normal), normal)
-            local = broad.scale[0] * net.desired[v]
             if fixed[v] or norm(subtract(foot, place)) > 0.6 * local:
                 break
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
             if norm(subtract(foot, place)) < SETTLED * local:
+                stayed = True
                 break
         place = row(net.nodes, v)
-        fit_patch(fine, patches[v], int(patches[v, 15]), place)
-        deviation[v] = norm(subtract(place, onto_patch(patches[v], place)))
+        if not stayed:
+            fit_patch(fine, narrow, int(patches[v, 15]), place)
+        deviation[v] = norm(subtract(place, onto_patch(narrow, place)))

@@ -1,4 +1,4 @@
-"""Nodes offered to the front before it starts: it comes to them as it does to nodes of its own."""
+"""Nodes that are there before the front starts: those it starts from, and others offered to it, which it comes to as to its own."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from .boxes import search
 from .compile import kernel
 from .front import NEAR, NODES, Front, add_node, propose_node
-from .surface import Surface, walk
+from .seat import nearest_site
+from .surface import PATCH, Surface, fit_patch, patch_normal, walk
 from .triangles import distance_to_segment
 from .vectors import dot, norm, row, subtract
 
@@ -21,6 +22,23 @@ class RowNodes(NamedTuple):
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
     sites: np.ndarray  #: (K,) int64 a site near each
     length: float
+
+
+@kernel
+def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
+    """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
+    patch = np.zeros(PATCH)
+    first, site = front.count[NODES], -1
+    for i in range(len(nodes)):
+        place = row(nodes, i)
+        if site >= 0:
+            site = walk(surface, site, place)
+        if site < 0 or norm(subtract(row(surface.mean, site), place)) > 2.0 * surface.scale[4]:
+            site = nearest_site(surface, place[0], place[1], place[2])
+        fit_patch(surface, patch, site, place)
+        propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)
+        add_node(front)
+    return first
 
 
 @kernel

@@ -6,8 +6,8 @@ import numpy as np
 
 from .compile import kernel
 from .field import length_at
-from .grid import CURVE, DEGREE, INTERIOR, KIND, RIM, Net
-from .rim import Rim, slide
+from .grid import CURVE, DEGREE, INTERIOR, KIND, LINE, OPEN, REST, RIM, Net
+from .rim import Rim, nearest_on_rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
 from .vectors import norm, row, subtract
 
@@ -56,6 +56,24 @@ def seat_nodes(
                     patches[u, 15] = site
                     queue[count] = u
                     count += 1
+
+
+@kernel
+def seat_on_rim(net: Net, rim: Rim, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
+    """Find the place of every boundary node on the curves; those that are no corner (K, 3) and not fixed may slide from there."""
+    for v in range(net.free[-1]):
+        if net.state[v, OPEN] == 0 or net.state[v, KIND] != REST:
+            continue
+        place = row(net.nodes, v)
+        curve, arc, distance = nearest_on_rim(rim, place[0], place[1], place[2])
+        if curve < 0 or distance > 0.5 * length:
+            continue
+        net.state[v, CURVE], net.arc[v] = curve, arc
+        free = not fixed[v] and net.state[v, LINE] == 0
+        for k in range(len(corners)):
+            free = free and norm(subtract(row(corners, k), place)) > 1e-6 * length
+        if free:
+            net.state[v, KIND] = RIM
 
 
 @kernel

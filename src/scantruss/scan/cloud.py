@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
+from ..machine import in_parts, processors
 from ..settings import UNITS
 
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 SAMPLE = 600  # points at which the spacing is measured
 FEW = 200  # points at which the gap is measured
-MOST_PAIRS = 1 << 22  # distances looked at in one go
+PART = 50_000  # fewest points for a thread of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +27,16 @@ class PointCloud:
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
     name: str = ""  #: file the points came from
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest coordinates, (3,) each [scan unit]."""
+        return bounds_of(self.points)
+
+    @property
+    def extent(self) -> float:
+        """Longest side of the box around the points [scan unit]."""
+        return float((self.bounds[1] - self.bounds[0]).max())
 
     @cached_property
     def spacing(self) -> float:
@@ -89,7 +100,7 @@ def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
 def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the finite points with their lower and upper corner; refuse a cloud that is mostly not finite."""
     count = len(array)
-    lower, upper = _corners(array)
+    lower, upper = bounds_of(array)
     if not (np.isfinite(lower).all() and np.isfinite(upper).all()) and count:
         array = array[np.isfinite(array).all(axis=1)]
         if 2 * len(array) < count:
@@ -97,13 +108,13 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
                 f"{said}{count - len(array):,} of {count:,} points have NaN or infinite coordinates;"
                 " at least half must be finite, so check the export of the scan"
             )
-        lower, upper = _corners(array)
+        lower, upper = bounds_of(array)
     if len(array) < 3:
         raise InputError(f"{said}at least 3 points are needed, got {len(array)}")
     return array, lower, upper
 
 
-def _corners(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bounds_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the smallest and largest coordinates, (3,) each; a NaN shows in both."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
@@ -169,14 +180,14 @@ def measure_spacing(points: np.ndarray) -> float:
     if len(points) < 2:
         return 0.0
     sample = points[np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)]
-    lower, upper = _corners(points)
+    lower, upper = bounds_of(points)
     same = 8 * np.finfo(float).eps * float(max(np.abs(lower).max(), np.abs(upper).max()))
     sample, place = np.unique(sample, axis=0, return_inverse=True)
     parts = np.array_split(sample, len(sample) // 500 + 1)
     nearest = np.concatenate([_nearest_of(part, sample, same) for part in parts])
     if len(place) < len(points):
         reach = float(np.linalg.norm(upper - lower))
-        nearest = _refine(points, lower, sample, nearest, np.bincount(place.ravel()), same, reach)
+        nearest = _refine(points, sample, nearest, np.bincount(place.ravel()), same, reach)
     spacing = float(np.median(nearest[place.ravel()]))
     return spacing if math.isfinite(spacing) else 0.0
 
@@ -215,7 +226,6 @@ def _nearest_of(rows: np.ndarray, others: np.ndarray, same: float) -> np.ndarray
 
 def _refine(
     points: np.ndarray,
-    lower: np.ndarray,
     sample: np.ndarray,
     coarse: np.ndarray,
     times: np.ndarray,
@@ -224,7 +234,7 @@ def _refine(
 ) -> np.ndarray:
     """Return the nearest distances of the sample, exact up to their median, in the whole cloud.
 
-    Neighbours are looked for in the 27 search boxes around a point of the sample, whose size grows until more than half
+    Neighbours are looked for in search boxes around the points of the sample, whose size grows until more than half
     of the sample have theirs, each counted as often as it was taken; the others are farther than the median.
     """
     found = np.full(len(sample), math.inf)
@@ -235,59 +245,28 @@ def _refine(
     size = max(size, 4 * same, 1e-12 * reach)
     while 2 * times[np.isfinite(found)].sum() <= times.sum() and size < 4 * reach:
         rows = np.flatnonzero(np.isinf(found))
-        near = _search(points, lower, sample[rows], size, same)
-        done = near <= size
+        near = _search(points, np.ascontiguousarray(sample[rows]), size, same)
+        done = np.isfinite(near)
         found[rows[done]] = near[done]
         size *= 2.0
     return found
 
 
-def _search(points: np.ndarray, lower: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
-    """Return the distance of each point of the sample to the nearest point in its 27 search boxes, inf where none."""
-    step = np.stack(np.meshgrid(*[np.arange(-1, 2)] * 3, indexing="ij"), axis=-1).reshape(27, 3)
-    wanted = _hash(_box(sample, lower, size)[:, None, :] + step)
-    marked = np.zeros(1 << 20, dtype=bool)
-    marked[_slot(wanted)] = True
-    places, keys = [], []
-    for begin in range(0, len(points), 1 << 19):
-        part = points[begin : begin + (1 << 19)]
-        key = _hash(_box(part, lower, size))
-        keep = np.flatnonzero(marked[_slot(key)])
-        places.append(part[keep])
-        keys.append(key[keep])
-    place, key = np.concatenate(places), np.concatenate(keys)
-    order = np.argsort(key, kind="stable")
-    place, key = place[order], key[order]
-    start, stop = np.searchsorted(key, wanted, "left"), np.searchsorted(key, wanted, "right")
-    nearest = np.empty(len(sample))
-    for row in range(len(sample)):
-        nearest[row] = _nearest_in(place, start[row], stop[row], sample[row], same)
+def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
+    """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
+    from ..kernels import spacing
+    from ..kernels.boxes import new_boxes
+    from ..kernels.sites import put_all
+
+    boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.0 * size, len(sample), len(sample))
+    put_all(boxes, sample, np.arange(len(sample)))
+    marked = np.zeros(1 << 16, np.bool_)
+    spacing.mark_around(boxes, sample, marked)
+    squares = np.full((processors(), len(sample)), math.inf)
+
+    def search_part(part: int, begin: int, end: int) -> None:
+        spacing.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
+
+    in_parts(len(points), PART, search_part)
+    nearest: np.ndarray = np.sqrt(squares.min(axis=0))
     return nearest
-
-
-def _nearest_in(place: np.ndarray, start: np.ndarray, stop: np.ndarray, point: np.ndarray, same: float) -> float:
-    """Return the distance of one point to the nearest place in the given ranges that does not coincide."""
-    ranges = [place[a:b] for a, b in zip(start.tolist(), stop.tolist(), strict=True) if a < b]
-    best = math.inf
-    for part in [np.concatenate(ranges)] if sum(map(len, ranges)) < MOST_PAIRS else ranges:
-        squared = ((part - point) ** 2).sum(axis=1)
-        best = min(best, float(squared.min(initial=math.inf, where=squared > same * same)))
-    return math.sqrt(best)
-
-
-def _box(points: np.ndarray, lower: np.ndarray, size: float) -> np.ndarray:
-    """Return the integer search box of each point, (..., 3) int64."""
-    box: np.ndarray = np.floor((points - lower) / size).astype(np.int64)
-    return box
-
-
-def _hash(box: np.ndarray) -> np.ndarray:
-    """Return one number for each box; boxes may share one, which costs time but no neighbour."""
-    mixed: np.ndarray = box[..., 0] * 73856093 + box[..., 1] * 19349663 * 1013 + box[..., 2] * 83492791 * 1000003
-    return mixed
-
-
-def _slot(key: np.ndarray) -> np.ndarray:
-    """Return the place of a key in a table of 2**20."""
-    slot: np.ndarray = (key ^ (key >> 20)) & ((1 << 20) - 1)
-    return slot

@@ -15,7 +15,7 @@ from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
-from .cloud import PointCloud
+from .cloud import PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
 from .strays import find_strays, has_strays
 
@@ -274,7 +274,7 @@ def _link(
 def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, SearchBoxes]:
     """Return the site of each point, the point of each site and the sites by box."""
     owner = np.full(len(points), -1, np.int64)
-    lower, upper = points.min(axis=0), points.max(axis=0)
+    lower, upper = bounds_of(points)
     capacity, begin, count = 1 << 14, 0, 0
     chosen = np.full(capacity, -1, np.int64)
     boxes = new_boxes(lower, upper, 4.0 * radius, capacity, capacity)
