@@ -129,7 +129,7 @@ def test_normals_agree_with_those_of_numpy(seed):
     neighbors = np.full((13, 12), -1, np.int64)
     neighbors[0], neighbors[1, :5] = np.arange(1, 13), [0, 2, 3, 4, 5]
     normals, thickness = np.empty((13, 3)), np.empty(13)
-    site_normals(mean, neighbors, normals, thickness)
+    site_normals(mean, neighbors, normals, thickness, 0, len(mean))
     for s, ring in ((0, list(range(13))), (1, [1, 0, 2, 3, 4, 5])):
         expected = naive.plane_normal(mean[ring])
         assert abs(normals[s] @ expected) == pytest.approx(1, abs=1e-6)
@@ -198,7 +198,7 @@ def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed):
     surface = small_ball()
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(surface.mean))
     normals = surface.normals * signs[:, None]
-    weights = np.empty(surface.neighbors.shape)
+    weights = np.empty(surface.neighbors.shape, np.uint16)
     link_weights(surface.mean, normals, surface.neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((surface.neighbors >= 0).sum())]
     piece = np.empty(len(signs), np.int64)
@@ -210,14 +210,16 @@ def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed):
 
 
 @pytest.mark.kernels
-def test_link_weights_are_0_between_mirrored_normals_and_2_without_a_link():
+def test_link_weights_are_0_between_mirrored_normals_and_most_without_a_link():
     """Two places of a circle: each normal is the other one mirrored at the plane half-way, however far apart they are."""
     angle = np.radians([0.0, 70.0])
     mean = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    weights = np.empty((2, 2))
+    weights = np.empty((2, 2), np.uint16)
     link_weights(mean, mean.copy(), np.array([[1, -1], [0, -1]]), weights)
-    assert weights[:, 0] == pytest.approx(0, abs=1e-12)
-    assert (weights[:, 1] == 2).all()
+    assert weights[:, 0].max() == 0
+    assert (weights[:, 1] == 65535).all()
+    link_weights(mean, np.array([[1.0, 0, 0], [0, 0, 1]]), np.array([[1, -1], [0, -1]]), weights)
+    assert weights[:, 0].min() == 60000  # at right angles, mirrored or not
 
 
 @pytest.mark.kernels

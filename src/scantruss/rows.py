@@ -13,11 +13,11 @@ from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
 
-APART = 0.4  # distance of the posts, in member lengths
+APART = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
 FEWEST = 12  # posts of the coarsest level
 LINKS = 12  # links of a post
-PASSES = 6  # of smoothing, on each level
+PASSES = 3  # of smoothing, on each level
 WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
 CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
 DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths

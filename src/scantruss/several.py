@@ -44,6 +44,7 @@ SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desi
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
 }
 FINALISTS = {"quick": 1, "normal": 1, "best": 3}  # grids that are improved to the end
+SMALL = 600.0  # area, in squares of the desired length, up to which `normal` tries all its rows: the rim decides there
 BATCHES = 2  # of finalists, where none of the first passes
 
 
@@ -69,6 +70,8 @@ def several_grids(
         No front has led to a grid that passes; the fault of the best.
     """
     ways, finalists = WAYS[settings.effort], FINALISTS[settings.effort]
+    if settings.effort == "normal" and boundary.sites.graded_area > SMALL * settings.length**2:
+        ways = ways[:1]
     graded = boundary.sites.graded
     if graded:
         ways = tuple(Rows(scale=scale) for scale in SCALES[settings.effort])

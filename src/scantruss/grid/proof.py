@@ -5,6 +5,7 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -61,11 +62,16 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         return replace(told, faults=(Fault("empty", "has no triangles"),))
     if not np.isfinite(grid.nodes).all():
         return replace(told, faults=(Fault("empty", "has nodes that are nowhere"),))
-    cuts = find_crossings(grid.nodes, grid.triangles)
-    told = replace(told, crossings=len(cuts), **_cover(grid, boundary, settings.length), **_extremes(grid, settings))
+    with ThreadPoolExecutor(2) as pool:  # mostly kernels
+        crossing = pool.submit(find_crossings, grid.nodes, grid.triangles)
+        reaching = pool.submit(_cover, grid, boundary, settings.length)
+        on_sheets = pool.submit(faults_on_sheets, grid, boundary.sites, settings.length)
+        extremes = _extremes(grid, settings)
+    cuts = crossing.result()
+    told = replace(told, crossings=len(cuts), **reaching.result(), **extremes)
     faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
     known = {fault.kind for fault in faults}
-    faults += [f for f in faults_on_sheets(grid, boundary.sites, settings.length) if f.kind not in known]
+    faults += [f for f in on_sheets.result() if f.kind not in known]
     return replace(told, faults=tuple(faults))
 
 

@@ -36,8 +36,8 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 
 @kernel
-def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray) -> None:
-    """For each site, a direction in which a disc that touches it would be empty, or 9 where there is none.
+def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
+    """For each site from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
 
     Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
     the middle of the widest free range, counted from `across(normal)`.
@@ -45,7 +45,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
     blocked = np.zeros(DIRECTIONS, np.bool_)
     angles = np.empty(surface.neighbors.shape[1])
     noise = 0.2 * surface.scale[0]
-    for s in range(len(surface.mean)):
+    for s in range(begin, end):
         free[s] = 9.0
         normal, place = row(surface.normals, s), row(surface.mean, s)
         u = across(normal)

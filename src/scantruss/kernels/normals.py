@@ -39,9 +39,14 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
 
 
 @kernel
-def site_normals(mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray) -> None:
-    """Normal of the least-squares plane of each site and its neighbours, and their rms distance from it; sign not settled yet."""
-    for s in range(len(mean)):
+def site_normals(
+    mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray, begin: int, end: int
+) -> None:
+    """Normal of the least-squares plane of each site from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
+
+    The sign is not settled yet.
+    """
+    for s in range(begin, end):
         v, thickness[s] = _plane_at(mean, neighbors, s)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
 
@@ -132,18 +137,18 @@ def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
 
 @kernel
 def link_weights(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray) -> None:
-    """How much the normals of neighbours disagree when one is mirrored to the other, 0 (agree) to 1; (S, K), 2 = no link.
+    """How much the normals of neighbours disagree when one is mirrored to the other, 0 (agree) to 60,000; (S, K) uint16, 65,535 = no link.
 
     Mirroring at the plane half-way follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
     """
     for s in range(len(mean)):
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
-            weights[s, k] = 2.0
+            weights[s, k] = 65535
             if n >= 0:
                 e = unit(subtract(row(mean, n), row(mean, s)))
                 a, b = row(normals, s), row(normals, n)
-                weights[s, k] = 1.0 - abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b))
+                weights[s, k] = int(60000.0 * max(1.0 - abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b)), 0.0))
 
 
 @kernel

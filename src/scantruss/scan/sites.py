@@ -177,7 +177,7 @@ def _prepare(
         neighbors, normals, thickness = _link(mean, mean, boxes, length, radius, spacing)
     facing.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
     facing.cut_steep_links(mean, normals, neighbors, STEEP)
-    weights = np.empty(neighbors.shape)
+    weights = np.empty(neighbors.shape, np.uint16)  # few values are sorted faster
     facing.link_weights(mean, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
@@ -267,7 +267,9 @@ def _link(
     )
     kernels.link_back(place, neighbors)
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
-    facing.site_normals(mean, neighbors, normals, thickness)
+    in_parts(
+        len(mean), 3000, lambda _, begin, end: facing.site_normals(mean, neighbors, normals, thickness, begin, end)
+    )
     return neighbors, normals, thickness
 
 
