@@ -18,8 +18,10 @@ from ..settings import Settings
 from .cloud import PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
 from .strays import find_strays, has_strays
+from .streamline import is_dense, streamlined
 
 NEIGHBORS = 12  # links of a site
+FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
 STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
@@ -151,19 +153,22 @@ def _prepare(
     measured: int | None = None,
 ) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
+    whole, size = points, FINE * radius if measured is None else 0.0
+    points = _fewer(whole, size, spacing)
     found = _linked(points, radius, length, spacing)
     strays = 0
     if stray_distance and has_strays(found.neighbors):
-        stray = find_strays(points, stray_distance, length)
+        stray = find_strays(whole, stray_distance, length)
         strays = int(stray.sum())
         if strays:
-            points = np.ascontiguousarray(points[~stray])
+            whole = np.ascontiguousarray(whole[~stray])
+            points = _fewer(whole, size, spacing)
             found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
     if _is_rough(found, SHEETS * length):
-        fine = _linked_finer(points, radius, length, spacing)
+        fine = _linked_finer(whole, radius, length, spacing)
         if fine is not None:
-            found, radius = fine
+            points, (found, radius) = whole, fine
     measured = len(found.chosen) if measured is None else int((found.chosen < measured).sum())
     owner, _, boxes, mean, neighbors, normals, thickness = found
     grouped, start, _ = _group(points, owner, len(mean))
@@ -206,6 +211,11 @@ def _prepare(
     large = _large_pieces(piece, area, graded, length)
     total, scaled = float(area.sum()), float(graded.sum())
     return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured)
+
+
+def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
+    """Return one point of each box of a size where they lie much denser, else all."""
+    return points[streamlined(points, size)] if is_dense(spacing, size) else points
 
 
 class _Linked(NamedTuple):

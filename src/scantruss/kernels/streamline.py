@@ -1,0 +1,42 @@
+"""One point of each search box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .boxes import SearchBoxes, box_index, slot_of
+from .compile import kernel
+
+
+@kernel
+def choose_first(
+    points: np.ndarray, boxes: SearchBoxes, among: np.ndarray, chosen: np.ndarray, begin: int, count: int
+) -> tuple[int, int]:
+    """Choose the first of the points `among` (M,) in each box that is not taken yet.
+
+    Parameters
+    ----------
+    points : (N, 3)
+    boxes : SearchBoxes, of which only the keys are used
+    chosen : (capacity,) int64, filled with the points
+    begin, count : where to go on in `among`, and the points so far
+
+    Returns
+    -------
+    begin, count : begin < M where `chosen` is full
+    """
+    for m in range(begin, len(among)):
+        p = among[m]
+        i, j, k = (
+            box_index(boxes, 0, points[p, 0]),
+            box_index(boxes, 1, points[p, 1]),
+            box_index(boxes, 2, points[p, 2]),
+        )
+        slot = slot_of(boxes, i, j, k)
+        if boxes.keys[slot] == -1:
+            if count == len(chosen):
+                return m, count
+            boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
+            chosen[count] = p
+            count += 1
+    return len(among), count

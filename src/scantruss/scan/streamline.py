@@ -1,0 +1,66 @@
+"""Streamlining: of a scan much denser than the grid needs, one point in each small search box (Sec. 2 leaves that to the scanner).
+
+Nodes come down on patches of some hundred points. What lies denser than that is not looked at; where the scan is sparse every
+point stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels import streamline as kernels
+from ..kernels.boxes import new_boxes
+from ..machine import in_parts, processors
+from .cloud import bounds_of
+
+DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
+PART = 200_000  # fewest points for a thread of their own
+ROOM = 1 << 16  # boxes that the first table has room for
+
+
+def is_dense(spacing: float, size: float) -> bool:
+    """Whether so many points lie in a box of this size that one of them serves as well."""
+    return 0.0 < spacing < DENSE * size
+
+
+def streamlined(points: np.ndarray, size: float) -> np.ndarray:
+    """Return the first point in each occupied search box, in their order.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 [scan unit]
+    size : about the distance of the points that stay [scan unit]
+
+    Returns
+    -------
+    (K,) int64
+        Which points stay; the same for any number of processors.
+    """
+    lower, upper = bounds_of(points)
+    parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
+
+    def choose(part: int, begin: int, end: int) -> None:
+        parts[part] = _first_of_boxes(points, lower, upper, size, np.arange(begin, end))
+
+    in_parts(len(points), PART, choose)
+    found = [part for part in parts if len(part)]
+    if len(found) == 1:
+        return found[0]
+    return _first_of_boxes(points, lower, upper, size, np.concatenate(found))
+
+
+def _first_of_boxes(
+    points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, among: np.ndarray
+) -> np.ndarray:
+    """The first in each box of the points `among` (M,)."""
+    room, begin, count = ROOM, 0, 0
+    chosen = np.empty(room, np.int64)
+    boxes = new_boxes(lower, upper, size, 0, room)
+    while True:
+        begin, count = kernels.choose_first(points, boxes, among, chosen, begin, count)
+        if begin == len(among):
+            return chosen[:count].copy()
+        room *= 4
+        chosen = np.concatenate([chosen[:count], np.empty(room - count, np.int64)])
+        boxes = new_boxes(lower, upper, size, 0, room)
+        kernels.choose_first(points, boxes, chosen[:count].copy(), chosen, 0, 0)
