@@ -29,6 +29,7 @@ PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 KICKS = {"quick": (0, 0.0), "normal": (3, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
+MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once
 HOT = 0.8  # part of the rounds in which they may cost anything
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
@@ -118,6 +119,8 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
     For `best` it may cost a little at first and less and less later on (simulated annealing).
     """
     rounds, heat = KICKS[effort]
+    if effort == "normal" and relief.net.used > MANY:
+        rounds = 1
     scratch, area = new_scratch(relief), new_area(relief)
     for done in range(rounds):
         if progress:

@@ -10,23 +10,23 @@ from .compile import kernel
 
 @kernel
 def choose_first(
-    points: np.ndarray, boxes: SearchBoxes, among: np.ndarray, chosen: np.ndarray, begin: int, count: int
+    points: np.ndarray, boxes: SearchBoxes, among: np.ndarray, chosen: np.ndarray, begin: int, end: int, count: int
 ) -> tuple[int, int]:
-    """Choose the first of the points `among` (M,) in each box that is not taken yet.
+    """Choose the first of the points `among` (M,), of those before `end` where M is 0, in each box that is not taken yet.
 
     Parameters
     ----------
     points : (N, 3)
     boxes : SearchBoxes, of which only the keys are used
     chosen : (capacity,) int64, filled with the points
-    begin, count : where to go on in `among`, and the points so far
+    begin, end, count : where to go on and to stop in `among`, and the points so far
 
     Returns
     -------
-    begin, count : begin < M where `chosen` is full
+    begin, count : begin < end where `chosen` is full
     """
-    for m in range(begin, len(among)):
-        p = among[m]
+    for m in range(begin, end):
+        p = among[m] if len(among) > 0 else m
         i, j, k = (
             box_index(boxes, 0, points[p, 0]),
             box_index(boxes, 1, points[p, 1]),
@@ -39,4 +39,4 @@ def choose_first(
             boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
             chosen[count] = p
             count += 1
-    return len(among), count
+    return end, count

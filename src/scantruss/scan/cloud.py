@@ -15,6 +15,7 @@ from ..settings import UNITS
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 SAMPLE = 600  # points at which the spacing is measured
 FEW = 200  # points at which the gap is measured
+BLOCK = 1 << 14  # points looked at in one go
 PART = 50_000  # fewest points for a thread of their own
 
 
@@ -78,7 +79,8 @@ class PointCloud:
         clean, lower, upper = _drop_not_finite(array, said)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
-        moved = np.subtract(clean, origin, order="C")
+        moved = np.empty(clean.shape)
+        in_parts(len(clean), PART, lambda _, begin, end: np.subtract(clean[begin:end], origin, out=moved[begin:end]))
         _check_not_on_a_line(moved, extent, said)
         return cls(points=moved, origin=origin, unit=unit, dropped=len(array) - len(clean), name=name)
 
@@ -118,10 +120,18 @@ def bounds_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the smallest and largest coordinates, (3,) each; a NaN shows in both."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
-    return (
-        np.array([array[:, axis].min() for axis in range(3)]),
-        np.array([array[:, axis].max() for axis in range(3)]),
-    )
+    found = np.empty((processors(), 2, 3))
+    found[:, 0], found[:, 1] = math.inf, -math.inf
+
+    def look(part: int, begin: int, end: int) -> None:
+        for at in range(begin, end, BLOCK):  # a block at a time stays in the cache
+            block = array[at : min(at + BLOCK, end)]
+            for axis in range(3):
+                found[part, 0, axis] = np.minimum(found[part, 0, axis], block[:, axis].min())
+                found[part, 1, axis] = np.maximum(found[part, 1, axis], block[:, axis].max())
+
+    in_parts(len(array), PART, look)
+    return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
 def _check_extent(lower: np.ndarray, upper: np.ndarray, said: str) -> float:

@@ -15,6 +15,7 @@ from .cloud import bounds_of
 
 DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
 PART = 200_000  # fewest points for a thread of their own
+ALL = np.zeros(0, np.int64)  # stands for all points
 ROOM = 1 << 16  # boxes that the first table has room for
 
 
@@ -40,27 +41,28 @@ def streamlined(points: np.ndarray, size: float) -> np.ndarray:
     parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
 
     def choose(part: int, begin: int, end: int) -> None:
-        parts[part] = _first_of_boxes(points, lower, upper, size, np.arange(begin, end))
+        parts[part] = _first_of_boxes(points, lower, upper, size, ALL, begin, end)
 
     in_parts(len(points), PART, choose)
     found = [part for part in parts if len(part)]
     if len(found) == 1:
         return found[0]
-    return _first_of_boxes(points, lower, upper, size, np.concatenate(found))
+    both = np.concatenate(found)
+    return _first_of_boxes(points, lower, upper, size, both, 0, len(both))
 
 
 def _first_of_boxes(
-    points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, among: np.ndarray
+    points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, among: np.ndarray, begin: int, end: int
 ) -> np.ndarray:
-    """The first in each box of the points `among` (M,)."""
-    room, begin, count = ROOM, 0, 0
+    """The first in each box of the points `among` (M,) from `begin` to `end` - 1."""
+    room, count = ROOM, 0
     chosen = np.empty(room, np.int64)
     boxes = new_boxes(lower, upper, size, 0, room)
     while True:
-        begin, count = kernels.choose_first(points, boxes, among, chosen, begin, count)
-        if begin == len(among):
+        begin, count = kernels.choose_first(points, boxes, among, chosen, begin, end, count)
+        if begin == end:
             return chosen[:count].copy()
         room *= 4
         chosen = np.concatenate([chosen[:count], np.empty(room - count, np.int64)])
         boxes = new_boxes(lower, upper, size, 0, room)
-        kernels.choose_first(points, boxes, chosen[:count].copy(), chosen, 0, 0)
+        kernels.choose_first(points, boxes, chosen[:count].copy(), chosen, 0, count, 0)

@@ -1,0 +1,66 @@
+"""One point of each small box where a scan is much denser than its grid needs."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st_
+from shapes import make
+
+import scantruss as st
+from scantruss import machine
+from scantruss.scan import streamline
+from scantruss.scan.sites import prepare_sites
+from scantruss.scan.streamline import is_dense, streamlined
+
+
+def slow(points, size):
+    """The first point of each box, by a dictionary; boxes as search boxes divide the extent."""
+    lower, extent = points.min(axis=0), np.ptp(points, axis=0)
+    step = np.where(extent > 0.5 * size, extent / np.maximum(np.ceil(extent / size), 1), size)
+    first = {}
+    for number, box in enumerate(np.floor((points - lower) / step).astype(int).tolist()):
+        first.setdefault(tuple(box), number)
+    return sorted(first.values())
+
+
+@pytest.mark.kernels
+@given(st_.integers(0, 1000), st_.sampled_from([0.2, 0.5, 3.0]))
+@settings(max_examples=10)
+def test_the_first_point_of_each_box_stays(seed, size):
+    points = np.random.default_rng(seed).uniform(0, 4, (400, 3)) * [1.0, 0.7, 0.01]
+    assert streamlined(points, size).tolist() == slow(points, size)
+
+
+@pytest.mark.parametrize("room", [1, 64, 1 << 16])
+def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
+    points = np.random.default_rng(7).uniform(0, 1, (3000, 3))
+    monkeypatch.setattr(streamline, "PART", 500)
+    monkeypatch.setattr(streamline, "ROOM", room)
+    found = []
+    for count in (1, 2, 5):
+        monkeypatch.setattr(machine, "processors", lambda count=count: count)
+        monkeypatch.setattr(streamline, "processors", lambda count=count: count)
+        found.append(streamlined(points, 0.1).tolist())
+    assert found[0] == found[1] == found[2] == slow(points, 0.1)
+
+
+def test_a_scan_as_dense_as_its_patches_need_is_taken_whole():
+    assert not is_dense(0.5, 1.0) and is_dense(0.3, 1.0) and not is_dense(0.0, 1.0)
+    shape = make("cloth", 20_000, seed=0)
+    sites = prepare_sites(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
+    assert len(sites.surface.points) == 20_000
+
+
+def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
+    """Eight times as many points as patches take: fewer are kept, corners, rim and surface are as true."""
+    shape = make("l_plate", 300_000, seed=2)
+    settings = st.Settings(length=1.5 * shape.length, effort="quick")
+    cloud = st.PointCloud.from_array(shape.points)
+    sites = prepare_sites(cloud, settings)
+    assert len(sites.surface.points) < 100_000
+    grid = st.grid_from_points(shape.points, settings)
+    assert (grid.topology.boundary_loops, grid.topology.euler) == (len(shape.loops), shape.euler)
+    nodes = grid.nodes + grid.origin
+    assert shape.distance(nodes).max() < 0.02 * settings.length
+    for corner in shape.corners:
+        assert np.linalg.norm(nodes - corner, axis=1).min() < 0.05 * settings.length
