@@ -12,13 +12,14 @@ from ..errors import InputError
 from ..kernels import normals as facing
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
+from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
 from .strays import find_strays, has_strays
-from .streamline import is_dense, streamlined
+from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
@@ -46,6 +47,7 @@ class Sites:
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
+    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
 
     @property
     def graded(self) -> bool:
@@ -92,7 +94,7 @@ def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Set
     both = np.concatenate([points, added])
     wish = wish_of(settings, cloud.origin)
     prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, wish, len(points))
-    return replace(prepared, strays=sites.strays)
+    return replace(prepared, strays=sites.strays, whole=sites.whole)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -108,6 +110,19 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     if np.isfinite(points):  # so many points, whatever the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
     return surface._replace(scale=scale)
+
+
+def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
+    """Return the surface with all points near some sites (R,), where it has only some of them: those of the rim tell where it is."""
+    if sites.whole is None or len(rim) == 0:
+        return surface
+    near = sites.whole[points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1])]
+    owner = np.empty(len(near), np.int64)
+    nearest_places(near, sites.boxes, surface.mean, 2.0 * surface.scale[1], owner)
+    owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
+    points = np.concatenate([surface.points, near[owner >= 0]])
+    grouped, start, _ = _group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
+    return surface._replace(points=grouped, start=start)
 
 
 def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
@@ -210,7 +225,8 @@ def _prepare(
     graded = area / surface.field**2
     large = _large_pieces(piece, area, graded, length)
     total, scaled = float(area.sum()), float(graded.sum())
-    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured)
+    dense = whole if len(points) < len(whole) else None
+    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured, dense)
 
 
 def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
