@@ -1,4 +1,4 @@
-"""Points of a text file (XYZ, TXT, CSV, PTS, ASC): by numpy where it can, line by line where it cannot."""
+"""Points of a text file (XYZ, TXT, CSV, PTS, ASC): by a compiled loop or numpy where they can, line by line where they cannot."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import FormatError
 from .content import Content
 from .layout import ANY, MISSING, NUMBER, NUMBER_COMMA, Layout, find_layout, is_number, split_line
+from .lines import LARGE, read_regular
 
 
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -39,7 +40,11 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
     """Return the columns of a regular file; ValueError where it is not."""
-    if layout.separator == ANY or _holds(path, b".#"):
+    if layout.separator == ANY:
+        raise ValueError
+    if path.stat().st_size > LARGE and (rows := read_regular(path, layout, columns)) is not None:
+        return rows
+    if _holds(path, b".#"):
         raise ValueError
     source: Path | StringIO = path
     if layout.comma:
