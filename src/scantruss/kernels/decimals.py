@@ -135,7 +135,7 @@ def read_rows(
                 i = end
                 seen += 1
             while i < stop and data[i] != 10 and data[i] != separator:
-                if data[i] == 35 or data[i] == 13 and (i + 1 >= stop or data[i + 1] != 10):
+                if data[i] == 35 or (data[i] == 13 and (i + 1 >= stop or data[i + 1] != 10)):
                     return -1, 0
                 if separator == 0 and (data[i] == 32 or data[i] == 9):
                     break

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import FormatError
 from .content import Content, find_attributes
 from .kinds import read_head, unreadable, wrong_kind
+from .packed import check_size
 from .units import metres_of
 
 
@@ -39,12 +40,15 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
     held = []
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            check_size(path, sum(member.file_size for member in arrays.zip.infolist()))
             for name in arrays.files:
                 array = _member(arrays, name)
                 content = _content(array, wanted) if array is not None else None
                 if content is not None:
                     return replace(content, metres=_metres(arrays))
                 held.append(f"{name} {'' if array is None else array.shape}".strip())
+    except FormatError:
+        raise
     except Exception as error:  # a damaged archive ends in many ways
         raise unreadable(path, "NPZ", error) from None
     raise FormatError(f"{path} must hold an array of shape (N, 3) or wider, got {', '.join(held)[:200] or 'none'}")

@@ -12,6 +12,7 @@ from ..errors import FormatError
 from .content import Content
 from .heights import look_like_feet
 from .kinds import read_head, unreadable, wrong_kind
+from .las_header import check_header
 from .systems import System, system_of
 
 CHUNK = 1_000_000  # points
@@ -23,6 +24,7 @@ def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
+    check_header(path)
     names = [name for name in dict.fromkeys([*wanted, "return_count"]) if name in FIELDS]
     points, columns = np.empty((0, 3)), [np.empty(0)] * len(names)
     try:

@@ -39,16 +39,19 @@ def unpacked(path: Path) -> Iterator[Path]:
 
 
 def _unpack(path: Path, inner: Path) -> None:
-    most = max(ALWAYS, MOST_SHRUNK * path.stat().st_size)
     try:
         with gzip.open(path) as source, inner.open("wb") as target:
             size = 0
             while block := source.read(BLOCK):
                 size += len(block)
-                if size > most:
-                    raise FormatError(
-                        f"{path} unpacks to over {most:,} bytes, which no scan of its size does; unpack it yourself"
-                    )
+                check_size(path, size)
                 target.write(block)
     except (EOFError, zlib.error, gzip.BadGzipFile) as error:
         raise FormatError(f"{path} cannot be unpacked ({' '.join(str(error).split())}); copy it again") from None
+
+
+def check_size(path: Path, size: int) -> None:
+    """Refuse a packed file that unpacks to so many bytes as no scan would."""
+    most = max(ALWAYS, MOST_SHRUNK * path.stat().st_size)
+    if size > most:
+        raise FormatError(f"{path} unpacks to over {most:,} bytes, which no scan of its size does; unpack it yourself")
