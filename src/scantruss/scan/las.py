@@ -24,14 +24,16 @@ def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
-    check_header(path)
     names = [name for name in dict.fromkeys([*wanted, "return_count"]) if name in FIELDS]
     points, columns = np.empty((0, 3)), [np.empty(0)] * len(names)
     try:
+        check_header(path)
         promised, system, chunks = _read(path, names)
         if chunks:
             points = np.concatenate([chunk[0] for chunk in chunks])
             columns = [np.concatenate([chunk[1 + i] for chunk in chunks]) for i in range(len(names))]
+    except FormatError:
+        raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
     if len(points) < promised:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from ..errors import FormatError
 
 LEAST_HEADER = 227  # bytes, of LAS 1.0 to 1.2
 HEADER_14 = 375
+LASZIP = 22204  # number of the record that describes how points are packed
+ONES = (1 << 64) - 1
 RECORD, EXTENDED = 54, 60  # bytes of the header of a variable length record, and of an extended one
 
 
@@ -41,6 +44,54 @@ def check_header(path: Path) -> None:
                     raise FormatError(
                         f"{path} ends early: its LAS header promises records behind its end; copy it again"
                     )
+        if form & 0xC0:
+            _check_packed(path, size, length, records, start, width)
     held = (size - start) // max(width, 1)
     if form < 64 and count > held:
         raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
+
+
+def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int) -> None:
+    """Refuse packed points whose chunks are more or larger than the file."""
+    import lazrs
+
+    early = FormatError(f"{path} ends early: the table of its packed points is not whole; copy it again")
+    with path.open("rb") as file:
+        described = _find_record(file, length, records, LASZIP)
+        file.seek(start)
+        words = file.read(8)
+        table = struct.unpack("<Q", words)[0] if len(words) == 8 else 0
+        if table == ONES:  # a writer that could not go back wrote it at the end
+            file.seek(size - 8)
+            table = struct.unpack("<Q", file.read(8))[0]
+        if len(described) < 34 or not start + 8 <= table <= size - 8:
+            raise early
+        _, items = struct.unpack_from("<qH", described, 24)
+        sizes = [
+            struct.unpack_from("<H", described, 36 + 6 * i)[0] for i in range(items) if 40 + 6 * i <= len(described)
+        ]
+        if sum(sizes) != width or len(sizes) != items:
+            raise FormatError(
+                f"{path}: its packed points do not have the {width} bytes of its header; the file is damaged"
+            )
+        file.seek(table)
+        _, chunks = struct.unpack("<II", file.read(8))
+        if chunks * max(width, 1) > table - start:
+            raise early
+        file.seek(start)
+        if sum(entry[1] for entry in lazrs.read_chunk_table(file, lazrs.LazVlr(described))) > table - start:
+            raise early
+
+
+def _find_record(file: BinaryIO, place: int, records: int, number: int) -> bytes:
+    """Return what a variable length record holds; nothing where there is none."""
+    for _ in range(records):
+        file.seek(place)
+        entry = file.read(RECORD)
+        if len(entry) < RECORD:
+            return b""
+        found, long = struct.unpack_from("<HH", entry, 18)
+        if found == number:
+            return file.read(long)
+        place += RECORD + long
+    return b""

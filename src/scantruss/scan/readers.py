@@ -125,7 +125,8 @@ def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
             known = " ".join(sorted(READERS))
             raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
         try:
-            return reader(inner, wanted)
+            with np.errstate(all="ignore"):  # what is not finite is counted and left out later
+                return reader(inner, wanted)
         except OSError as error:
             raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
         except MemoryError:
