@@ -67,10 +67,8 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
         if len(described) < 34 or not start + 8 <= table <= size - 8:
             raise early
         _, items = struct.unpack_from("<qH", described, 24)
-        sizes = [
-            struct.unpack_from("<H", described, 36 + 6 * i)[0] for i in range(items) if 40 + 6 * i <= len(described)
-        ]
-        if sum(sizes) != width or len(sizes) != items:
+        parts = [struct.unpack_from("<HH", described, 34 + 6 * i) for i in range(items) if 40 + 6 * i <= len(described)]
+        if sum(part[1] for part in parts) != width or len(parts) != items:
             raise FormatError(
                 f"{path}: its packed points do not have the {width} bytes of its header; the file is damaged"
             )
@@ -79,8 +77,15 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
         if chunks * max(width, 1) > table - start:
             raise early
         file.seek(start)
-        if sum(entry[1] for entry in lazrs.read_chunk_table(file, lazrs.LazVlr(described))) > table - start:
-            raise early
+        lengths = [entry[1] for entry in lazrs.read_chunk_table(file, lazrs.LazVlr(described))]
+        layers = sum({10: 9, 11: 1, 12: 2, 13: 1, 14: long}.get(kind, 0) for kind, long in parts)
+        place = start + 8
+        for long in lengths:
+            file.seek(place + width + 4)
+            told = np.frombuffer(file.read(4 * layers), dtype="<u4")
+            place += long
+            if place > table or len(told) < layers or int(told.sum(dtype=np.int64)) > long:
+                raise early
 
 
 def _find_record(file: BinaryIO, place: int, records: int, number: int) -> bytes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from .layout import Layout
 
 LARGE = 1 << 23  # bytes of a file for which it is worth loading the compiled loop
 BLOCK = 1 << 24  # bytes
+LONGEST = 1 << 20  # bytes of a line
 MOST_SLOW = 1 << 16  # numbers of a block that Python rounds; of more, numpy is as fast
 
 
@@ -37,23 +37,17 @@ def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int 
     tables = []
     with path.open("rb") as file:
         for _ in range(layout.skip):
-            if not file.readline(block).endswith(b"\n"):
+            if not file.readline(LONGEST).endswith(b"\n"):
                 return None
-        while (lines := _whole_lines(file, block)) is not None:
-            table = _read_block(lines, separator, layout.comma, place, len(columns))
+        while raw := bytearray(file.read(block)):
+            rest = file.readline(LONGEST)
+            raw += rest
+            data = np.frombuffer(raw, dtype=np.uint8)
+            table = _read_block(data, separator, layout.comma, place, len(columns)) if len(rest) < LONGEST else None
             if table is None:
                 return None
             tables.append(table)
     return np.concatenate(tables) if tables else None
-
-
-def _whole_lines(file: BinaryIO, block: int) -> np.ndarray | None:
-    """Return the next lines, (N,) uint8; None behind the last."""
-    raw = bytearray(file.read(block))
-    if not raw:
-        return None
-    raw += file.readline(block)
-    return np.frombuffer(raw, dtype=np.uint8)
 
 
 def _read_block(data: np.ndarray, separator: int, comma: bool, place: np.ndarray, width: int) -> np.ndarray | None:

@@ -86,7 +86,7 @@ def _read_header(path: Path) -> Header:
         place = [float(word) for word in words.get("VIEWPOINT", [])]
     except (KeyError, ValueError, IndexError):
         raise FormatError(f"{path}: cannot understand its PCD header; export it again") from None
-    if not len(names) == len(types) == len(counts) or min([*counts, points]) < 0 or sum(counts) > 10_000:
+    if not len(names) == len(types) == len(counts) or min([*counts, 1]) < 1 or points < 0 or sum(counts) > 10_000:
         raise FormatError(f"{path}: SIZE, TYPE and COUNT of its PCD header must fit FIELDS; export it again")
     if "WIDTH" in words and area != points:
         raise FormatError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,8 +45,7 @@ def system_of(records: Sequence[Any]) -> System:
 
 def from_wkt(text: str) -> System:
     """Return the system of a WKT text; an empty one where it cannot be understood."""
-    tokens = iter(_TOKEN.findall(text))
-    root = _node(next(tokens, ""), tokens, 0)
+    root = _root(text)
     if root is None:
         return System()
     while root[0] in ("BOUNDCRS", "SOURCECRS"):
@@ -54,38 +53,29 @@ def from_wkt(text: str) -> System:
     name = _epsg(root) or _name(root)
     if root[0] not in ("COMPD_CS", "COMPOUNDCRS"):
         return System(name, *_units(root), _is_geographic(root))
-    parts = [
-        child for child in _children(root) if "CRS" in child[0] or child[0].endswith("_CS") or child[0] in "PROJCS"
-    ]
+    parts = [child for child in _children(root) if child[0].endswith(("CRS", "_CS", "GCS", "JCS"))]
     flat = next((part for part in parts if not part[0].startswith("VERT")), ("", []))
     height = next((part for part in parts if part[0].startswith("VERT")), ("", []))
     metres, z_metres = _units(flat)
     return System(_epsg(flat) or _name(flat) or name, metres, _units(height)[0] or z_metres, _is_geographic(flat))
 
 
-def _node(word: str, tokens: Iterator[str], depth: int) -> Node | None:
-    """Return a keyword with what follows it in brackets; None where there are none."""
-    if depth > DEEPEST or not word or next(tokens, "") not in "[(":
-        return None
-    held: list[Any] = []
-    last = ""
-    for token in tokens:
+def _root(text: str) -> Node | None:
+    """Return the outermost keyword of a WKT text with what its brackets hold; None where there is none."""
+    stack: list[Node] = [("", [])]
+    for token in _TOKEN.findall(text):
+        held = stack[-1][1]
         if token in "[(":
-            inner = _node(last, _chain(token, tokens), depth + 1)
-            if inner is None:
+            word = held.pop() if held and isinstance(held[-1], str) else ""
+            if len(stack) > DEEPEST:
                 return None
-            held[-1:] = [inner]
+            stack.append((word.upper(), []))
+            held.append(stack[-1])
         elif token in "])":
-            return word.upper(), held
+            stack = stack[: max(1, len(stack) - 1)]
         elif token != ",":
-            held.append(token.strip('"') if token[0] == '"' else token)
-        last = token
-    return word.upper(), held  # the text ends early
-
-
-def _chain(first: str, rest: Iterator[str]) -> Iterator[str]:
-    yield first
-    yield from rest
+            held.append(token[1:-1].replace('""', '"') if token[0] == '"' else token)
+    return next((node for node in stack[0][1] if isinstance(node, tuple)), None)
 
 
 def _children(node: Node) -> list[Node]:
