@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROUNDS = 5
+ROUNDS = 2
 OURS = "from scantruss.scan.readers import read_content\n"
 OUR_CLOUD = "from scantruss.scan.readers import read_points\n"
 CASES = (  # suffix, imports of the other, what it does, its name

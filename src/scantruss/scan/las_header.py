@@ -13,6 +13,7 @@ from ..errors import FormatError
 LEAST_HEADER = 227  # bytes, of LAS 1.0 to 1.2
 HEADER_14 = 375
 LASZIP = 22204  # number of the record that describes how points are packed
+MOST_IN_CHUNK = 1 << 20  # points of one chunk, where the file holds fewer; room is made for all of them
 ONES = (1 << 64) - 1
 RECORD, EXTENDED = 54, 60  # bytes of the header of a variable length record, and of an extended one
 
@@ -45,13 +46,13 @@ def check_header(path: Path) -> None:
                         f"{path} ends early: its LAS header promises records behind its end; copy it again"
                     )
         if form & 0xC0:
-            _check_packed(path, size, length, records, start, width)
+            _check_packed(path, size, length, records, start, width, count)
     held = (size - start) // max(width, 1)
     if form < 64 and count > held:
         raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
 
 
-def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int) -> None:
+def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int, count: int) -> None:
     """Refuse packed points whose chunks are more or larger than the file."""
     import lazrs
 
@@ -77,10 +78,12 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
         if chunks * max(width, 1) > table - start:
             raise early
         file.seek(start)
-        lengths = [entry[1] for entry in lazrs.read_chunk_table(file, lazrs.LazVlr(described))]
+        entries = lazrs.read_chunk_table(file, lazrs.LazVlr(described))
+        if not all(0 < entry[0] <= max(count, MOST_IN_CHUNK) for entry in entries):
+            raise FormatError(f"{path}: its packed points come in chunks of no sensible size; the file is damaged")
         layers = sum({10: 9, 11: 1, 12: 2, 13: 1, 14: long}.get(kind, 0) for kind, long in parts)
         place = start + 8
-        for long in lengths:
+        for _, long in entries:
             file.seek(place + width + 4)
             told = np.frombuffer(file.read(4 * layers), dtype="<u4")
             place += long
