@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FormatError
+from ..errors import FormatError, ScanTrussError
 from .columns import check_not_degrees, find_columns
 from .content import Content, find_attributes
 from .kinds import read_head, unreadable, wrong_kind
@@ -30,7 +30,7 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
     try:
         with parquet.ParquetFile(path, memory_map=True) as file:
             return _read(path, file, wanted)
-    except FormatError:
+    except ScanTrussError:
         raise
     except BaseException as error:
         raise unreadable(path, "Parquet", error) from None
