@@ -227,7 +227,9 @@ def test_files_of_different_units_are_brought_to_that_of_the_first(tmp_path: Pat
     (tmp_path / "d.e57").write_bytes(e57((__import__("scan_files").axes(P), "")))
     cloud = read_points(f"{tmp_path}/*.*")
     assert cloud.unit == "m" and np.allclose(cloud.points + cloud.origin, np.tile(P, (4, 1)), atol=1e-9)
-    assert "b.ply is in mm and is brought to m, the unit of a.ply" in cloud.notes
+    assert "b.ply is in mm and is brought to m, the unit of the first file" in cloud.notes
+    part = read_points(f"{tmp_path}/*.ply", selection=Selection(crop=("box:0,0,20,30",)))
+    assert len(part.points) == 2 * (P[:, 0] <= 20).sum()  # what is cropped is in the unit of the result
     assert any(note.startswith("c.xyz does not say its unit") for note in cloud.notes)
 
 

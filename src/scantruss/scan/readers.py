@@ -91,7 +91,10 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
         raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
     selection = selection or Selection()
     files = files_of(path)
-    parts = [read_part(file, unit, selection) for file in files]
+    parts: list[Part] = []
+    for file in files:
+        common = next((part.unit for part in parts if part.unit), "")
+        parts.append(read_part(file, unit, selection, common))
     points, unit, notes = _join(files, parts)
     if not len(points):
         raise _nothing_left(files, parts)
@@ -99,16 +102,20 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     return replace(cloud, notes=notes)
 
 
-def read_part(path: Path, unit: str, selection: Selection) -> Part:
-    """Return the selected points of one file; see `read_points`."""
+def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
+    """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
     content = read_content(path, selection.needs)
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_one_unit(path, content, unit, selection.z_unit)
+    feet = (content.feet,) if content.feet and unit != "foot" and not selection.z_unit else ()
+    size, own = UNITS[common], UNITS[unit]
+    if size and own and size != own:
+        notes = (*notes, f"{path.name} is in {unit} and is brought to {common}, the unit of the first file")
+        points, unit = points * (own / size), common
     kept, left_out = choose(points, content.attributes, selection)
     held = "" if kept.any() else describe(points, content.attributes)
     if not kept.all():
         points = points[kept]
-    feet = (content.feet,) if content.feet and unit != "foot" and not selection.z_unit else ()
     return Part(points, unit, content.system, len(kept), left_out, held, (*content.notes, *notes, *feet))
 
 
@@ -138,21 +145,15 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
     _check_systems(files, parts)
     unit = next((part.unit for part in parts if part.unit), "")
     notes: dict[str, None] = {}
-    arrays = []
     for file, part in zip(files, parts, strict=True):
-        points = part.points
         notes.update(dict.fromkeys(part.notes))
-        size, own = UNITS[unit], UNITS[part.unit]
-        if own and size and own != size:
-            points = points * (own / size)
-            notes[f"{file.name} is in {part.unit} and is brought to {unit}, the unit of {files[0].name}"] = None
-        elif unit and not part.unit:
+        if unit and not part.unit:
             notes[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
-        arrays.append(points)
     for words in parts[0].left_out:
         count = sum(part.left_out[words] for part in parts)
         notes[f"{count:,} points {words} are left out"] = None
-    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays), unit, tuple(notes)
+    points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
+    return points, unit, tuple(notes)
 
 
 def _check_systems(files: Sequence[Path], parts: Sequence[Part]) -> None:
