@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-ROUNDS = 2
-OURS = "from scantruss.scan.readers import read_content\n"
-OUR_CLOUD = "from scantruss.scan.readers import read_points\n"
+ROUNDS = 3
+OURS = "import scantruss.kernels.decimals\nfrom scantruss.scan.readers import read_content\n"
+OUR_CLOUD = "import scantruss.kernels.decimals\nfrom scantruss.scan.readers import read_points\n"
 CASES = (  # suffix, imports of the other, what it does, its name
     (
         ".ply",
