@@ -8,7 +8,7 @@ import pytest
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "scantruss"
 LAYERS = (  # lowest first; a module imports from its own line and from lines above
     ("errors", "kernels", "__init__"),  # __init__: the version
-    ("settings", "machine"),
+    ("selection", "settings", "machine"),
     ("scan",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
     ("curves",),

@@ -21,15 +21,18 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 
+SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
+
+
 def info_parser() -> Parser:
     """Options of ``scantruss info``."""
-    from .options import Parser, add_settings
+    from .options import READING, Parser, add_settings
 
     parser = Parser(
         "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
     )
-    parser.add_argument("scan", metavar="SCAN", help="scan file")
-    add_settings(parser, ("length", "unit", "method"))
+    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    add_settings(parser, ("length", "method", *READING))
     return parser
 
 
@@ -70,7 +73,7 @@ def grid_parser() -> Parser:
         "SCAN OUT [OUT ...] --length L [options]",
         "Turn a scan into a triangular grid truss of a desired member length.",
     )
-    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("scan", metavar="SCAN", help=SCAN)
     parser.add_argument("outs", metavar="OUT", nargs="+", help="results; the suffix names the format")
     files = parser.add_argument_group("files")
     files.add_argument(
@@ -119,11 +122,14 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from .export.files import check_place
     from .export.formats import check_output
+    from .scan.paths import files_of
 
-    inputs = [(values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
+    inputs = [(str(file), "scan") for file in files_of(values.scan)]
+    inputs += [(values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
     if isinstance(length := vars(values).get("length"), str) and not length.startswith(CURVATURE):
         inputs.append((length, "file of lengths"))
     inputs += [(name, "fixed line") for name in getattr(values, "fixed_lines", ())]
+    inputs += [(name, "polygon") for name in getattr(values, "crop", ()) if Path(name).is_file()]
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)
@@ -146,8 +152,10 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     from .scan.readers import read_points
 
     bars("read", 0.0)
-    cloud = read_points(path, unit=settings.unit)
+    cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     bars("read", 1.0)
+    for note in cloud.notes:
+        bars.note(note)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
     return cloud

@@ -65,7 +65,7 @@ def grid_from_scan(
     from .scan.readers import read_points
 
     started = perf_counter()
-    cloud = read_points(path, unit=settings.unit)
+    cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     spent = perf_counter() - started
     return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 

@@ -28,6 +28,7 @@ class PointCloud:
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
     name: str = ""  #: file the points came from
+    notes: tuple[str, ...] = ()  #: what a user should know of how it was read
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
