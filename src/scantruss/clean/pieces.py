@@ -1,0 +1,47 @@
+"""Loose small pieces: a few points together, away from all that is large."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels import strays as kernels
+from ..kernels import tree as trees
+from .nearby import AROUND, Nearby, grow_tree
+
+LINK = 3.0  # reaches over which points belong to one piece
+APART = (
+    6.0  # reaches over which a small piece belongs to what is beside it: a line of the scanner, a part behind a shadow
+)
+
+
+def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
+    """Return which points belong to pieces with fewer than this share of all points, away from all others; rows of the tree.
+
+    A small piece that lies near a large one stays, and so does what lies near that.
+    """
+    count = len(near.squares)
+    if count <= AROUND:
+        return np.zeros(count, np.bool_)
+    piece = np.empty(count, np.int64)
+    kernels.join_near(near.neighbors, near.squares, near.reach, LINK, piece)
+    sizes = np.bincount(piece, minlength=count)
+    least = min(max(share * count, AROUND), float(sizes.max()))
+    loose = sizes[piece] < least
+    typical = float(np.median(near.reach))
+    while loose.any():
+        kept = np.flatnonzero(~loose)
+        tree = grow_tree(near.tree.points[kept])
+        away, which = _distances(tree, near.tree.points[loose])
+        beside = away <= APART * np.maximum(typical, near.reach[kept[which]])
+        joined = np.unique(piece[loose][beside])
+        if not len(joined):
+            break
+        loose &= ~np.isin(piece, joined)
+    return loose
+
+
+def _distances(tree: trees.Tree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of places (P, 3) from the nearest point of a tree, and the number of that point."""
+    away, which = np.empty(len(places)), np.empty(len(places), np.int64)
+    kernels.nearest_of_places(tree, np.ascontiguousarray(places), away, which)
+    return away, which
