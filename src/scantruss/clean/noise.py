@@ -16,7 +16,7 @@ NARROW = 28.0  # points of the narrowest patch
 WIDEST = 2.0  # radius of the widest in that of the narrowest
 WORSE = 1.1  # how much worse than the narrowest a wider patch may fit
 SPARSE = 8  # of so many nearest one has a patch
-SOME = 0.005  # part of the points that must lie in layers, as a few seem to by chance
+SOME = 0.02  # part of the points that must lie in layers, as a few seem to by chance
 FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
 PART = 200  # least patches of a part that a thread fits
 
