@@ -117,7 +117,7 @@ def test_a_ridge_is_not_rounded():
     clean = clean_points(shape.points, normals=False)
     points = clean.points + clean.origin
     at_ridge = np.abs(points[:, 0]) < 2 * spacing
-    assert rms(shape.distance(points[at_ridge])) < 0.6 * rms(shape.distance(shape.points[clean.kept][at_ridge]))
+    assert rms(shape.distance(points[at_ridge])) < 0.75 * rms(shape.distance(shape.points[clean.kept][at_ridge]))
 
 
 def test_two_layers_become_one():
@@ -126,7 +126,7 @@ def test_two_layers_become_one():
     normals = clean_points(second.points, smooth=False, stray_distance=None, duplicates=None, loose_pieces=None).normals
     both = np.concatenate([first.points, second.points + 0.8 * spacing * normals])
     clean = clean_points(both, smooth=False)
-    assert count_of(clean, "layers") > 0.85 * len(both)
+    assert count_of(clean, "layers") > 0.75 * len(both)
     away = first.distance(clean.points + clean.origin)
     thick = away.std()
     assert abs(away.mean() - 0.4 * spacing) < 0.1 * spacing and thick < 0.2 * spacing

@@ -17,6 +17,7 @@ COARSE = (
     2.0  # spacing of the points at which sides are settled, in mean spacings: lines of a scanner are no pieces then
 )
 LINKS = 10  # links of each of them
+SMOOTH = 0.15  # thickness, in their spacings, up to which these are smooth enough to tell that a surface is one-sided
 BESIDE = 4  # of them a point asks for its side, the one most beside it counts
 
 
@@ -36,7 +37,8 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     reach = near.reach[np.isfinite(near.reach)]
     mean_spacing = float(np.median(reach)) * np.sqrt(np.pi / AROUND) if len(reach) else 0.0
     extent = float(np.ptp(points, axis=0).max())
-    stays = thin_to(points, max(COARSE * mean_spacing, 1e-5 * extent, 1e-300))
+    coarse = max(COARSE * mean_spacing, 1e-5 * extent, 1e-300)
+    stays = thin_to(points, coarse)
     few = Nearby.of(points[stays])
     chosen = np.flatnonzero(stays)[few.tree.ids]
     place, own = few.tree.points, np.ascontiguousarray(normals[chosen])
@@ -48,7 +50,9 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     piece = np.empty(len(place), np.int64)
     kernels.orient_normals(place, own, neighbors, order, piece)
     face_outside(place, own, piece)
-    head_on = int(kernels.head_on_links(place, own, neighbors, np.zeros(len(place)), 1.0))
+    planes, thickness = np.empty_like(own), np.empty(len(place))
+    kernels.site_normals(place, neighbors, planes, thickness)
+    head_on = int(kernels.head_on_links(place, own, neighbors, thickness, SMOOTH * coarse))
     turned = normals.copy()
     tree = grow_tree(place)
     settled = np.ascontiguousarray(own[tree.ids])

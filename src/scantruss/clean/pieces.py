@@ -7,8 +7,10 @@ import numpy as np
 from ..kernels import strays as kernels
 from ..kernels import tree as trees
 from .nearby import AROUND, Nearby, grow_tree
+from .strays import THICK
 
 LINK = 3.0  # reaches over which points belong to one piece
+BLOB = 4.0  # a cloud of points may have so many times more of them than a small surface
 APART = (
     6.0  # reaches over which a small piece belongs to what is beside it: a line of the scanner, a part behind a shadow
 )
@@ -17,7 +19,7 @@ APART = (
 def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     """Return which points belong to pieces with fewer than this share of all points, away from all others; rows of the tree.
 
-    A small piece that lies near a large one stays, and so does what lies near that.
+    Of pieces that are no surface but a cloud the share may be larger, `BLOB` times. A small piece that lies near a large one stays, and so does what lies near that.
     """
     count = len(near.squares)
     if count <= AROUND:
@@ -25,8 +27,11 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     piece = np.empty(count, np.int64)
     kernels.join_near(near.neighbors, near.squares, near.reach, LINK, piece)
     sizes = np.bincount(piece, minlength=count)
-    least = min(max(share * count, AROUND), float(sizes.max()))
-    loose = sizes[piece] < least
+    thick, aside = np.empty((2, count))
+    kernels.measure_planes(near.tree, np.arange(count), near.neighbors, thick, aside, 0, count)
+    blob = np.bincount(piece, thick > THICK, minlength=count) > 0.5 * sizes
+    least = np.minimum(np.maximum(share * count, AROUND) * np.where(blob, BLOB, 1.0), float(sizes.max()))
+    loose = sizes[piece] < least[piece]
     typical = float(np.median(near.reach))
     while loose.any():
         kept = np.flatnonzero(~loose)

@@ -47,7 +47,7 @@ def clean_points(
     *,
     duplicates: float | None = 0.01,
     stray_distance: float | None = 3.0,
-    loose_pieces: float | None = 0.002,
+    loose_pieces: float | None = 0.005,
     layer_distance: float | None = 2.0,
     smooth: bool = True,
     spacing: float | None = None,
