@@ -178,6 +178,18 @@ def test_a_one_sided_surface_is_said_to_be_one():
     assert "one-sided" not in clean_points(make("scallop", 15_000).points).steps[-1].words
 
 
+def test_dense_clouds_of_strays_go():
+    """Points scattered around a place as densely as those of the surface, which they touch."""
+    shape = make("scallop", 30_000, outliers=0.1)
+    rng = np.random.default_rng(0)
+    spots = shape.points[shape.distance(shape.points) < 1][:4] + np.array([0.0, 0.0, 2.5])
+    clouds = np.concatenate([spot + 1.5 * rng.normal(size=(150, 3)) for spot in spots])
+    clean = clean_points(np.concatenate([shape.points, clouds]), smooth=False, normals=False)
+    away = shape.distance(clean.points + clean.origin)
+    assert (away > 2 * spacing_of(shape, 30_000)).sum() <= 0.005 * 3600
+    assert (clean.kept[away < 4 * shape.noise] < len(shape.points)).sum() > 0.994 * 30_000
+
+
 def test_switched_off_all_points_come_back():
     points = make("scallop", 5000, outliers=0.1, duplicates=0.1).points
     nothing = dict.fromkeys(("duplicates", "stray_distance", "loose_pieces", "layer_distance"))

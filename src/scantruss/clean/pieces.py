@@ -19,7 +19,8 @@ APART = (
 def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     """Return which points belong to pieces with fewer than this share of all points, away from all others; rows of the tree.
 
-    Of pieces that are no surface but a cloud the share may be larger, `BLOB` times. A small piece that lies near a large one stays, and so does what lies near that.
+    Of pieces that are no surface but a cloud the share may be larger, `BLOB` times. A small surface
+    that lies near a large one stays, and so does what lies near that.
     """
     count = len(near.squares)
     if count <= AROUND:
@@ -38,7 +39,7 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
         tree = grow_tree(near.tree.points[kept])
         away, which = _distances(tree, near.tree.points[loose])
         beside = away <= APART * np.maximum(typical, near.reach[kept[which]])
-        joined = np.unique(piece[loose][beside])
+        joined = np.unique(piece[loose][beside & ~blob[piece[loose]]])
         if not len(joined):
             break
         loose &= ~np.isin(piece, joined)

@@ -15,6 +15,7 @@ ROUNDS = 5  # strays near each other hide each other: after a round some more st
 FAR = 4.5  # reach, in those of which a quarter of the points have more, at which a point is a stray whatever is near it
 CLOUD = 2.5  # ... where the points around form no surface
 THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
+MUCH = 0.1  # part of the points that form none from which on it is no cloud of strays but the scan
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
 TOO_FAR = 1.1  # the same in member lengths
 LONELY = (
@@ -64,7 +65,37 @@ def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> 
         which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
         kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
         reach[which] = np.sqrt(near.squares[which, AROUND - 1])
+    for _ in range(ROUNDS):
+        found = _in_clouds(near, alive)
+        if not len(found):
+            break
+        for _ in range(2):  # the surface below is told better now
+            alive[found] = False
+            which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
+            kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
+            found = which[_stand_off(near, alive, which, _planes(near, which)[1] > 0.5 * SIGHT)]
+        alive[found] = False
     return near.in_order(~alive)
+
+
+def _in_clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
+    """One round of `find_strays`: points of dense clouds, which hold each other, that stand off the surface around the cloud."""
+    which = np.flatnonzero(alive)
+    thick = np.zeros(len(alive), np.bool_)
+    thick[which] = _planes(near, which)[0] > THICK
+    if not 0 < thick.sum() < MUCH * len(which):
+        return which[:0]
+    around = np.where(near.neighbors >= 0, thick[near.neighbors], False)
+    doubted = np.flatnonzero(alive & (thick | (around.sum(axis=1) >= NEAREST // 4)))
+    sure = alive.copy()
+    sure[doubted] = False
+    off = np.empty(len(doubted))
+    in_parts(
+        len(doubted),
+        PART,
+        lambda _, begin, end: kernels.stand_off(near.tree, sure, doubted, 2 * PATCH, THIN, off, begin, end),
+    )
+    return doubted[off > OFF]
 
 
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

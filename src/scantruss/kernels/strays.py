@@ -66,21 +66,24 @@ def stand_off(
     A point itself is left out of its surface. What is expected grows with the thickness of the points there and with the doubt
     about the surface, large at a rim. least : part of the radius that counts as thickness in any case.
     """
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(2 * around, np.int64), np.empty(2 * around)
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
     buffer, matrix, patch = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
     for i in range(begin, end):
         p = which[i]
         off[i] = 0.0
         place = row(tree.points, p)
-        count = nearest(tree, place[0], place[1], place[2], 2 * around, stack, found, away)
-        taken, radius = 0, 0.0
-        for k in range(count):
-            if found[k] != p and alive[found[k]] and taken < around:
-                d = subtract(row(tree.points, found[k]), place)
-                buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                buffer[taken, 3] = away[k]
-                radius = 1.1 * math.sqrt(away[k])
-                taken += 1
+        taken, radius, most = 0, 0.0, around + around // 4
+        while taken < around and most <= 8 * around:  # farther where many around are left out
+            count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
+            taken = 0
+            for k in range(count):
+                if found[k] != p and alive[found[k]] and taken < around:
+                    d = subtract(row(tree.points, found[k]), place)
+                    buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
+                    buffer[taken, 3] = away[k]
+                    radius = 1.1 * math.sqrt(away[k])
+                    taken += 1
+            most *= 2
         if taken < FULL or radius <= 0.0:
             continue
         fit(buffer, taken, radius, ROUNDS, patch, matrix)
