@@ -9,7 +9,7 @@ SOURCE = Path(__file__).resolve().parents[1] / "src" / "scantruss"
 LAYERS = (  # lowest first; a module imports from its own line and from lines above
     ("errors", "kernels", "__init__"),  # __init__: the version
     ("selection", "settings", "machine"),
-    ("scan",),
+    ("scan", "clean"),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
     ("curves",),
     ("rolls", "corners", "fill", "lines"),
@@ -23,7 +23,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("structure",),
     ("export",),
     ("report", "demo"),
-    ("options", "studio", "commands"),
+    ("options", "studio", "commands", "commands_clean"),
     ("cli", "__main__"),
 )
 MODULES = sorted(path.relative_to(SOURCE).with_suffix("").parts for path in SOURCE.rglob("*.py"))

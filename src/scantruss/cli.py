@@ -20,6 +20,7 @@ HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
 
   scantruss info  SCAN                     points, extent, spacing, boundaries, a sensible --length
+  scantruss clean SCAN OUT                 without repeated and stray points, loose pieces, layers, noise
   scantruss grid  SCAN OUT [OUT ...] --length L
                                            the grid; the suffix of each OUT names its format
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]

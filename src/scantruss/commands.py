@@ -182,9 +182,11 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """Say so where stray points were left out."""
     from .scan.sites import prepare_sites
 
-    strays = prepare_sites(cloud, settings).strays
-    if strays:
-        bars.note(f"{strays} stray points are left out; --stray-distance 0 keeps them")
+    sites = prepare_sites(cloud, settings)
+    if sites.repeated:
+        bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
+    if sites.strays:
+        bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
 
 
 def note_compiling(bars: Bars, method: str, *stages: str) -> None:
@@ -193,6 +195,20 @@ def note_compiling(bars: Bars, method: str, *stages: str) -> None:
 
     if not are_compiled(method, *stages):
         bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
+
+
+def clean_parser() -> Parser:
+    """Options of ``scantruss clean``."""
+    from .commands_clean import clean_parser
+
+    return clean_parser()
+
+
+def clean(values: Namespace) -> None:
+    """Clean a scan and save it."""
+    from .commands_clean import clean
+
+    clean(values)
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
@@ -279,6 +295,7 @@ def demo(values: Namespace) -> None:
 
 COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
     "info": (info_parser, info),
+    "clean": (clean_parser, clean),
     "grid": (grid_parser, grid),
     "print": (print_parser, print_solid),
     "demo": (demo_parser, demo),

@@ -138,6 +138,12 @@ class Settings:
     box_size: float = _setting(
         0.2, "distance of the sites to which the scan is thinned, in lengths; search boxes are larger", source="Eq. 1"
     )
+    clean: bool = _setting(
+        True, "leave out what does not belong to the scan, by the steps below; --no-clean keeps all", source="Sec. 2"
+    )
+    drop_repeated: bool = _setting(
+        True, "points that repeat another one are left out, where a hundredth of the points or more do", source="Sec. 2"
+    )
     stray_distance: float = _setting(
         3.0, "points so many times farther from others than their neighbours are left out; 0 keeps all", source="Sec. 2"
     )
@@ -172,6 +178,8 @@ class Settings:
             choices = spec.metadata["choices"]
             if choices and value not in (*choices, spec.default):
                 raise InputError(f"{spec.name} must be one of {' '.join(choices)}, got {value!r}")
+            if spec.type == "bool" and not isinstance(value, bool):
+                raise InputError(f"{spec.name} must be true or false, got {value!r}")
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{spec.name} must be a finite number, got {value}")
         for name, low, high in (

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..clean.duplicates import find_repeated, has_repeats
+from ..clean.strays import find_strays, has_strays
 from ..errors import InputError
 from ..kernels import normals as facing
 from ..kernels import sites as kernels
@@ -18,7 +20,6 @@ from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
-from .strays import find_strays, has_strays
 from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
@@ -46,6 +47,7 @@ class Sites:
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
+    repeated: int = 0  #: points that were left out because they repeat another one
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
 
@@ -55,7 +57,7 @@ class Sites:
         return is_graded(self.surface)
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, Wish | None], Sites]] = (
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, bool, Wish | None], Sites]] = (
     weakref.WeakKeyDictionary()
 )
 
@@ -67,10 +69,12 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `stray_distance` which points are left out, `length_field` where
-        members are to be longer.
+        `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
+        out, `length_field` where members are to be longer.
     """
-    key = (settings.length, settings.box_size, settings.stray_distance, wish_of(settings, cloud.origin))
+    strays = settings.stray_distance if settings.clean else 0.0
+    repeated = settings.clean and settings.drop_repeated
+    key = (settings.length, settings.box_size, strays, repeated, wish_of(settings, cloud.origin))
     kept = _KEPT.setdefault(cloud, {})
     if key not in kept:
         kept.clear()
@@ -93,8 +97,8 @@ def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Set
     points = sites.surface.points
     both = np.concatenate([points, added])
     wish = wish_of(settings, cloud.origin)
-    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, wish, len(points))
-    return replace(prepared, strays=sites.strays, whole=sites.whole)
+    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, False, wish, len(points))
+    return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -164,10 +168,16 @@ def _prepare(
     length: float,
     box_size: float,
     stray_distance: float,
+    drop_repeated: bool,
     wish: Wish | None,
     measured: int | None = None,
 ) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
+    repeated = 0
+    if drop_repeated and has_repeats(points):
+        kept = ~find_repeated(points)
+        repeated = int(len(points) - kept.sum())
+        points = np.ascontiguousarray(points[kept])
     whole, size = points, FINE * radius if measured is None else 0.0
     points = _fewer(whole, size, spacing)
     found = _linked(points, radius, length, spacing)
@@ -204,7 +214,7 @@ def _prepare(
     facing.orient_normals(mean, normals, neighbors, order, piece)
     smoothed = np.empty_like(normals)
     facing.smooth_normals(normals, neighbors, 0.7, smoothed)
-    _face_outside(mean, smoothed, piece)
+    face_outside(mean, smoothed, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
     surface = Surface(
@@ -226,7 +236,7 @@ def _prepare(
     large = _large_pieces(piece, area, graded, length)
     total, scaled = float(area.sum()), float(graded.sum())
     dense = whole if len(points) < len(whole) else None
-    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured, dense)
+    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, repeated, measured, dense)
 
 
 def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
@@ -342,7 +352,7 @@ def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, lengt
     return tuple(int(i) for i in np.flatnonzero(large))
 
 
-def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
+def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
     """Turn the normals of each piece away from its centre; upwards where that does not tell (a plate)."""
     _, inverse = np.unique(piece, return_inverse=True)
     inverse = inverse.ravel()
