@@ -1,8 +1,8 @@
 """Measure and write docs/numbers.md: `uv run --group benchmarks python -m benchmarks [SECTION]`.
 
-Without a section all of them, one after the other, each written as soon as it is measured: some four to eight hours on two
-cores, nearly all of it for the other ways; stopped and called again, runs that were kept (benchmarks/.runs) are not done
-again. `--quick`: three minutes, two clouds.
+Without a section all of them, one after the other, each written as soon as it is measured. By what parts of it took, some
+four to eight hours on two cores, nearly all of it for the other ways; stopped and called again, their runs that were kept
+(benchmarks/.runs) are not done again. `--quick`: two clouds, about four minutes of processor time.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _peers(options: argparse.Namespace, command: str) -> Section:
         limit = section.LIMIT
     repeats = section.QUICK_REPEATS if options.quick else section.REPEATS
     rows = section.measured(chosen, some, limit=options.limit or limit, repeats=repeats, fresh=options.fresh)
-    return section.section(rows, command)
+    return section.section(rows, command, *([options.page.parent] if options.page else []))
 
 
 MAKERS: dict[str, Callable[[argparse.Namespace, str], Section | None]] = {
@@ -90,7 +90,7 @@ def parser() -> argparse.ArgumentParser:
     whole.add_argument("part", nargs="?", default="all", choices=["all", *PARTS, "own", "compare"],
                        help="all (the default), one section, own (our own figures as JSON) or compare (two of these)")  # fmt: skip
     whole.add_argument("files", nargs="*", type=Path, help="of own: where to write; of compare: OLD NEW")
-    whole.add_argument("--quick", action="store_true", help="a small part, three minutes")
+    whole.add_argument("--quick", action="store_true", help="a small part, some three minutes")
     whole.add_argument("--page", type=Path, help="the page to write instead of docs/numbers.md")
     whole.add_argument("--data", help="scans: their folder; SCANTRUSS_DATA if left out")
     whole.add_argument("--seeds", type=int, default=100, help="random: how many surfaces (default 100)")

@@ -219,7 +219,10 @@ def memory(counts: Iterable[int]) -> list[Memory]:
 def section(command_line: str, quick: bool = False) -> Section:
     """Return the section; quick: 100,000 points only, and nothing that compiles."""
     sizes = [size for size in SIZES if not quick or size[0] == 100_000]
-    rows = [warm_run(*size) for size in sizes]
+    rows = [
+        warm_run(points, nodes, effort, min(rounds, 5) if quick else rounds, aim)
+        for points, nodes, effort, rounds, aim in sizes
+    ]
     rows += [more_effort(5 if quick else 15, "normal", 3.0), *in_shell(3 if quick else 7)]
     grows = [] if quick else growth()
     rooms = memory((100_000,) if quick else GROWTH_POINTS)

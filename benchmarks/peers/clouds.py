@@ -73,6 +73,16 @@ def shape_of(cloud: Cloud) -> Shape:
     return replace(shape, length=float(np.sqrt(4 / np.sqrt(3) * triangle)))
 
 
+@lru_cache(maxsize=1)
+def _spacing(shape: str, points: int, noise: float) -> float:
+    return spacing(_sampled(shape, points, noise).points)
+
+
+def spacing_of(cloud: Cloud) -> float:
+    """Return the spacing of the points as they are, with their noise."""
+    return _spacing(cloud.shape, cloud.points, cloud.noise)
+
+
 def save(cloud: Cloud, folder: Path) -> Path:
     """Return the file of the points, made if it is not there."""
     path = folder / f"{cloud.name}.npy"

@@ -56,7 +56,7 @@ def gmsh_frontal(mesh: Mesh, scan: Scan) -> Mesh:
         surface = gmsh.model.addDiscreteEntity(2)
         gmsh.model.mesh.addNodes(2, surface, np.arange(1, len(mesh.nodes) + 1), mesh.nodes.ravel())
         gmsh.model.mesh.addElementsByType(surface, 2, [], mesh.triangles.ravel() + 1)
-        gmsh.model.mesh.classifySurfaces(np.pi, True, False, np.pi / 4)
+        gmsh.model.mesh.classifySurfaces(np.pi, True, True, np.pi / 4)
         gmsh.model.mesh.createGeometry()
         gmsh.model.geo.synchronize()
         size = gmsh.model.mesh.field.add("MathEval")

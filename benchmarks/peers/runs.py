@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from .clouds import Cloud, save, shape_of, spacing
+from .clouds import Cloud, save, shape_of, spacing_of
 from .figures import figures
 from .ways import WAYS, Way
 
@@ -47,7 +47,9 @@ class Row:
         return self.done and bool(self.found["right"])
 
     def value(self, name: str) -> float:
-        """Return a time or a figure; NaN where there is none."""
+        """Return a time or a figure; NaN where there is none. `searches`: seconds over those of the neighbour search."""
+        if name == "searches":
+            return self.value("seconds") / self.value("search")
         known = {**self.times, **self.found}.get(name)
         return float("nan") if known is None else float(known)
 
@@ -88,6 +90,16 @@ def key_of(cloud: Cloud, way: Way, limit: float, repeats: int) -> str:
     return json.dumps([asdict(cloud), way.name, identity(way), limit, repeats])
 
 
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a process and what it started."""
+    if hasattr(os, "killpg"):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        process.kill()
+    process.wait()
+
+
 def run_child(job: dict[str, Any], limit: float, module: str = "benchmarks.peers.child") -> dict[str, Any]:
     """Return the answer of a job done by a process of its own, or how that process ended."""
     answer, log = Path(job["answer"]), Path(job["log"])
@@ -106,9 +118,7 @@ def run_child(job: dict[str, Any], limit: float, module: str = "benchmarks.peers
             return {"result": "out of time", "words": f"more than {limit:g} s"}
         finally:
             if process.poll() is None:  # also when we are interrupted
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+                _end(process)
     if answer.exists():
         return dict(json.loads(answer.read_text(encoding="utf-8")))
     how = f"signal {-process.returncode}" if process.returncode < 0 else f"exit status {process.returncode}"
@@ -125,7 +135,7 @@ def run(cloud: Cloud, way: Way, limit: float, repeats: int = REPEATS, kept: Path
         folder = Path(name)
         job = {
             "way": way.name, "points": str(save(cloud, kept)), "length": shape.length, "nodes": cloud.nodes, "repeats": repeats,
-            "spacing": spacing(shape.points[:: max(1, len(shape.points) // 200_000)]),
+            "spacing": spacing_of(cloud),
             "grid": str(folder / "grid.npz"), "answer": str(folder / "answer.json"), "log": str(folder / "log.txt"),
         }  # fmt: skip
         answer = run_child(job, limit)
