@@ -208,7 +208,7 @@ def memory(counts: Iterable[int]) -> list[Memory]:
                 "length": length_for(shape, 1_000),
                 "nodes": 1_000,
                 "spacing": 0.0,
-                "repeats": 0,
+                "repeats": 1,
                 **{key: str(folder / file) for key, file in JOB_FILES.items()},
             }
             added = run_child(job, 600.0).get("added", math.nan)

@@ -19,7 +19,7 @@ def scatter(rows: Sequence[Row], across: tuple[str, str], up: tuple[str, str], f
     import matplotlib
 
     matplotlib.use("Agg")
-    from matplotlib import pyplot
+    from matplotlib import pyplot, ticker
 
     settings = {"svg.hashsalt": "scantruss", "svg.fonttype": "path", "font.size": 9, "font.family": "DejaVu Sans"}
     with pyplot.rc_context(settings):
@@ -48,8 +48,10 @@ def scatter(rows: Sequence[Row], across: tuple[str, str], up: tuple[str, str], f
         axes.grid(True, which="both", linewidth=0.3, color="#cccccc")
         axes.set_axisbelow(True)
         for axis in (axes.xaxis, axes.yaxis):
+            if drawn:
+                axis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5)))
+                axis.set_minor_formatter(ticker.NullFormatter())
             axis.set_major_formatter("{x:g}")
-            axis.set_minor_formatter("{x:g}")
         figure.legend(loc="outside right center", frameon=False)
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
         pyplot.close(figure)

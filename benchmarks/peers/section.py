@@ -18,19 +18,20 @@ QUICK_LIMIT, QUICK_REPEATS = 30.0, 1
 QUICK_CLOUDS = (Cloud("scallop", 100_000, 1_000, 0.3), Cloud("great_court", 100_000, 1_000, 0.0))
 QUICK_WAYS = tuple(way for way in WAYS if way.name != "ScanTruss best")
 NOTE = """\
-Each run is a process of its own with a time limit, on points in memory. The clock runs inside, without imports and
-reading; a first call under 5 s is repeated thrice (by --quick once) and the median of these counts, ours and theirs alike, so all are warm
-(our kernels are compiled once for all and loaded before; the first run ever is in the section Speed). Conversions into
+Each run is a process of its own with a time limit, on points in memory. The clock runs inside, without imports and reading;
+a first call under 5 s is repeated thrice (by --quick once) and the median of these counts, ours and theirs alike; ours is
+always repeated, so that no first call that compiles counts (the first run ever is in the section Speed). Conversions into
 the types of a package are its own time, as are thinning and normals. Memory: what the work and the points added to the
-process at its peak (/proc), in MB, the programs themselves not counted. To ours: seconds over those of ScanTruss normal,
-median of the clouds. Searches: seconds over those of the neighbour search (scipy cKDTree, 16 neighbours, two threads) in the
-same process just after. Length: mean member in desired ones. Angle: the smallest. Six: share of inner nodes with six members.
-Off: mean distance of the nodes from the true surface, in members. Rim: the largest distance between the rim of the grid
-and the true one, either way, in members. Bare: share of the scan farther than half a member from the grid. Right: manifold,
-orientable, with the loops, pieces and Euler number of the truth. Noise is the standard deviation of each coordinate, in
-medians of the distance to the nearest neighbour. Out of time or not run (out of time already on an easier cloud of the same
-surface): the limit was not enough. No peer is shipped with ScanTruss or imported by it; they are only run, here.
-On Linux Open3D needs libusb-1.0 of the system; without it all ways by Open3D are missing."""
+process at its peak (/proc), in MB, the programs themselves not counted. Searches: seconds over those of the neighbour
+search (scipy cKDTree, 16 neighbours, two threads) in the same process just after; times are compared by these, as rows may
+be kept from a run under another load. To ours: searches over those of ScanTruss normal, median of the clouds. Length: mean
+member in desired ones. Angle: the smallest. Six: share of inner nodes with six members. Off: mean distance of the nodes
+from the true surface, in members. Rim: the largest distance between the rim of the grid and the true one, either way, in
+members. Bare: share of the scan farther than half a member from the grid. Right: manifold, orientable, with the loops,
+pieces and Euler number of the truth. Noise is the standard deviation of each coordinate, in medians of the distance to the
+nearest neighbour. Out of time or not run (out of time already on an easier cloud of the same surface): the limit was not
+enough. No peer is shipped with ScanTruss or imported by it; they are only run, here. On Linux Open3D needs libusb-1.0 of
+the system; without it all ways by Open3D are missing."""
 
 
 def section(rows: Sequence[Row], command: str, folder: Path = FILE.parent) -> Section:

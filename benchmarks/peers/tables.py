@@ -34,7 +34,7 @@ class Measure:
 
 
 MEASURES = (
-    Measure("seconds", "seconds", QUICK, False, ".2f", 0.0),
+    Measure("searches", "time in neighbour searches", QUICK, False, ".2f", 0.0),
     Measure("added", "memory added by the work, MB", QUICK, False, ".0f", 1.0),
     Measure("shape_mean", "mean G", NORMAL, True, ".4f", 1e-4),
     Measure("shape_std", "std G", NORMAL, False, ".3f", 1e-3),
@@ -95,10 +95,10 @@ def _quick_first(group: list[Row]) -> bool | None:
     ours, peers = row_of(group, QUICK), [row for row in group if row.way not in OURS and row.right]
     if ours is None or not peers:
         return None
-    fastest = min(peers, key=lambda row: row.value("seconds"))
+    fastest = min(peers, key=lambda row: row.value("searches"))
     rim = not ours.value("rim") > fastest.value("rim")  # neither has one on a closed surface
     better = ours.value("cv") <= fastest.value("cv") and ours.value("shape_mean") >= fastest.value("shape_mean")
-    return ours.right and ours.value("seconds") <= fastest.value("seconds") and better and rim
+    return ours.right and ours.value("searches") <= fastest.value("searches") and better and rim
 
 
 def _half_of_instant(group: list[Row]) -> bool | None:
@@ -108,7 +108,7 @@ def _half_of_instant(group: list[Row]) -> bool | None:
         return None
     return (
         ours.right
-        and ours.value("seconds") <= other.value("seconds") / 2
+        and ours.value("searches") <= other.value("searches") / 2
         and not ours.value("rim") > other.value("rim") / 10
     )
 
@@ -122,7 +122,7 @@ def _five_times(group: list[Row]) -> bool | None:
         row for row in group
         if row.way not in OURS and row.right and row.value("shape_mean") >= ours.value("shape_mean") and not row.value("rim") > 0.1
     ]  # fmt: skip
-    return all(5 * ours.value("seconds") <= row.value("seconds") for row in peers) if peers else None
+    return all(5 * ours.value("searches") <= row.value("searches") for row in peers) if peers else None
 
 
 AIMS = (
@@ -237,7 +237,7 @@ def summary(rows: Sequence[Row]) -> str:
         for group in groups:
             ours, row = row_of(group, NORMAL), row_of(group, name)
             if ours is not None and row is not None and ours.done and row.done:
-                ratios.append(row.value("seconds") / ours.value("seconds"))
+                ratios.append(row.value("searches") / ours.value("searches"))
         cells = [_median([row.value(column) for row in own], show) for column, _, show in shown]
         lines.append(
             f"| {name} | {sum(row.right for row in own)} of {len(own)} | {_median(ratios, '.1f')} | "
