@@ -115,11 +115,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Do what the arguments say; return the exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     whole = parser()
-    options = whole.parse_args(arguments)
+    options = whole.parse_intermixed_args(arguments)
     if options.part == "compare":
         if len(options.files) != 2:
             whole.error("compare needs two files: OLD NEW")
-        return own.compare(*options.files, options.tolerance)
+        try:
+            return own.compare(*options.files, options.tolerance)
+        except (OSError, ValueError) as error:
+            whole.error(str(error))
     if (options.files and options.part != "own") or len(options.files) > 1:
         whole.error("files are for own (one) and compare (two)")
     page = {"file": options.page} if options.page else {}
