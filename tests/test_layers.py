@@ -10,6 +10,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("errors", "kernels", "__init__"),  # __init__: the version
     ("selection", "settings", "machine"),
     ("scan", "clean"),
+    ("splice",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
     ("curves",),
     ("rolls", "corners", "fill", "lines"),
@@ -23,7 +24,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("structure",),
     ("export",),
     ("report", "demo"),
-    ("options", "studio", "commands", "commands_clean"),
+    ("options", "studio", "commands", "commands_clean", "splice_command"),
     ("cli", "__main__"),
 )
 MODULES = sorted(path.relative_to(SOURCE).with_suffix("").parts for path in SOURCE.rglob("*.py"))

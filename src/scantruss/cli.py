@@ -25,6 +25,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
                                            the grid; the suffix of each OUT names its format
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            one watertight solid of a grid saved as .json
+  scantruss splice SCAN SCAN [SCAN ...] -o OUT
+                                           one cloud of overlapping scans in frames of their own
   scantruss demo  [FOLDER]                 all of it on a bundled scan
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from .errors import CertificateError, FormatError, InputError
 from .settings import CURVATURE
+from .splice_command import splice, splice_parser
 
 if TYPE_CHECKING:
     from .grid.grid import Grid
@@ -298,5 +299,6 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "clean": (clean_parser, clean),
     "grid": (grid_parser, grid),
     "print": (print_parser, print_solid),
+    "splice": (splice_parser, splice),
     "demo": (demo_parser, demo),
 }

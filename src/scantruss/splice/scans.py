@@ -1,0 +1,68 @@
+"""The scans of a splice, each looked at with three spacings: for features, for judging, and for the last alignment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..scan.cloud import PointCloud
+from .views import View, make_view
+
+PARTS = 75.0  # coarse spacings along the diagonal of a typical scan
+MIDDLE = 2.5  # middle spacings in a coarse one
+FINEST = 400.0  # most fine spacings along the diagonal of a typical scan
+FINE = 1.5  # fine spacing, in spacings of the points
+FEWEST = 60  # coarse places below which a scan is too small to be told by its features
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One scan and its views."""
+
+    name: str
+    cloud: PointCloud
+    coarse: View
+    middle: View
+    fine: View
+
+
+def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
+    """Return the median over the scans of the diagonal of the box that holds all but a few stray points [scan unit]."""
+    sizes = []
+    for cloud in clouds:
+        lower, upper = np.percentile(cloud.points[:: max(len(cloud.points) // 100_000, 1)], (2.0, 98.0), axis=0)
+        sizes.append(float(np.linalg.norm(upper - lower)))
+    return float(np.median(sizes))
+
+
+def prepare_scans(
+    clouds: Sequence[PointCloud], names: Sequence[str], progress: Callable[[str, float], None]
+) -> list[Scan]:
+    """Return the scans with their views, all at the same three spacings.
+
+    Raises
+    ------
+    InputError
+        A scan is too small or too sparse beside the others to be told by its shape.
+    """
+    diagonal = typical_diagonal(clouds)
+    spacing = float(np.median([cloud.spacing for cloud in clouds]))
+    coarse = max(diagonal / PARTS, 3.0 * spacing)
+    middle = max(coarse / MIDDLE, 1.5 * spacing)
+    fine = min(max(FINE * spacing, diagonal / FINEST), middle)
+    scans = []
+    for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
+        progress("prepare", place / len(clouds))
+        wide = make_view(cloud.points, coarse)
+        if len(wide.points) < FEWEST:
+            raise InputError(
+                f"{name} covers {len(wide.points)} patches of {coarse:.3g}, and {FEWEST} are needed to tell where it belongs;"
+                " is it in another unit, or too sparse?"
+            )
+        middle_view = make_view(cloud.points, middle, wide)
+        fine_view = make_view(cloud.points, fine, wide) if fine < middle else middle_view
+        scans.append(Scan(name, cloud, wide, middle_view, fine_view))
+    return scans
