@@ -127,7 +127,10 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
             bars.note(f"{name}: {cloud.dropped} points with NaN or infinite coordinates are left out")
         clouds.append(cloud)
     result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
-    reasons = [f"{name} {'fits in more ways than one' if name in result.doubtful else 'fits nowhere'}" for name in result.left_out]
+    reasons = [
+        f"{name} {'fits in more ways than one' if name in result.doubtful else 'fits nowhere'}"
+        for name in result.left_out
+    ]
     if reasons and values.all:
         raise InputError(f"{'; '.join(reasons)}; leave it out, or give its pose with --poses")
     for reason in reasons:
@@ -151,11 +154,11 @@ def show_splice(result: Splice, written: list[Path]) -> None:
         for pair in result.pairs
     ]
     print_table(("pair", "overlap", "agreement", "residual", "in spacings"), rows)
-    count = len(result.poses)
+    count, frame = len(result.poses), result.frame or "the poses given"
+    told = f"{count} of {count + len(result.left_out)} scans in the frame of {frame}"
     print_lines(
         [
-            f"{count} of {count + len(result.left_out)} scans in the frame of {result.frame}, spacing {result.spacing:.4g}{unit},"
-            f" {len(result.cloud.points):,} points",
+            f"{told}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
         ]
     )

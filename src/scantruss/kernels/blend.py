@@ -23,7 +23,13 @@ def depths(places: np.ndarray, rims: np.ndarray, boxes: SearchBoxes, most: float
 
 @kernel
 def own_places(
-    points: np.ndarray, places: np.ndarray, boxes: SearchBoxes, depth: np.ndarray, reach: float, own: np.ndarray, deep: np.ndarray
+    points: np.ndarray,
+    places: np.ndarray,
+    boxes: SearchBoxes,
+    depth: np.ndarray,
+    reach: float,
+    own: np.ndarray,
+    deep: np.ndarray,
 ) -> None:
     """The place of its own scan nearest to each point, -1 where there is none, and how deep inside the scan that is."""
     for p in range(len(points)):

@@ -34,7 +34,12 @@ def mark_rim(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, asi
 
 @kernel
 def face_like(
-    points: np.ndarray, normals: np.ndarray, places: np.ndarray, place_normals: np.ndarray, boxes: SearchBoxes, reach: float
+    points: np.ndarray,
+    normals: np.ndarray,
+    places: np.ndarray,
+    place_normals: np.ndarray,
+    boxes: SearchBoxes,
+    reach: float,
 ) -> None:
     """Turn each normal to the side that the normal of the nearest place faces; where none is near it stays."""
     for p in range(len(points)):
@@ -82,9 +87,7 @@ def turned(pose: np.ndarray, v: Vector) -> Vector:
 
 
 @kernel
-def _add(
-    sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: float, weight: float
-) -> None:
+def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: float, weight: float) -> None:
     """Add one pair of places to the (7, 7) sums: difference d, normals n and m, lever arm from the centre.
 
     Plane-to-plane (Segal, Haehnel and Thrun 2009): the difference counts by the inverse of C = 2 I - (1 - e)(n n' + m m'), here

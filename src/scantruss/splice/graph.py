@@ -46,7 +46,9 @@ def assemble(
     """
     group_of = {i: Group([i], {i: np.eye(4)}, {i: 1.0}) for i in range(len(scans))}
     waiting = sorted(pairs, key=lambda pair: (-pair.fit.score, pair.first, pair.second))
-    tried: dict[tuple[int, ...], bool] = {}  # two groups between which nothing has come of it, and whether for too many ways
+    tried: dict[
+        tuple[int, ...], bool
+    ] = {}  # two groups between which nothing has come of it, and whether for too many ways
     at = 0
     while at < len(waiting):
         progress("assemble", 1.0 - len({id(group) for group in group_of.values()}) / len(scans))
@@ -217,7 +219,9 @@ def settle(
                 if k > 0:
                     group.poses[i] = small_motion(moves[k, :3], moves[k, 3:], centre[0]) @ group.poses[i]
             spacing = views[group.members[0]].spacing
-            if (np.linalg.norm(moves[:, :3], axis=1) * size + np.linalg.norm(moves[:, 3:], axis=1)).max() < 2e-3 * spacing:
+            if (
+                np.linalg.norm(moves[:, :3], axis=1) * size + np.linalg.norm(moves[:, 3:], axis=1)
+            ).max() < 2e-3 * spacing:
                 break
 
 

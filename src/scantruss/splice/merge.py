@@ -22,7 +22,9 @@ BESIDE = 2.2  # reach in which a scan sees a point, in spacings
 OFF = 2.0  # distance across the surface up to which two layers are the same, in spacings
 
 
-def merge_scans(scans: list[Scan], group: Group, progress: Callable[[str, float], None]) -> tuple[np.ndarray, list[int]]:
+def merge_scans(
+    scans: list[Scan], group: Group, progress: Callable[[str, float], None]
+) -> tuple[np.ndarray, list[int]]:
     """Return the points (N, 3) of all scans of a group in its frame, and how many of each member were kept."""
     depth = {i: _depth(scans[i].fine) for i in group.members}
     ranked = sorted(group.members, key=lambda i: (scans[i].cloud.spacing, i))
@@ -43,9 +45,7 @@ def _depth(view: View) -> np.ndarray:
     return depth
 
 
-def _points_of(
-    scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndarray], ranked: list[int]
-) -> np.ndarray:
+def _points_of(scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndarray], ranked: list[int]) -> np.ndarray:
     """Return the points that scan i gives to the whole, moved to the mean layer, in the frame of the group."""
     points, view = scans[i].cloud.points, scans[i].fine
     own, deep = np.empty(len(points), np.int64), np.empty(len(points))

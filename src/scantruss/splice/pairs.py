@@ -22,6 +22,7 @@ WORSE = 0.2  # of them those whose score is not below this share of the best
 FEW = 800  # places of a scan that are enough to align it
 KEPT = 3  # poses of a pair that are handed on
 GOOD = 0.9  # agreement at which the other side of the normals need not be looked at
+BULGE = 0.6  # how surely normals must face the outside for the other side not to be looked at
 SHARE = 0.03  # overlap below which a pair is not considered
 AGREEMENT = 0.6  # agreement below which it is not
 NOISE = 3.0  # distance within which two scans agree, in the noise of both together
@@ -78,7 +79,8 @@ def _find_pair(scans: list[Scan], features: list[np.ndarray], first: int, second
     """Return the poses in which two scans may belong together, the best first."""
     one, other = scans[first], scans[second]
     found: list[Pair] = []
-    for turn in (1.0, -1.0):
+    sure = min(one.coarse.bulge, other.coarse.bulge) > BULGE  # then the normals of both face outside
+    for turn in (1.0,) if sure else (1.0, -1.0):
         candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, CANDIDATES)
         poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:ALIGNED]
         reach = one.coarse.spacing

@@ -50,8 +50,14 @@ def _pose_of(value: Any, where: str) -> np.ndarray:
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise FormatError(f"{where}: needs a 4 x 4 matrix of numbers, or a rotation R (3 x 3) and a translation t (3)")
     u, _, v = np.linalg.svd(pose[:3, :3])
-    if np.abs(u @ v - pose[:3, :3]).max() > SKEW or np.linalg.det(u @ v) < 0.0 or np.abs(pose[3] - [0, 0, 0, 1]).max() > SKEW:
-        raise FormatError(f"{where}: the matrix is no rigid motion; it needs a rotation and a translation, without scale")
+    if (
+        np.abs(u @ v - pose[:3, :3]).max() > SKEW
+        or np.linalg.det(u @ v) < 0.0
+        or np.abs(pose[3] - [0, 0, 0, 1]).max() > SKEW
+    ):
+        raise FormatError(
+            f"{where}: the matrix is no rigid motion; it needs a rotation and a translation, without scale"
+        )
     return make_pose(u @ v, pose[:3, 3])
 
 

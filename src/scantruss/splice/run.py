@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,8 +48,8 @@ class Splice:
 
     @property
     def frame(self) -> str:
-        """Name of the scan whose frame is the common one."""
-        return next(name for name, pose in self.poses.items() if np.array_equal(pose, np.eye(4)))
+        """Name of the scan whose frame is the common one; "" where it is that of poses used as given."""
+        return next((name for name, pose in self.poses.items() if np.array_equal(pose, np.eye(4))), "")
 
 
 def splice_scans(
@@ -93,10 +93,11 @@ def splice_scans(
     order = sorted(range(len(clouds)), key=lambda k: _digest(clouds[k]))
     scans = prepare_scans([clouds[k] for k in order], [names[k] for k in order], progress)
     local = [_into_local(given[k], clouds[k]) for k in order]
+    doubtful: tuple[str, ...] = ()
     if use_poses:
-        group, doubtful = _as_given(scans, [pose for pose in local if pose is not None]), ()
+        group = _as_given(scans, [pose for pose in local if pose is not None])
     else:
-        scans, group, doubtful = _put_together(scans, local, progress)
+        scans, group, doubtful = _put_together(scans, names, local, progress)
     first = min(group.members, key=lambda i: order[i])
     return _result(scans, group, first, progress, names, doubtful, as_given=use_poses)
 
@@ -126,10 +127,12 @@ def _into_local(pose: np.ndarray | None, cloud: PointCloud) -> np.ndarray | None
 
 
 def _put_together(
-    scans: list[Scan], given: list[np.ndarray | None], progress: Progress
+    scans: list[Scan], names: list[str], given: list[np.ndarray | None], progress: Progress
 ) -> tuple[list[Scan], Group, tuple[str, ...]]:
     """Return all scans with the strictness they were judged with, those that fit together, and who fits in several ways."""
-    pairs = [pair for first in range(len(scans)) for second in range(first) for pair in _start(scans, given, second, first)]
+    pairs = [
+        pair for first in range(len(scans)) for second in range(first) for pair in _start(scans, given, second, first)
+    ]
     done = {(pair.first, pair.second) for pair in pairs}
     wanted = [(i, j) for j in range(len(scans)) for i in range(j) if (i, j) not in done]
     if wanted:
@@ -140,7 +143,7 @@ def _put_together(
     groups, doubtful = assemble(scans, rejudge(pairs, scans), progress)
     group = groups[0]
     if 2 * len(group.members) <= len(scans):
-        raise InputError(_why_not(scans, groups, doubtful))
+        raise InputError(_why_not(scans, names, groups, doubtful))
     settle(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
     settle(
         scans, group, [scan.fine for scan in scans], (2.0, 1.0, 1.0), steps=8, few=6000,
@@ -149,15 +152,20 @@ def _put_together(
     return scans, group, tuple(scans[i].name for i in doubtful if i not in group.members)
 
 
-def _why_not(scans: list[Scan], groups: list[Group], doubtful: set[int]) -> str:
+def _why_not(scans: list[Scan], names: list[str], groups: list[Group], doubtful: set[int]) -> str:
     """Return the words on scans of which most do not fit together."""
-    several = ", ".join(scans[i].name for i in sorted(doubtful))
-    parts = "; ".join(" and ".join(scans[i].name for i in g.members) for g in groups if len(g.members) > 1)
+
+    def listed(members: Iterable[int]) -> list[str]:
+        return sorted((scans[i].name for i in members), key=names.index)
+
+    parts = "; ".join(" and ".join(listed(group.members)) for group in groups if len(group.members) > 1)
     said = f"only {parts} do" if parts else "no overlap tells how they lie"
-    if several:
-        said = f"{several} fit in more ways than one, as parts of a symmetric shape do"
-    names = ", ".join(scan.name for scan in scans)
-    return f"the scans {names} do not fit together: {said}; give scans that overlap more, or poses to start from (--poses)"
+    if doubtful:
+        said = f"{', '.join(listed(doubtful))} fit in more ways than one, as parts of a symmetric shape do"
+    return (
+        f"the scans {', '.join(names)} do not fit together: {said}; give scans that overlap more, or poses to start from"
+        " (--poses)"
+    )
 
 
 def _start(scans: list[Scan], given: list[np.ndarray | None], first: int, second: int) -> list[Pair]:

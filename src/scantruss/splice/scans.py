@@ -14,7 +14,9 @@ from .views import View, make_view
 PARTS = 75.0  # coarse spacings along the diagonal of a typical scan
 MIDDLE = 2.5  # middle spacings in a coarse one
 FINEST = 400.0  # most fine spacings along the diagonal of a typical scan
-FINE = 1.5  # fine spacing, in spacings of the points
+FINE = 1.2  # fine spacing, in distances between points
+COARSEST = 1.2  # least coarse spacing, in distances between points
+UNEVEN = 1.4  # distance of the sixth neighbour in points as even as those of a range grid, in distances between points
 FEWEST = 60  # coarse places below which a scan is too small to be told by its features
 
 
@@ -49,10 +51,10 @@ def prepare_scans(
         A scan is too small or too sparse beside the others to be told by its shape.
     """
     diagonal = typical_diagonal(clouds)
-    spacing = float(np.median([cloud.spacing for cloud in clouds]))
-    coarse = max(diagonal / PARTS, 3.0 * spacing)
-    middle = max(coarse / MIDDLE, 1.5 * spacing)
-    fine = min(max(FINE * spacing, diagonal / FINEST), middle)
+    apart = float(np.median([max(cloud.spacing, cloud.gap / UNEVEN) for cloud in clouds]))
+    coarse = max(diagonal / PARTS, COARSEST * apart)
+    middle = max(coarse / MIDDLE, FINE * apart)
+    fine = min(max(FINE * apart, diagonal / FINEST), middle)
     scans = []
     for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
         progress("prepare", place / len(clouds))

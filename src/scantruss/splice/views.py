@@ -28,6 +28,7 @@ class View:
     boxes: SearchBoxes  #: of the places
     spacing: float  #: distance the places keep [scan unit]
     noise: float  #: typical distance of a place from the plane of its neighbours [scan unit]
+    bulge: float  #: how surely the normals face the outside of a bulge, 0 to 1
     strict: float = 1.0  #: by what the distance is lessened within which other scans agree with this one
 
 
@@ -56,15 +57,15 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     if coarse is None:
         _face_one_side(places, normals, neighbors)
     else:
-        kernels_of_overlap.face_like(
-            places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing
-        )
+        kernels_of_overlap.face_like(places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing)
     smoothed = np.empty_like(normals)
     facing.smooth_normals(normals, neighbors, 0.7, smoothed)
     aside = np.zeros(len(places))
     kernels_of_overlap.mark_rim(places, normals, neighbors, aside)
     noise = float(np.median(thickness)) if len(places) else 0.0
-    return View(places, smoothed, aside > RIM, boxes_of(places, 1.5 * spacing), spacing, noise)
+    return View(
+        places, smoothed, aside > RIM, boxes_of(places, 1.5 * spacing), spacing, noise, abs(_bulge(places, smoothed))
+    )
 
 
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
@@ -104,9 +105,7 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
     in_parts(
         len(points),
         3000,
-        lambda _, begin, end: kernels.nearest_sites(
-            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
-        ),
+        lambda _, begin, end: kernels.nearest_sites(points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end),
     )
     far = 3.3 * spacing  # the kernel looks farther where there are few; here those are strays
     off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
@@ -131,5 +130,11 @@ def _face_one_side(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarra
         sign = np.where(sums @ view < 0.0, -1.0, 1.0)
         view = (sign[votes, None] * sums[votes]).sum(axis=0) if len(votes) else view
     normals *= sign[inverse][:, None]
-    if len(places) and (normals * (places - places.mean(axis=0))).sum() < 0.0:
+    if len(places) and _bulge(places, normals) < 0.0:
         normals *= -1.0
+
+
+def _bulge(places: np.ndarray, normals: np.ndarray) -> float:
+    """Return by how much more the normals point away from the middle of the places than towards it, -1 to 1."""
+    rise = (normals * (places - places.mean(axis=0))).sum(axis=1) if len(places) else np.zeros(1)
+    return float(rise.sum() / max(np.abs(rise).sum(), 1e-300))
