@@ -89,8 +89,9 @@ def test_a_stranger_is_left_out_by_name(scanned):
     scans, poses, _ = scanned
     chance = np.random.default_rng(9)
     stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], chance)
-    result = splice_scans(clouds_of([stranger[0], *scans[:3]]), ["stranger", *NAMES[:3]])
-    assert result.left_out == ("stranger",) and result.frame == "a"
+    inches = 39.37 * stranger[0]
+    result = splice_scans(clouds_of([stranger[0], *scans[:3], inches]), ["stranger", *NAMES[:3], "inches"])
+    assert result.left_out == ("stranger", "inches") and result.frame == "a"
     assert not any("stranger" in (pair.first, pair.second) for pair in result.pairs)
     turned, moved = errors_of(result.poses, poses[:3], scans[:3], NAMES[:3])
     assert turned < 0.5 and moved < 0.5 * result.spacing

@@ -130,11 +130,11 @@ def _put_together(
     scans: list[Scan], names: list[str], given: list[np.ndarray | None], progress: Progress
 ) -> tuple[list[Scan], Group, tuple[str, ...]]:
     """Return all scans with the strictness they were judged with, those that fit together, and who fits in several ways."""
-    pairs = [
-        pair for first in range(len(scans)) for second in range(first) for pair in _start(scans, given, second, first)
-    ]
+    telling = [i for i, scan in enumerate(scans) if scan.tells]
+    both = [(i, j) for j in telling for i in telling if i < j]
+    pairs = [pair for i, j in both for pair in _start(scans, given, i, j)]
     done = {(pair.first, pair.second) for pair in pairs}
-    wanted = [(i, j) for j in range(len(scans)) for i in range(j) if (i, j) not in done]
+    wanted = [pair for pair in both if pair not in done]
     if wanted:
         progress("features", 0.0)
         pairs += find_pairs(scans, find_features([scan.coarse for scan in scans]), wanted, progress)
@@ -158,8 +158,11 @@ def _why_not(scans: list[Scan], names: list[str], groups: list[Group], doubtful:
     def listed(members: Iterable[int]) -> list[str]:
         return sorted((scans[i].name for i in members), key=names.index)
 
+    mute = listed(i for i, scan in enumerate(scans) if not scan.tells)
     parts = "; ".join(" and ".join(listed(group.members)) for group in groups if len(group.members) > 1)
     said = f"only {parts} do" if parts else "no overlap tells how they lie"
+    if mute:
+        said += f", and {', '.join(mute)} have too few points for the size of the others, or are in another unit"
     if doubtful:
         said = f"{', '.join(listed(doubtful))} fit in more ways than one, as parts of a symmetric shape do"
     return (

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
 from ..scan.cloud import PointCloud
 from .views import View, make_view
 
@@ -30,6 +29,11 @@ class Scan:
     middle: View
     fine: View
 
+    @property
+    def tells(self) -> bool:
+        """Whether it is large enough beside the others to be told by its shape."""
+        return len(self.coarse.points) >= FEWEST
+
 
 def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
     """Return the median over the scans of the diagonal of the box that holds all but a few stray points [scan unit]."""
@@ -43,13 +47,7 @@ def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
 def prepare_scans(
     clouds: Sequence[PointCloud], names: Sequence[str], progress: Callable[[str, float], None]
 ) -> list[Scan]:
-    """Return the scans with their views, all at the same three spacings.
-
-    Raises
-    ------
-    InputError
-        A scan is too small or too sparse beside the others to be told by its shape.
-    """
+    """Return the scans with their views, all at the same three spacings."""
     diagonal = typical_diagonal(clouds)
     apart = float(np.median([max(cloud.spacing, cloud.gap / UNEVEN) for cloud in clouds]))
     coarse = max(diagonal / PARTS, COARSEST * apart)
@@ -59,11 +57,9 @@ def prepare_scans(
     for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
         progress("prepare", place / len(clouds))
         wide = make_view(cloud.points, coarse)
-        if len(wide.points) < FEWEST:
-            raise InputError(
-                f"{name} covers {len(wide.points)} patches of {coarse:.3g}, and {FEWEST} are needed to tell where it belongs;"
-                " is it in another unit, or too sparse?"
-            )
+        if len(wide.points) < FEWEST:  # in another unit, or too sparse beside the others
+            scans.append(Scan(name, cloud, wide, wide, wide))
+            continue
         middle_view = make_view(cloud.points, middle, wide)
         fine_view = make_view(cloud.points, fine, wide) if fine < middle else middle_view
         scans.append(Scan(name, cloud, wide, middle_view, fine_view))
