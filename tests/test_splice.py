@@ -89,9 +89,8 @@ def test_a_stranger_is_left_out_by_name(scanned):
     scans, poses, _ = scanned
     chance = np.random.default_rng(9)
     stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], chance)
-    inches = 39.37 * stranger[0]
-    result = splice_scans(clouds_of([stranger[0], *scans[:3], inches]), ["stranger", *NAMES[:3], "inches"])
-    assert result.left_out == ("stranger", "inches") and result.frame == "a"
+    result = splice_scans(clouds_of([stranger[0], *scans[:3]]), ["stranger", *NAMES[:3]])
+    assert result.left_out == ("stranger",) and result.frame == "a"
     assert not any("stranger" in (pair.first, pair.second) for pair in result.pairs)
     turned, moved = errors_of(result.poses, poses[:3], scans[:3], NAMES[:3])
     assert turned < 0.5 and moved < 0.5 * result.spacing
@@ -116,7 +115,8 @@ def test_units_do_not_matter(scanned):
     scans, _, _result = scanned
     far = np.array([4e5, 5e6, 100.0])
     large = splice_scans(clouds_of([1000.0 * scan + far for scan in scans[:2]]), NAMES[:2])
-    small = splice_scans(clouds_of(scans[:2]), NAMES[:2])
+    small = splice_scans(clouds_of([*scans[:2], 39.37 * scans[2]]), [*NAMES[:2], "inches"])
+    assert small.left_out == ("inches",)  # one scan in another unit is no obstacle
     move = np.eye(4)
     move[:3, :3] *= 1000.0
     move[:3, 3] = far

@@ -53,7 +53,7 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
         places = np.ascontiguousarray(places[sound])
         neighbors = link(places, spacing)
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
-    facing.site_normals(places, neighbors, normals, thickness)
+    facing.site_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
         _face_one_side(places, normals, neighbors)
     else:
@@ -115,7 +115,7 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
 
 def _face_one_side(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Turn all normals to one side: along the links of each piece, the pieces as one sensor sees them, outwards as a whole."""
-    weights = np.empty(neighbors.shape)
+    weights = np.empty(neighbors.shape, np.uint16)
     facing.link_weights(places, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(places), np.int64)
