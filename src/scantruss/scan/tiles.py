@@ -1,0 +1,216 @@
+"""Tiles: files, or ranges of files, that can be read by themselves and by anybody.
+
+A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole.
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FormatError
+from .kinds import read_head, unreadable, wrong_kind
+from .layout import ANY, Layout, find_layout
+from .ply import _row_type
+from .ply_header import read_header
+from .readers import READERS
+
+TILE = 8_000_000  # points of a tile
+TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
+TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of points as its header describes it."""
+
+    path: Path
+    kind: str  #: las, rows (of fixed size), text, or whole
+    points: int  #: points that the header promises; a guess for text, or for a file that is read whole
+    begin: int = 0  #: byte at which points begin: rows, text
+    end: int = 0  #: byte behind the points: text
+    rows: np.dtype[np.void] | None = None  #: layout of a row
+    columns: tuple[int, ...] = ()  #: of the coordinates: text
+    layout: Layout | None = None  #: of a text
+
+    @property
+    def whole(self) -> bool:
+        """Whether it can only be read whole, with memory for all of its points."""
+        return self.kind == "whole"
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A part of a file: points, or bytes of a text."""
+
+    source: Source
+    begin: int
+    end: int
+
+    @property
+    def points(self) -> int:
+        """About how many points are in it."""
+        if self.source.kind != "text":
+            return self.end - self.begin
+        share = (self.end - self.begin) / max(self.source.end - self.source.begin, 1)
+        return max(round(share * self.source.points), 1)
+
+
+def find_files(names: Iterable[str | Path]) -> list[Path]:
+    """Return the files of a scan in several pieces: names, or patterns such as ``tiles/*.laz``; each once, in the order of names.
+
+    Raises
+    ------
+    FormatError
+        Nothing has such a name.
+    """
+    found: dict[Path, None] = {}
+    for name in names:
+        text = str(name)
+        if not glob.has_magic(text) or Path(text).exists():
+            found[Path(text)] = None
+            continue
+        matches = sorted(glob.glob(text, recursive=True), key=_by_number)
+        if not matches:
+            raise FormatError(f"no file is named as {text}; check the pattern")
+        found.update(dict.fromkeys(map(Path, matches)))
+    return list(found)
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    """Order tile-2 before tile-10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def find_source(path: str | Path) -> Source:
+    """Return what the header of a file says of its points, without reading them.
+
+    Raises
+    ------
+    FormatError
+        The file is missing, empty, damaged, or of another kind than its suffix says.
+    """
+    path = Path(path)
+    head = read_head(path)
+    suffix = path.suffix.lower()
+    if suffix not in READERS:
+        known = " ".join(sorted(READERS))
+        raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}')
+    try:
+        if suffix in (".las", ".laz"):
+            return _las(path, head)
+        if suffix == ".ply" and (source := _ply(path)) is not None:
+            return source
+        if suffix == ".npy" and (source := _npy(path)) is not None:
+            return source
+        if suffix in TEXTS and (source := _text(path, head)) is not None:
+            return source
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
+    return Source(path, "whole", max(path.stat().st_size // TEXT_POINT, 1))
+
+
+def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
+    """Yield the tiles of some files, of about so many points each."""
+    for source in sources:
+        if source.whole:
+            yield Tile(source, 0, source.points)
+            continue
+        first, last, step = 0, source.points, points
+        if source.kind == "text":
+            first, last = source.begin, source.end
+            step = max(points * (last - first) // max(source.points, 1), 1)
+        for begin in range(first, last, step):
+            yield Tile(source, begin, min(begin + step, last))
+
+
+def _las(path: Path, head: bytes) -> Source:
+    if not head.startswith(b"LASF"):
+        raise wrong_kind(path, head, "a LAS or LAZ file")
+    import laspy
+
+    try:
+        with laspy.open(path) as file:
+            return Source(path, "las", int(file.header.point_count))
+    except BaseException as error:
+        raise unreadable(path, "LAS or LAZ", error) from None
+
+
+def _ply(path: Path) -> Source | None:
+    """Return a binary PLY file whose first element is vertex, without lists."""
+    if not re.match(rb"ply[ \t]*[\r\n]", read_head(path)):
+        return None
+    header = read_header(path)
+    vertex = header.elements[0] if header.elements else None
+    if not header.order or vertex is None or vertex.name != "vertex" or vertex.has_lists:
+        return None
+    rows = _row_type(vertex, header.order, [0] * len(vertex.properties))
+    if not {"x", "y", "z"} <= set(rows.names or ()):
+        return None
+    return _rows(path, vertex.count, header.start, rows)
+
+
+def _npy(path: Path) -> Source | None:
+    """Return an NPY file of rows; None for one by columns, of objects, or another shape."""
+    try:
+        with path.open("rb") as file:
+            version = np.lib.format.read_magic(file)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, by_columns, kind = read(file)
+            start = file.tell()
+    except (ValueError, EOFError):
+        return None
+    if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
+        if all(kind[axis].kind in "fiu" and not kind[axis].shape for axis in "xyz"):
+            return _rows(path, shape[0], start, kind)
+        return None
+    if len(shape) != 2 or shape[1] < 3 or by_columns or kind.kind not in "fiu":
+        return None
+    names = ["x", "y", "z", *(f"other {c}" for c in range(3, shape[1]))]
+    return _rows(path, shape[0], start, np.dtype([(name, kind) for name in names]))
+
+
+def _rows(path: Path, count: int, start: int, rows: np.dtype[np.void]) -> Source:
+    held = max(path.stat().st_size - start, 0) // rows.itemsize
+    if held < count:
+        raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
+    return Source(path, "rows", count, start, rows=rows)
+
+
+def _text(path: Path, head: bytes) -> Source | None:
+    """Return a text file in which a line is a point wherever one enters it."""
+    layout = find_layout(path)
+    if layout.encoding == "utf-16" or layout.separator == ANY or b"\r" in head.replace(b"\r\n", b""):
+        return None
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        for _ in range(layout.skip):
+            file.readline()
+        start = file.tell()
+        sample = file.read(1 << 16)
+    lines = max(sample.count(b"\n"), 1)
+    points = layout.promised or max(round((size - start) * lines / max(len(sample), 1)), 1)
+    columns = layout.columns
+    if len(columns) == 4:
+        columns = columns[1:] if _counts(path, layout, size) else columns[:3]
+    return Source(path, "text", points, start, size, columns=columns, layout=layout)
+
+
+def _counts(path: Path, layout: Layout, size: int) -> bool:
+    """Whether the first of four columns is a running number at the start, in the middle and at the end of a text."""
+    from .chunks import text_rows
+
+    for begin in {0, size // 2, max(size - (1 << 14), 0)}:
+        with path.open("rb") as file:
+            file.seek(begin)
+            lines = file.read(1 << 14).split(b"\n")
+        lines = lines[layout.skip if begin == 0 else 1 : -1 if begin + (1 << 14) < size else None]
+        rows = text_rows(path, b"\n".join(lines), layout, layout.columns, at="")
+        if len(rows) > 1 and not (np.diff(rows[:, 0]) == 1).all():
+            return False
+    return True
