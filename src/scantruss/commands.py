@@ -63,7 +63,7 @@ def info(values: Namespace) -> None:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_settings
+    from .options import Parser, add_settings, size_of_memory
 
     parser = Parser(
         "grid",
@@ -83,6 +83,9 @@ def grid_parser() -> Parser:
         action="store_true",
         help="write a grid that fails its certificate too; the exit status is 3 either way",
     )
+    parser.add_argument(
+        "--memory", metavar="SIZE", type=size_of_memory, help="a larger scan is thinned, as 4GB (default: half of what is free)"
+    )
     add_settings(parser)
     return parser
 
@@ -100,6 +103,7 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
+        settings = thin_to_fit([values.scan], settings, values.memory)
         cloud = read_scan(values.scan, settings, bars)
         result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
     from .export.formats import write
@@ -146,10 +150,34 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     from .scan.readers import read_points
 
     bars("read", 0.0)
-    cloud = read_points(path, unit=settings.unit)
+    if settings.thin_spacing:
+        cloud = read_thinned_scan([path], settings, bars)
+    else:
+        cloud = read_points(path, unit=settings.unit)
     bars("read", 1.0)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
+    return cloud
+
+
+def thin_to_fit(names: Sequence[str], settings: Settings, memory: float | None) -> Settings:
+    """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
+    from .scan.streaming import spacing_to_fit
+
+    spacing = spacing_to_fit(names, settings, memory)
+    return settings.replace(thin_spacing=spacing) if spacing else settings
+
+
+def read_thinned_scan(names: Sequence[str], settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan that is thinned while it is read, and say so."""
+    from .scan.streaming import read_thinned
+
+    cloud, read = read_thinned(names, settings, bars)
+    unit = f" {settings.unit}" if settings.unit else ""
+    bars.note(
+        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
+        " --thin-spacing 0 takes all"
+    )
     return cloud
 
 
