@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import CertificateError, FormatError, InputError
+from .scale_commands import sweep, sweep_parser, thin, thin_parser
 from .settings import CURVATURE
 
 if TYPE_CHECKING:
@@ -300,6 +301,8 @@ def demo(values: Namespace) -> None:
 COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
     "info": (info_parser, info),
     "grid": (grid_parser, grid),
+    "thin": (thin_parser, thin),
+    "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
     "demo": (demo_parser, demo),
 }
