@@ -86,7 +86,7 @@ def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
     """Return the workers of the command line, and say who they are where they are several."""
     from .workers import NEEDS_DASK, Processes, open_workers
 
-    workers = open_workers(values.workers or count if values.workers != 0 else 0, values.scheduler)
+    workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
     if isinstance(workers, Processes):
         bars.note(f"{workers.words}; a cluster {NEEDS_DASK}")
     elif workers.count > 1 or values.scheduler:
@@ -179,7 +179,7 @@ def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:
         one |= {name: varied[name][number][1] for name, number in zip(varied, pick, strict=True)}
         return settings_of(Namespace(**(vars(values) | one)))
 
-    words = {option_of(name).lstrip("-"): [word for word, _ in value] for name, value in varied.items()}
+    words = {option_of(name).removeprefix("--"): [word for word, _ in value] for name, value in varied.items()}
     return trials_of(words, choose), tuple(words)
 
 
@@ -204,5 +204,6 @@ def _save(
         save.beside(folder / "table.csv").write_bytes(encode_table_csv(head, rows))
         save.beside(folder / "table.md").write_bytes(encode_table_markdown(head, rows))
         save.beside(folder / "index.html").write_bytes(encode_page(title, head, rows, trials, outcomes))
-        pictures = [(title_of(trial), outcome.picture) for trial, outcome in zip(trials, outcomes, strict=True)]
+        both = zip(trials, outcomes, strict=True)
+        pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
         save.beside(folder / "overview.png").write_bytes(encode_sheet(pictures))

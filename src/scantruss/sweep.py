@@ -23,6 +23,7 @@ class Trial:
     """Settings to be tried, and what is different in them."""
 
     name: str  #: of its files
+    title: str  #: for people
     varied: tuple[str, ...]  #: values of what is varied, in words
     settings: Settings
 
@@ -69,7 +70,8 @@ def trials_of(varied: Mapping[str, Sequence[str]], choose: Callable[[tuple[int, 
     for pick in picks:
         words = tuple(values[number] for values, number in zip(varied.values(), pick, strict=True))
         name = "_".join(f"{key}-{_file_name(word)}" for key, word in zip(varied, words, strict=True)) or "grid"
-        trials.append(Trial(name, words, choose(pick)))
+        title = ", ".join(f"{key} {word}" for key, word in zip(varied, words, strict=True)) or "grid"
+        trials.append(Trial(name, title, words, choose(pick)))
     if len({trial.name for trial in trials}) < len(trials):
         raise InputError("a value is named twice; name each once")
     return trials

@@ -8,13 +8,14 @@ from typing import Any
 
 from .strokes import INK, PAPER
 
-PICTURE = (560, 420)  #: of one of them [pixel]
-TITLE = 36  # above each [pixel]
+PICTURE = (560, 391)  #: of one of them [pixel]
+TITLE = 60  # above each [pixel]
+SHOWN = 0.93  # of its height; the caption below is too small here
 MOST = 4  # in a row
 
 
 def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
-    """Return one PNG of PNGs with a title each, row by row; one without a picture shows its title alone."""
+    """Return one PNG of PNGs with a title each, row by row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from PIL import Image
@@ -26,14 +27,14 @@ def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
     canvas: Any = FigureCanvasAgg(figure)
     for number, (title, png) in enumerate(pictures):
         x, y = number % columns * PICTURE[0], tall - (number // columns) * (PICTURE[1] + TITLE) - TITLE
-        if png:
-            with Image.open(io.BytesIO(png)) as image:
-                small = image.convert("RGB").resize(PICTURE, Image.Resampling.LANCZOS)
-            figure.figimage(small, x, y - PICTURE[1], origin="upper")
+        with Image.open(io.BytesIO(png)) as image:
+            part = (0, 0, image.width, round(SHOWN * image.height))
+            small = image.convert("RGB").resize(PICTURE, Image.Resampling.LANCZOS, box=part)
+        figure.figimage(small, x, y - PICTURE[1], origin="upper")
         figure.text(
             (x + PICTURE[0] / 2) / wide,
             (y + TITLE / 2) / tall,
-            title if png else f"{title}: no grid",
+            title,
             fontsize=12,
             color=tuple(INK),
             ha="center",

@@ -66,7 +66,7 @@ def take_extremes(table: BoxTable, row: int, points: np.ndarray, n: int, fresh: 
     for side in range(6):
         if fresh or is_farther(points, n, table.extremes, row, side):
             for c in range(3):
-                table.extremes[row, 3 * side + c] = points[n, c]
+                table.extremes[row, 3 * side + c] = points[n, c] + 0.0  # -0.0 is the same place as 0.0
 
 
 @kernel
@@ -180,13 +180,13 @@ def take_nearest(
         nearer = squared < best[row, 0]
         for c in range(3):
             if nearer:
-                best[row, 1 + c] = points[n, c]
+                best[row, 1 + c] = points[n, c] + 0.0
             elif points[n, c] != best[row, 1 + c]:
                 if points[n, c] > best[row, 1 + c]:
                     break
                 nearer = True
                 for d in range(c + 1):
-                    best[row, 1 + d] = points[n, d]
+                    best[row, 1 + d] = points[n, d] + 0.0
         best[row, 0] = squared
     return missed
 

@@ -60,8 +60,8 @@ def encode_page(
         figures = "".join(f"<td>{escape(cell)}</td>" for cell in row[:-1])
         lines.append(f'<tr>{figures}<td class="words">{escape(row[-1])}</td></tr>')
     pictures = [
-        f'<figure><a href="{escape(trial.name)}.png"><img src="{escape(trial.name)}.png" alt="{escape(title_of(trial))}"></a>'
-        f'<figcaption>{escape(title_of(trial))} (<a href="{escape(trial.name)}.json">grid</a>)</figcaption></figure>'
+        f'<figure><a href="{escape(trial.name)}.png"><img src="{escape(trial.name)}.png" alt="{escape(trial.title)}"></a>'
+        f'<figcaption>{escape(trial.title)} (<a href="{escape(trial.name)}.json">grid</a>)</figcaption></figure>'
         for trial, outcome in zip(trials, outcomes, strict=True)
         if outcome.picture
     ]
@@ -75,6 +75,8 @@ def encode_page(
     ).encode()
 
 
-def title_of(trial: Trial) -> str:
-    """Return what is varied in a trial, in words."""
-    return ", ".join(trial.varied) or "grid"
+def title_of(trial: Trial, outcome: Outcome) -> str:
+    """Return two lines over a picture: what is varied, and the figures that tell most."""
+    figures = dict(zip(FIGURES, outcome.figures, strict=True))
+    told = f"{figures['members']} members, std/mean {figures['length std/mean']}, shape {figures['shape']}"
+    return f"{trial.title}\n{told}"
