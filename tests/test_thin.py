@@ -30,10 +30,10 @@ def in_parts(points, spacing, cuts, *, merged, rim=False):
         if merged:
             own = Thinning(spacing, rim=rim)
             own.add(part)
-            whole.add_rows(own.to_rows())
+            whole.add_rows(own.take_rows())
         else:
             whole.add(part)
-    return whole.to_rows()
+    return whole.take_rows()
 
 
 def same_rows(one: Rows, other: Rows):

@@ -85,7 +85,10 @@ def grid_parser() -> Parser:
         help="write a grid that fails its certificate too; the exit status is 3 either way",
     )
     parser.add_argument(
-        "--memory", metavar="SIZE", type=size_of_memory, help="a larger scan is thinned, as 4GB (default: half of what is free)"
+        "--memory",
+        metavar="SIZE",
+        type=size_of_memory,
+        help="a larger scan is thinned, as 4GB (default: half of what is free)",
     )
     add_settings(parser)
     return parser

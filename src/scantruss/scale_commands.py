@@ -70,9 +70,7 @@ def thin(values: Namespace) -> None:
         for source in sources:
             if source.whole and source.points > MANY:
                 bars.note(f"{source.path} cannot be read in parts, so it is read whole")
-        result = thin_scan(
-            files, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars
-        )
+        result = thin_scan(files, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars)
         if result.dropped:
             bars.note(f"{result.dropped:,} points with NaN or infinite coordinates are left out")
         bars("write", 0.0)

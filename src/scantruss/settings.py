@@ -176,7 +176,9 @@ class Settings:
         object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
         if self.fill_holes is not None and not (isinstance(self.fill_holes, int | float) and self.fill_holes >= 0):
             raise InputError(f"fill_holes must be a length of 0 or more, got {self.fill_holes}")
-        if self.thin_spacing is not None and not (isinstance(self.thin_spacing, int | float) and self.thin_spacing >= 0):
+        if self.thin_spacing is not None and not (
+            isinstance(self.thin_spacing, int | float) and self.thin_spacing >= 0
+        ):
             raise InputError(f"thin_spacing must be a length of 0 or more, got {self.thin_spacing}")
         try:
             fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)

@@ -95,9 +95,7 @@ class Processes(Workers):
         waiting: dict[int, Job] = {}
         deaths = 0
         while True:
-            with ProcessPoolExecutor(
-                self.count, multiprocessing.get_context("spawn"), _keep_shared, (shared,)
-            ) as pool:
+            with ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _keep_shared, (shared,)) as pool:
                 try:
                     for number, result in _in_pool(pool, work, coming, waiting, AHEAD * self.count):
                         deaths = 0
@@ -166,7 +164,7 @@ class Cluster(Workers):
                 cluster = LocalCluster(
                     n_workers=count,
                     threads_per_worker=1,
-                    dashboard_address=None,
+                    dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                 )
                 self._ends.enter_context(cluster)

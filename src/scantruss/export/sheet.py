@@ -6,6 +6,8 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from .strokes import INK, PAPER
 
 PICTURE = (560, 391)  #: of one of them [pixel]
@@ -30,7 +32,7 @@ def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
         with Image.open(io.BytesIO(png)) as image:
             part = (0, 0, image.width, round(SHOWN * image.height))
             small = image.convert("RGB").resize(PICTURE, Image.Resampling.LANCZOS, box=part)
-        figure.figimage(small, x, y - PICTURE[1], origin="upper")
+        figure.figimage(np.asarray(small), x, y - PICTURE[1], origin="upper")
         figure.text(
             (x + PICTURE[0] / 2) / wide,
             (y + TITLE / 2) / tall,

@@ -221,7 +221,11 @@ def rim_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray
         if x * x + y * y + z * z < (ASIDE * size) ** 2:
             continue
         for side in range(6):
-            a, b, c = table.extremes[row, 3 * side], table.extremes[row, 3 * side + 1], table.extremes[row, 3 * side + 2]
+            a, b, c = (
+                table.extremes[row, 3 * side],
+                table.extremes[row, 3 * side + 1],
+                table.extremes[row, 3 * side + 2],
+            )
             outwards = (a - means[row, 0]) * x + (b - means[row, 1]) * y + (c - means[row, 2]) * z
             if outwards < 0.0:
                 kept[row, side] = 1

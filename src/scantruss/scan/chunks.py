@@ -99,15 +99,13 @@ def _fixed_rows(tile: Tile, size: int) -> Iterator[np.ndarray]:
 
 
 def _whole(tile: Tile) -> Iterator[np.ndarray]:
-    from .readers import READERS
+    from .readers import read_points
 
-    path = tile.source.path
-    try:
-        yield np.ascontiguousarray(READERS[path.suffix.lower()](path), np.float64)
-    except OSError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
-    except MemoryError:
-        raise FormatError(f"{path} does not fit into the memory of this computer, and cannot be read in parts") from None
+    cloud = read_points(tile.source.path)
+    points = cloud.points + cloud.origin
+    if cloud.dropped:
+        points = np.concatenate([points, np.full((cloud.dropped, 3), np.nan)])  # so that they are counted
+    yield points
 
 
 def _text(tile: Tile) -> Iterator[np.ndarray]:
@@ -120,7 +118,9 @@ def _text(tile: Tile) -> Iterator[np.ndarray]:
             file.seek(tile.begin - 1)
             file.readline()  # of a line that began before: another tile has it
         while (at := file.tell()) < tile.end:
-            block = file.read(min(BLOCK, tile.end - at)) + file.readline()
+            block = file.read(min(BLOCK, tile.end - at))
+            if not block.endswith(b"\n"):
+                block += file.readline()
             if block.strip():
                 yield text_rows(source.path, block, layout, source.columns, at=f", after byte {at:,}")
 

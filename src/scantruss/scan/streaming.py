@@ -37,7 +37,9 @@ SHARE = 0.5  # of the memory at hand that a scan may take
 class Thinned:
     """A scan with one point a box."""
 
-    points: np.ndarray  #: (C, 3) float64 in the scan's own frame [scan unit], by the number of their boxes; then those at the rim
+    points: (
+        np.ndarray
+    )  #: (C, 3) float64 in the scan's own frame [scan unit], by the number of their boxes; then those at the rim
     read: int  #: points that were read
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
     rim: int  #: points that stand for the rim, the last of `points`
@@ -135,7 +137,7 @@ def _all_rows(sources: Sequence[Source], spacing: float, rim: bool, workers: Wor
                 f"{source.path} ends early: its count line promises {promised:,} points,"
                 f" got {read[source.path]:,}; copy it again"
             )
-    return thinning.to_rows()
+    return thinning.take_rows()
 
 
 class _Tiles:
@@ -164,12 +166,10 @@ def _rows_of(tile: Tile, shared: tuple[float, bool]) -> Rows:
     thinning = Thinning(spacing, rim=rim)
     for points in _chunks_there(tile):
         thinning.add(points)
-    return thinning.to_rows()
+    return thinning.take_rows()
 
 
-def _all_nearest(
-    sources: Sequence[Source], rows: Rows, spacing: float, workers: Workers, report: _Share
-) -> np.ndarray:
+def _all_nearest(sources: Sequence[Source], rows: Rows, spacing: float, workers: Workers, report: _Share) -> np.ndarray:
     """Return the points nearest to the means of all boxes."""
     if workers.alone:
 
@@ -228,7 +228,9 @@ def spacing_to_fit(names: Sequence[str | Path], settings: Settings, memory: floa
     return settings.length / FINENESS if points * BYTES > memory else 0.0
 
 
-def read_thinned(names: Sequence[str | Path], settings: Settings, progress: Progress | None = None) -> tuple[PointCloud, int]:
+def read_thinned(
+    names: Sequence[str | Path], settings: Settings, progress: Progress | None = None
+) -> tuple[PointCloud, int]:
     """Return a scan thinned to `settings.thin_spacing` with its rim kept, and how many points were read.
 
     The mean of a box has less noise than its points, but lies up to half a box inside at the rim; so the outermost points there stay.

@@ -94,13 +94,16 @@ class Thinning:
         self._table.counters[NOT_FINITE] += part.dropped
         self.points += part.points
 
-    def to_rows(self) -> Rows:
-        """Return all boxes by their numbers i, j, k; the same for any order in which points came."""
-        count = int(self._table.counters[ROWS])
-        rows = self._table.rows[:count]
+    def take_rows(self) -> Rows:
+        """Return all boxes by their numbers i, j, k, the same for any order in which points came; none are left here."""
+        table, count = self._table, int(self._table.counters[ROWS])
+        rows, extremes = table.rows[:count], table.extremes[:count]
         order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
-        extremes = self._table.extremes[:count][order] if self.rim else np.empty((0, 18))
-        return Rows(rows[order], extremes, self.points, self.dropped)
+        for column in (*rows.T, *extremes.T):  # in their place: they may fill the memory
+            column[:] = column[order] if len(column) else 0
+        found = Rows(rows, extremes, self.points, self.dropped)
+        self._table, self.points = _new_table(FIRST_ROWS, self.rim), 0
+        return found
 
 
 def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", rim: bool = False) -> np.ndarray:
@@ -119,7 +122,7 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", rim: 
     """
     thinning = Thinning(spacing, rim=rim)
     thinning.add(points)
-    rows = thinning.to_rows()
+    rows = thinning.take_rows()
     chosen = means_of(rows.rows, spacing)
     if keep == "nearest":
         found = nearest_in([np.ascontiguousarray(points, np.float64)], rows.rows, spacing)

@@ -98,9 +98,6 @@ def find_source(path: str | Path) -> Source:
     path = Path(path)
     head = read_head(path)
     suffix = path.suffix.lower()
-    if suffix not in READERS:
-        known = " ".join(sorted(READERS))
-        raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}')
     try:
         if suffix in (".las", ".laz"):
             return _las(path, head)
