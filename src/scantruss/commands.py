@@ -154,10 +154,8 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     from .scan.readers import read_points
 
     bars("read", 0.0)
-    if settings.thin_spacing:
-        cloud = read_thinned_scan([path], settings, bars)
-    else:
-        cloud = read_points(path, unit=settings.unit)
+    thin = bool(settings.thin_spacing)
+    cloud = read_thinned_scan([path], settings, bars) if thin else read_points(path, unit=settings.unit)
     bars("read", 1.0)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")

@@ -31,7 +31,7 @@ NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[clust
 
 
 class Workers(AbstractContextManager["Workers"]):
-    """This process alone; the others build on it."""
+    """Nobody but this process; the others build on it."""
 
     count = 1
     alone = True  #: nobody else works, so that a job may use all processors

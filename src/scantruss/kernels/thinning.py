@@ -193,10 +193,10 @@ def take_nearest(
 
 @kernel
 def rim_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
-    """Of the rows from `begin` to `end` mark in `kept` (C, 6) the extremes of boxes at the rim that lie on its outer side; returns their number.
+    """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the rim that lie on its outer side.
 
-    A box is at the rim where the middle of the points around it, the nearer the more they count, lies aside of its own mean: the
-    extremes on the other side stand for the rim, which the mean of a box misses by up to half a box.
+    Returns their number. A box is at the rim where the middle of the points around it, the nearer the more they count, lies
+    aside of its own mean: the extremes on the other side stand for the rim, which a mean misses by up to half a box.
     """
     count = 0
     for row in range(begin, end):

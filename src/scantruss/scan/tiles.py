@@ -75,7 +75,7 @@ def find_files(names: Iterable[str | Path]) -> list[Path]:
         if not glob.has_magic(text) or Path(text).exists():
             found[Path(text)] = None
             continue
-        matches = sorted(glob.glob(text, recursive=True), key=_by_number)
+        matches = sorted(glob.glob(text, recursive=True), key=_by_number)  # noqa: PTH207 - absolute patterns too
         if not matches:
             raise FormatError(f"no file is named as {text}; check the pattern")
         found.update(dict.fromkeys(map(Path, matches)))
