@@ -122,7 +122,7 @@ def rim_of(grid):
 
 
 def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path):
-    """The cloud is so dense that 29 points fall into a box; means alone would lose 0.03 of rim."""
+    """The cloud is so dense that a box holds 14 points; means alone would lose 0.04 of rim."""
     points = plate(600_000)
     np.save(tmp_path / "scan.npy", points)
     settings = st.Settings(length=4.0, effort="quick")
@@ -130,8 +130,9 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     assert thinned.thin_spacing == 0.2 and len(cloud.points) < len(points) / 10
     whole, found = st.grid_from_points(points, settings), st.grid_from_points(cloud.points + cloud.origin, thinned)
     assert found.topology == whole.topology
-    assert [len(loop) for loop in found.boundary_loops] == [len(loop) for loop in whole.boundary_loops]
-    assert abs(rim_of(found) - rim_of(whole)) < 0.02
+    both = zip(found.boundary_loops, whole.boundary_loops, strict=True)
+    assert all(abs(len(one) - len(other)) <= 2 for one, other in both)
+    assert abs(rim_of(found) - rim_of(whole)) < 0.01
     nodes = found.nodes + found.origin
     assert np.abs(nodes[:, 2] - 0.01 * nodes[:, 0] * (40 - nodes[:, 0])).mean() < 0.01
     assert abs(found.quality.shape_mean - whole.quality.shape_mean) < 0.005

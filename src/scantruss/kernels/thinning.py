@@ -26,7 +26,7 @@ ASIDE = 0.25  # it is at the rim where their middle lies farther aside than this
 class BoxTable(NamedTuple):
     """Occupied boxes in a hash table."""
 
-    slots: np.ndarray  #: (H,) int64 row of the box in each slot, -1 free; H is a power of two, at least twice C
+    slots: np.ndarray  #: (H,) int64 row of the box in each slot, -1 free; H is a power of two, at least 1.5 C
     rows: np.ndarray  #: (C, 7) int64 box i, j, k; points in it; sums of their x, y, z from its lower corner [step]
     extremes: np.ndarray  #: (C, 18) float64 points farthest to -x, +x, -y, +y, -z, +z; (0, 18) where not wanted
     counters: np.ndarray  #: (3,) int64 rows in use, points that are not finite, points too far from zero

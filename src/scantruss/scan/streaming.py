@@ -95,7 +95,9 @@ def thin_scan(
         chosen = _all_nearest(sources, rows, spacing, workers, _Share(progress, stages[-1], sources))
     else:
         chosen = means_of(rows.rows, spacing)
-    added = points_at_rim(rows, spacing) if rim else np.empty((0, 3))
+    if not rim:
+        return Thinned(chosen, rows.points, rows.dropped, 0)
+    added = points_at_rim(rows, spacing)
     return Thinned(np.concatenate([chosen, added]), rows.points, rows.dropped, len(added))
 
 

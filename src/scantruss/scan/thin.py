@@ -81,7 +81,7 @@ class Thinning:
         points = np.ascontiguousarray(points, np.float64)
         begin = 0
         while (begin := add_points(self._table, points, begin, self.spacing)) < len(points):
-            self._table = _grown(self._table)
+            self._grow()
         if self._table.counters[TOO_FAR]:
             raise InputError(f"spacing {self.spacing:g} is too small for points so far from zero; use a larger one")
         self.points += len(points)
@@ -90,9 +90,24 @@ class Thinning:
         """Add what another worker has found."""
         begin = 0
         while (begin := add_rows(self._table, part.rows, part.extremes, begin)) < len(part.rows):
-            self._table = _grown(self._table)
+            self._grow()
         self._table.counters[NOT_FINITE] += part.dropped
         self.points += part.points
+
+    def _grow(self) -> None:
+        """Make room for more boxes; what is old is let go of as soon as can be."""
+        slots, rows, extremes, counters = self._table
+        del self._table
+        count, capacity = int(counters[ROWS]), int(GROWTH * len(rows))
+        few = _slots_for(capacity) > len(slots)
+        if few:
+            del slots
+        rows = _longer(rows, count, capacity)
+        extremes = _longer(extremes, count, capacity if self.rim else 0)
+        if few:
+            slots = np.full(_slots_for(capacity), -1, np.int64)
+            fill_slots(slots, rows, count)
+        self._table = BoxTable(slots, rows, extremes, counters)
 
     def take_rows(self) -> Rows:
         """Return all boxes by their numbers i, j, k, the same for any order in which points came; none are left here."""
@@ -210,24 +225,13 @@ def _new_table(capacity: int, rim: bool) -> BoxTable:
 
 
 def _slots_for(capacity: int) -> int:
-    return 1 << max(int(2 * capacity - 1).bit_length(), 4)
+    return 1 << max(int(1.5 * capacity - 1).bit_length(), 4)
 
 
-def _grown(table: BoxTable) -> BoxTable:
-    """Return the same table with more room."""
-    count = int(table.counters[ROWS])
-    capacity = int(GROWTH * len(table.rows))
-    rows = np.empty((capacity, 7), np.int64)
-    rows[:count] = table.rows[:count]
-    extremes = table.extremes
-    if len(extremes):
-        extremes = np.empty((capacity, 18))
-        extremes[:count] = table.extremes[:count]
-    slots = table.slots
-    if 2 * capacity > len(slots):
-        slots = np.full(_slots_for(capacity), -1, np.int64)
-        fill_slots(slots, rows, count)
-    return BoxTable(slots, rows, extremes, table.counters)
+def _longer(array: np.ndarray, count: int, capacity: int) -> np.ndarray:
+    longer = np.empty((capacity, array.shape[1]), array.dtype)
+    longer[: min(count, capacity)] = array[: min(count, capacity)]
+    return longer
 
 
 def _filled_slots(rows: np.ndarray) -> np.ndarray:
