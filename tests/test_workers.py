@@ -41,7 +41,7 @@ def leave_once(job, folder):
     if job == 2 and not marker.exists():
         marker.touch()
         worker = get_worker()
-        worker.loop.add_callback(worker.close, executor_wait=False)
+        worker.loop.add_callback(worker.close, timeout=1, executor_wait=False)
         time.sleep(0.5)
     return job
 
