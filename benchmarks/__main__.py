@@ -1,59 +1,146 @@
-"""Measure everything and write docs/numbers.md: `python -m benchmarks [--data DIR] [--seeds N]`.
+"""Measure and write docs/numbers.md: `uv run --group benchmarks python -m benchmarks [SECTION]`.
 
-A few minutes without scans (`--data` or SCANTRUSS_DATA names their folder) and with few random surfaces.
+Without a section all of them, one after the other, each written as soon as it is measured. By what parts of it took, some
+four to eight hours on two cores, nearly all of it for the other ways; stopped and called again, their runs that were kept
+(benchmarks/.runs) are not done again. `--quick`: two clouds, about four minutes of processor time.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from . import all_scans, first_figures, quality, random_surfaces, table3
-from .ratios import machine, table
+from . import own
+from .page import Section, write
 
-FILE = Path(__file__).resolve().parents[1] / "docs" / "numbers.md"
-
-
-def main() -> None:
-    """Measure and write, losses first."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--data", help="folder of the scans; SCANTRUSS_DATA if left out")
-    parser.add_argument("--seeds", type=int, default=100, help="random surfaces (default 100)")
-    options = parser.parse_args()
-    print("speed ...", flush=True)
-    speed = first_figures.first_figures()
-    print("the examples of the paper ...", flush=True)
-    examples = quality.examples()
-    print("by way of a surface ...", flush=True)
-    surface = table3.table3()
-    print("random surfaces ...", flush=True)
-    random = random_surfaces.section(options.seeds)
-    print("all scans ...", flush=True)
-    scans = all_scans.section(all_scans.data_folder(options.data))
-    losses = [f"- {row.what}: {row.ratio:.2f}, the aim is at most {row.aim:g}." for row in speed if row.lost]
-    losses += [f"- By way of a B-spline surface, {c.name}: {c.ratio:.2f} of our time." for c in surface if c.ratio < 1]
-    losses += [f"- {loss}" for example in examples for loss in example.losses()]
-    parts = [
-        "# Numbers\n\nWritten by `uv run --group benchmarks python -m benchmarks`; all figures of one run.",
-        f"Machine: {machine()};\nshared with other work, so ratios count, not seconds. Medians, both sides in turn.",
-        "## What is lost\n\n" + ("\n".join(losses) if losses else "Nothing of what is measured here."),
-        "## Speed\n\n" + table(speed),
-        "## Table 2: the examples of the paper\n\n" + quality.NOTE + "\n\n" + quality.table(examples),
-        "## Table 3: by way of a surface\n\n" + NOTE + "\n\n" + "\n".join([table3.HEADER, *(c.row() for c in surface)]),
-        "## All twins and real scans\n\n" + scans,
-        "## Random surfaces\n\n" + random,
-    ]
-    beside = FILE.with_suffix(".part")
-    beside.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
-    beside.replace(FILE)
-    print(FILE.read_text(encoding="utf-8"))
+PARTS = ("speed", "examples", "surface", "random", "scans", "peers")
+QUICK_PARTS = ("speed", "examples", "peers")
 
 
-NOTE = """\
-The same clouds and the same code of the front; the other way first fits a bicubic spline with scipy (knots as dense
-as helps; only one fit is timed) and looks at that surface instead. Ratio: seconds by way of the surface for one on
-the cloud. Distance: mean distance of the nodes from the true surface, in standard deviations of the noise. The paper's
-ratios are of its own fitting code; a library of today fits far faster."""
+def _speed(options: argparse.Namespace, command: str) -> Section:
+    from .speed import section
+
+    return section(command, options.quick)
+
+
+def _examples(options: argparse.Namespace, command: str) -> Section:
+    from .quality import section
+
+    return section(command)
+
+
+def _surface(options: argparse.Namespace, command: str) -> Section:
+    from .table3 import section
+
+    return section(command)
+
+
+def _random(options: argparse.Namespace, command: str) -> Section:
+    from . import random_surfaces
+
+    return random_surfaces.page_section(command, options.seeds)
+
+
+def _scans(options: argparse.Namespace, command: str) -> Section | None:
+    from . import all_scans
+
+    return all_scans.page_section(command, all_scans.data_folder(options.data))
+
+
+def _peers(options: argparse.Namespace, command: str) -> Section:
+    from .peers import clouds, section, ways
+
+    if options.quick:
+        chosen, some, limit = section.QUICK_CLOUDS, section.QUICK_WAYS, section.QUICK_LIMIT
+    else:
+        chosen = tuple(clouds.clouds(options.shapes, options.points, options.nodes, options.noises))
+        some = tuple(way for way in ways.WAYS if not options.ways or any(part in way.name for part in options.ways))
+        limit = section.LIMIT
+    repeats = section.QUICK_REPEATS if options.quick else section.REPEATS
+    rows = section.measured(chosen, some, limit=options.limit or limit, repeats=repeats, fresh=options.fresh)
+    return section.section(rows, command, *([options.page.parent] if options.page else []))
+
+
+MAKERS: dict[str, Callable[[argparse.Namespace, str], Section | None]] = {
+    "speed": _speed, "examples": _examples, "surface": _surface, "random": _random, "scans": _scans, "peers": _peers,
+}  # fmt: skip
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _counts(text: str) -> list[int]:
+    return [int(float(word)) for word in _words(text)]
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(word) for word in _words(text)]
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the command line."""
+    from .peers.clouds import NODES, NOISES, POINTS, SHAPES
+
+    whole = argparse.ArgumentParser(
+        "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    whole.add_argument("part", nargs="?", default="all", choices=["all", *PARTS, "own", "compare"],
+                       help="all (the default), one section, own (our own figures as JSON) or compare (two of these)")  # fmt: skip
+    whole.add_argument("files", nargs="*", type=Path, help="of own: where to write; of compare: OLD NEW")
+    whole.add_argument("--quick", action="store_true", help="a small part, some three minutes")
+    whole.add_argument("--page", type=Path, help="the page to write instead of docs/numbers.md")
+    whole.add_argument("--data", help="scans: their folder; SCANTRUSS_DATA if left out")
+    whole.add_argument("--seeds", type=int, default=100, help="random: how many surfaces (default 100)")
+    whole.add_argument(
+        "--tolerance",
+        type=float,
+        default=own.TOLERANCE,
+        help=f"compare: how much slower is no matter (default {own.TOLERANCE:g})",
+    )
+    for name, kind, default in (("shapes", _words, SHAPES), ("points", _counts, POINTS), ("nodes", _counts, NODES),
+                                ("noises", _numbers, NOISES), ("ways", _words, ())):  # fmt: skip
+        shown = ",".join(map(str, default)) or "all"
+        whole.add_argument(
+            f"--{name}", type=kind, default=default, help=f"peers: some of them, by commas (default {shown})"
+        )
+    whole.add_argument("--limit", type=float, help="peers: seconds for one run (default 300, quick 30)")
+    whole.add_argument("--fresh", action="store_true", help="peers: run again what was kept")
+    return whole
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Do what the arguments say; return the exit status."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    whole = parser()
+    options = whole.parse_intermixed_args(arguments)
+    if options.part == "compare":
+        if len(options.files) != 2:
+            whole.error("compare needs two files: OLD NEW")
+        try:
+            return own.compare(*options.files, options.tolerance)
+        except (OSError, ValueError) as error:
+            whole.error(str(error))
+    if (options.files and options.part != "own") or len(options.files) > 1:
+        whole.error("files are for own (one) and compare (two)")
+    page = {"file": options.page} if options.page else {}
+    names = (QUICK_PARTS if options.quick else PARTS) if options.part == "all" else (options.part,)
+    for name in names:
+        if name == "own":
+            continue
+        print(f"{name} ...", flush=True)
+        section = MAKERS[name](options, " ".join(arguments))
+        if section is None:
+            print(f"{name}: nothing measured, the page keeps what it has")
+            continue
+        write(section, **page)
+        print(f"{section.finding}\n", flush=True)
+    if options.part in ("all", "own"):
+        own.save(own.record(options.quick), options.files[0] if options.files else own.FILE)
+    return 0
+
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -17,6 +17,8 @@ from typing import Any
 
 import scantruss as st
 
+from .page import Section
+
 REAL = {  # member lengths that suit the real scans, in their units
     "scallop.ply": 1.9, "scallop_dense.laz": 1.9, "bunny_zipper.ply": 0.006, "bunnyDouble.e57": 0.006, "humface.csv": 7.0,
     "demosthenes_lowres.ply": 0.15, "nefertiti_lowres.obj": 16.0, "kitten.xyz": 0.07, "hillside_hexbin-crop.las": 8.0,
@@ -103,15 +105,18 @@ def _figures(quality: st.GridQuality, length: float) -> str:
     )
 
 
-def section(data: Path | None, names: Iterable[str] = (), ways: Iterable[str] = WAYS) -> str:
-    """Return the section of docs/numbers.md, what is wrong or refused first."""
+def page_section(command: str, data: Path | None) -> Section | None:
+    """Return the section of docs/numbers.md, what is wrong or refused first; None where the scans are not there."""
     if data is None:
-        return "Not measured in this run: the scans were not there (SCANTRUSS_DATA names their folder)."
-    ways = tuple(ways)
-    rows = [row for scan in scans_in(data, names) for row in rows_of(scan, ways)]
+        return None
+    ways = tuple(WAYS)
+    rows = [row for scan in scans_in(data) for row in rows_of(scan, ways)]
     bad = [row for row in rows if "**wrong**" in row or "| refused" in row]
-    count = f"{len(rows)} rows, {len(bad)} of them wrong or refused."
-    return "\n\n".join([NOTE, count, "\n".join([HEADER, *bad, *(row for row in rows if row not in bad)])])
+    wrong = sum("**wrong**" in row for row in rows)
+    finding = f"**{wrong}** of {len(rows)} rows are wrong, {len(bad) - wrong} refused."
+    lost = tuple(" ".join(row.strip("| ").split("|")) for row in bad if "right: refused" not in row)
+    text = "\n\n".join([NOTE, "\n".join([HEADER, *bad, *(row for row in rows if row not in bad)])])
+    return Section("All twins and real scans", command, finding, text, lost)
 
 
 def main() -> int:

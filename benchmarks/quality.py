@@ -9,6 +9,7 @@ from shapes import make
 import scantruss as st
 
 from .measure import Measured, measure
+from .page import Section
 
 PAPER = {  # mean G, std G, std L / mean L
     "scallop": (0.962, 0.041, 0.120),
@@ -72,3 +73,13 @@ def table(rows: list[Example]) -> str:
         lines.append(f"| {name} | the paper, its own shell | {mean} | {spread} | {variation} | | | | | |")
         lines += [row.row() for row in rows if row.name == name]
     return "\n".join(lines)
+
+
+def section(command: str) -> Section:
+    """Return the section of docs/numbers.md."""
+    rows = examples()
+    best = sum(row.found.shape_mean for row in rows if row.method == "default") / len(PAPER)
+    theirs = sum(mean for mean, _, _ in PAPER.values()) / len(PAPER)
+    finding = f"By default mean G is **{best:.3f}**, the paper reports {theirs:.3f} (means of the four examples)."
+    lost = tuple(loss for row in rows for loss in row.losses())
+    return Section("Table 2: the examples of the paper", command, finding, NOTE + "\n\n" + table(rows), lost)

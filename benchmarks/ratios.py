@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
 
 
@@ -57,8 +58,11 @@ def in_turn(
     return Ratio(what, statistics.median(p[0] for p in pairs), statistics.median(p[1] for p in pairs), aim)
 
 
-def machine() -> str:
-    """Return cores and versions, no names."""
-    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy"))
+def machine(packages: Iterable[str] = ()) -> str:
+    """Return cores and versions, no names; packages that are not there are left out."""
+    known = []
+    for name in dict.fromkeys(("numpy", "numba", "scipy", *packages)):
+        with contextlib.suppress(PackageNotFoundError):
+            known.append(f"{name} {version(name)}")
     system = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}"
-    return f"{os.cpu_count()} cores, {system}, {packages}"
+    return f"{os.cpu_count()} cores, {system}, {', '.join(known)}"

@@ -8,9 +8,10 @@ from shapes import make
 
 import scantruss as st
 from scantruss import machine
+from scantruss.boundary import find_boundary
 from scantruss.scan import streamline
 from scantruss.scan.sites import prepare_sites
-from scantruss.scan.streamline import is_dense, streamlined
+from scantruss.scan.streamline import is_dense, points_near, streamlined
 
 
 def slow(points, size):
@@ -64,3 +65,25 @@ def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
     assert shape.distance(nodes).max() < 0.02 * settings.length
     for corner in shape.corners:
         assert np.linalg.norm(nodes - corner, axis=1).min() < 0.05 * settings.length
+
+
+def test_the_rim_of_a_dense_scan_is_found_with_all_its_points():
+    """A disc: its rim lies no farther inside than that of a scan that is taken whole, though patches have few of the points."""
+    rng = np.random.default_rng(5)
+    angle, radius = rng.uniform(0, 2 * np.pi, 400_000), 10.0 * np.sqrt(rng.uniform(0, 1, 400_000))
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(400_000)])
+    cloud, settings = st.PointCloud.from_array(points), st.Settings(length=2.0)
+    sites = prepare_sites(cloud, settings)
+    assert sites.whole is not None and len(sites.surface.points) < 60_000
+    (loop,) = find_boundary(cloud, settings).loops
+    inside = 10.0 - np.linalg.norm((loop.points + cloud.origin)[:, :2], axis=1)
+    assert -0.001 < inside.mean() < 0.012  # a spacing is .016
+
+
+def test_points_near_some_places_are_all_listed():
+    rng = np.random.default_rng(3)
+    points, places = rng.uniform(0, 1, (5000, 3)), rng.uniform(0, 1, (7, 3))
+    near = points_near(points, places, 0.05)
+    away = np.linalg.norm(points[:, None] - places, axis=2).min(axis=1)
+    assert set(np.flatnonzero(away <= 0.05)) <= set(near.tolist()) and len(near) < 1500
+    assert (np.diff(near) > 0).all()

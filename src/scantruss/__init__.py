@@ -12,6 +12,7 @@ _HOMES = {
     "CertificateError": "errors",
     "Settings": "settings",
     "PointCloud": "scan.cloud", "read_points": "scan.readers",
+    "clean_points": "clean.steps", "CleanCloud": "clean.steps",
     "Boundary": "boundary", "find_boundary": "boundary",
     "advance_front": "front",
     "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.quality",

@@ -19,7 +19,7 @@ from .lines.find import find_lines
 from .lines.network import NO_LINES, Lines
 from .rolls import boundary_loops
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites, sites_with
+from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites, sites_with, with_whole_rim
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -138,10 +138,11 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
     radius = max(settings.boundary_radius * length, 1.3 * sites.surface.scale[1], 1.9 * sites.spacing)
     found: list[tuple[np.ndarray, int]] = []
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
-    for loop, piece in boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim):
-        if piece not in sites.pieces:
-            continue
-        points = boundary_points(surface, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
+    rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)
+    loops = [(loop, piece) for loop, piece in rolled if piece in sites.pieces]
+    dense = with_whole_rim(sites, np.concatenate([np.zeros(0, np.int64), *(loop for loop, _ in loops)]), surface)
+    for loop, piece in loops:
+        points = boundary_points(dense, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
         if len(points) < 3:
             continue
         if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:

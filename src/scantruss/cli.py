@@ -20,6 +20,7 @@ HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
 
   scantruss info  SCAN                     points, extent, spacing, boundaries, a sensible --length
+  scantruss clean SCAN OUT                 without repeated and stray points, loose pieces, layers, noise
   scantruss grid  SCAN OUT [OUT ...] --length L
                                            the grid; the suffix of each OUT names its format
   scantruss thin  SCAN... -o OUT --spacing S
@@ -28,6 +29,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
                                            many grids side by side: a table and pictures, for choosing
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            one watertight solid of a grid saved as .json
+  scantruss splice SCAN SCAN [SCAN ...] -o OUT
+                                           one cloud of overlapping scans in frames of their own
   scantruss demo  [FOLDER]                 all of it on a bundled scan
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from .errors import CertificateError, FormatError, InputError
 from .scale_commands import sweep, sweep_parser, thin, thin_parser
 from .settings import CURVATURE
+from .splice_command import splice, splice_parser
 
 if TYPE_CHECKING:
     from .grid.grid import Grid
@@ -22,15 +23,18 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 
+SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
+
+
 def info_parser() -> Parser:
     """Options of ``scantruss info``."""
-    from .options import Parser, add_settings
+    from .options import READING, Parser, add_settings
 
     parser = Parser(
         "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
     )
-    parser.add_argument("scan", metavar="SCAN", help="scan file")
-    add_settings(parser, ("length", "unit", "method"))
+    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    add_settings(parser, ("length", "method", *READING))
     return parser
 
 
@@ -71,7 +75,7 @@ def grid_parser() -> Parser:
         "SCAN OUT [OUT ...] --length L [options]",
         "Turn a scan into a triangular grid truss of a desired member length.",
     )
-    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("scan", metavar="SCAN", help=SCAN)
     parser.add_argument("outs", metavar="OUT", nargs="+", help="results; the suffix names the format")
     files = parser.add_argument_group("files")
     files.add_argument(
@@ -127,11 +131,14 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from .export.files import check_place
     from .export.formats import check_output
+    from .scan.paths import files_of
 
-    inputs = [(values.scan, "scan"), (values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
+    inputs = [(str(file), "scan") for file in files_of(values.scan)]
+    inputs += [(values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
     if isinstance(length := vars(values).get("length"), str) and not length.startswith(CURVATURE):
         inputs.append((length, "file of lengths"))
     inputs += [(name, "fixed line") for name in getattr(values, "fixed_lines", ())]
+    inputs += [(name, "polygon") for name in getattr(values, "crop", ()) if Path(name).is_file()]
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)
@@ -155,8 +162,14 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
     bars("read", 0.0)
     thin = bool(settings.thin_spacing)
-    cloud = read_thinned_scan([path], settings, bars) if thin else read_points(path, unit=settings.unit)
+    cloud = (
+        read_thinned_scan([path], settings, bars)
+        if thin
+        else read_points(path, unit=settings.unit, selection=settings.selection)
+    )
     bars("read", 1.0)
+    for note in cloud.notes:
+        bars.note(note)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
     return cloud
@@ -204,9 +217,11 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """Say so where stray points were left out."""
     from .scan.sites import prepare_sites
 
-    strays = prepare_sites(cloud, settings).strays
-    if strays:
-        bars.note(f"{strays} stray points are left out; --stray-distance 0 keeps them")
+    sites = prepare_sites(cloud, settings)
+    if sites.repeated:
+        bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
+    if sites.strays:
+        bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
 
 
 def note_compiling(bars: Bars, method: str, *stages: str) -> None:
@@ -215,6 +230,20 @@ def note_compiling(bars: Bars, method: str, *stages: str) -> None:
 
     if not are_compiled(method, *stages):
         bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
+
+
+def clean_parser() -> Parser:
+    """Options of ``scantruss clean``."""
+    from .commands_clean import clean_parser
+
+    return clean_parser()
+
+
+def clean(values: Namespace) -> None:
+    """Clean a scan and save it."""
+    from .commands_clean import clean
+
+    clean(values)
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
@@ -301,9 +330,11 @@ def demo(values: Namespace) -> None:
 
 COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
     "info": (info_parser, info),
+    "clean": (clean_parser, clean),
     "grid": (grid_parser, grid),
     "thin": (thin_parser, thin),
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
+    "splice": (splice_parser, splice),
     "demo": (demo_parser, demo),
 }

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from .errors import FormatError, InputError
+from .selection import Selection, read_crop
 from .settings import CURVATURE, Settings
 
 Position = tuple[float, float, float]
@@ -201,7 +202,9 @@ _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
 
 def option_of(name: str) -> str:
     """Return the option of a field; a length field is a value of ``--length``."""
-    return "--" + {"fixed_lines": "fixed_line"}.get(name, name).removesuffix("_field").replace("_", "-")
+    return "--" + {"fixed_lines": "fixed_line", "classes": "class"}.get(name, name).removesuffix("_field").replace(
+        "_", "-"
+    )
 
 
 def describe(spec: Field[Any]) -> str:
@@ -231,6 +234,12 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
         elif spec.name == "fixed_lines":
             options |= {"action": "append", "metavar": "FILE"}
             options["help"] += "; a text file of points X,Y,Z, an empty line between two polylines; repeatable"
+        elif spec.name == "classes":
+            options |= {"action": "append", "metavar": "NUMBER,..."}
+            options["help"] += "; repeatable"
+        elif spec.name == "crop":
+            options |= {"action": "append", "metavar": "BOX|SPHERE|FILE"}
+            options["help"] += "; repeatable, a point must lie in all"
         elif spec.type == "bool":
             options["action"] = argparse.BooleanOptionalAction
         else:
@@ -239,11 +248,30 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
         group.add_argument(option_of(spec.name), **options)
 
 
+READING = ("unit", "z_unit", "classes", "returns", "confidence", "crop")  #: settings that steer how scans are read
+
+
+def add_reading(parser: Parser) -> None:
+    """Add the options that steer how scans are read: units and which points are taken; see `selection_of`."""
+    add_settings(parser, READING)
+
+
+def selection_of(values: argparse.Namespace) -> Selection:
+    """Return what the options of `add_reading` select; files of polygons are read here."""
+    given = _with_crops({name: value for name, value in vars(values).items() if name in READING and name != "unit"})
+    return Selection(**given)
+
+
+def _with_crops(given: dict[str, Any]) -> dict[str, Any]:
+    """Return options with the polygons of files in place of their names."""
+    return given | ({"crop": tuple(map(read_crop, given["crop"]))} if "crop" in given else {})
+
+
 def settings_of(values: argparse.Namespace) -> Settings:
     """Return the settings of a command line: those of ``--settings``, overridden by explicit options."""
     given = vars(values)
     kept = Settings.read(given["settings"]).to_dict() if given.get("settings") else {}
-    explicit = {spec.name: given[spec.name] for spec in fields(Settings) if spec.name in given}
+    explicit = _with_crops({spec.name: given[spec.name] for spec in fields(Settings) if spec.name in given})
     if given.get("fixed_file"):
         explicit["fixed"] = (*explicit.get("fixed", ()), *read_positions(given["fixed_file"]))
     if isinstance(explicit.get("length"), float):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+from .selection import FORMS, RETURNS, Selection
 
 HOLE = 4.0  # members around the smallest hole worth framing; the front runs over smaller ones
 METHODS = ("default", "paper")
@@ -74,7 +75,26 @@ class Settings:
     prefer: str = _setting(
         "balance", "members of one length, or regular triangles, where not both can be had", choices=PREFER
     )
-    unit: str = _setting("", "unit of the scan's coordinates", choices=tuple(u for u in UNITS if u))
+    unit: str = _setting(
+        "", "unit of the scan's coordinates, before what the file says", choices=tuple(u for u in UNITS if u)
+    )
+    z_unit: str = _setting(
+        "",
+        "unit of the heights, where x and y have another; they are brought to that",
+        choices=tuple(u for u in UNITS if u),
+    )
+    classes: tuple[int, ...] = _setting(
+        (), "only points of these classes, as 6 or 2,6; of LAS or a column classification"
+    )
+    returns: str = _setting(
+        "all", f"only these returns of the laser pulses: {', '.join(RETURNS)} or a number from 1 to 15"
+    )
+    confidence: float | None = _setting(
+        None, "only points of at least this confidence, a property or column of the scan"
+    )
+    crop: tuple[str, ...] = _setting(
+        (), f"only points inside {FORMS}, in plan (GeoJSON, WKT, or x, y a line)", unit="scan unit"
+    )
     advance_from: str = _setting(
         "external", "which boundaries the front starts from", source="Sec. 3.6", choices=ADVANCE_FROM
     )
@@ -124,6 +144,12 @@ class Settings:
         unit="scan unit",
         source="Sec. 2",
     )
+    clean: bool = _setting(
+        True, "leave out what does not belong to the scan, by the steps below; --no-clean keeps all", source="Sec. 2"
+    )
+    drop_repeated: bool = _setting(
+        True, "points that repeat another one are left out, where a hundredth of the points or more do", source="Sec. 2"
+    )
     stray_distance: float = _setting(
         3.0, "points so many times farther from others than their neighbours are left out; 0 keeps all", source="Sec. 2"
     )
@@ -146,6 +172,9 @@ class Settings:
     def __post_init__(self) -> None:
         """Check every value, with a message that says what is needed."""
         object.__setattr__(self, "length_field", check_length_field(self.length_field))
+        taken = self.selection
+        for name in ("classes", "returns", "crop"):
+            object.__setattr__(self, name, getattr(taken, name))
         if self.length_field and self.length == 0:
             object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
@@ -155,6 +184,8 @@ class Settings:
             choices = spec.metadata["choices"]
             if choices and value not in (*choices, spec.default):
                 raise InputError(f"{spec.name} must be one of {' '.join(choices)}, got {value!r}")
+            if spec.type == "bool" and not isinstance(value, bool):
+                raise InputError(f"{spec.name} must be true or false, got {value!r}")
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{spec.name} must be a finite number, got {value}")
         for name, low, high in (
@@ -188,6 +219,12 @@ class Settings:
             if len(position) != 3 or not all(map(math.isfinite, position)):
                 raise InputError(f"a fixed node needs three finite coordinates, got {position}")
         object.__setattr__(self, "fixed", fixed)
+
+    @property
+    def selection(self) -> Selection:
+        """Which points of the scan are taken."""
+        names = [spec.name for spec in fields(Selection)]
+        return Selection(**{name: getattr(self, name) for name in names})
 
     @property
     def closed_rim(self) -> float:

@@ -52,46 +52,6 @@ def site_normals(
 
 
 @kernel
-def distances_from_planes(points: np.ndarray, neighbors: np.ndarray, off: np.ndarray, thickness: np.ndarray) -> None:
-    """Distance (N,) of each point from the plane of its neighbours, and theirs (rms), a quarter of them, the farthest off, left out.
-
-    Both stay as they are where not all neighbours are there.
-    """
-    count = neighbors.shape[1]
-    keep = count - count // 4
-    aside = np.empty(count)
-    for p in range(len(points)):
-        if neighbors[p, count - 1] < 0:
-            continue
-        limit, cx, cy, cz, v, square = 1e300, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), 0.0
-        for turn in range(2):
-            taken, sx, sy, sz = 0, 0.0, 0.0, 0.0
-            xx = xy = xz = yy = yz = zz = 0.0
-            for k in range(count):
-                if turn == 0 or aside[k] <= limit:
-                    x, y, z = subtract(row(points, neighbors[p, k]), row(points, p))
-                    taken, sx, sy, sz = taken + 1, sx + x, sy + y, sz + z
-                    xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-                    yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
-            cx, cy, cz = sx / taken, sy / taken, sz / taken
-            xx, xy, xz = xx - taken * cx * cx, xy - taken * cx * cy, xz - taken * cx * cz
-            yy, yz, zz = yy - taken * cy * cy, yz - taken * cy * cz, zz - taken * cz * cz
-            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-            square = 0.0
-            for k in range(count):
-                d = subtract(row(points, neighbors[p, k]), row(points, p))
-                rise = abs(dot(subtract(d, (cx, cy, cz)), v))
-                square += rise * rise if turn == 0 or aside[k] <= limit else 0.0
-                if turn == 0:
-                    aside[k] = rise
-            if turn == 0:
-                limit = np.sort(aside)[keep - 1]
-            else:
-                thickness[p] = math.sqrt(square / taken)
-        off[p] = abs(dot((cx, cy, cz), v))
-
-
-@kernel
 def trust_thin_sites(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
 ) -> None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import FormatError
+from .content import Content, find_attributes
 from .kinds import read_head, unreadable, wrong_kind
+from .packed import check_size
+from .units import metres_of
 
 
-def read_npy(path: Path) -> np.ndarray:
-    """Return the points of an NPY file, (N, 3) [scan unit]."""
+def read_npy(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of an NPY file, and the wanted attributes where it has fields of these names."""
     head = read_head(path)
     if not head.startswith(b"\x93NUMPY"):
         raise wrong_kind(path, head, "an NPY file")
@@ -22,26 +26,29 @@ def read_npy(path: Path) -> np.ndarray:
             array = np.load(file, allow_pickle=False)
     except Exception as error:  # a damaged header ends in many ways
         raise unreadable(path, "NPY", error) from None
-    points = _coordinates(array)
-    if points is None:
+    content = _content(array, wanted)
+    if content is None:
         raise FormatError(f"{path} must hold numbers of shape (N, 3) or wider, got {array.dtype} {array.shape}")
-    return points
+    return content
 
 
-def read_npz(path: Path) -> np.ndarray:
-    """Return the first array of an NPZ file that can be points, (N, 3) [scan unit]."""
+def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the first array of an NPZ file that can be points; an array `unit` says the unit."""
     head = read_head(path)
     if not head.startswith(b"PK"):
         raise wrong_kind(path, head, "an NPZ file")
     held = []
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            check_size(path, sum(member.file_size for member in arrays.zip.infolist()))
             for name in arrays.files:
                 array = _member(arrays, name)
-                points = _coordinates(array) if array is not None else None
-                if points is not None:
-                    return points
+                content = _content(array, wanted) if array is not None else None
+                if content is not None:
+                    return replace(content, metres=_metres(arrays))
                 held.append(f"{name} {'' if array is None else array.shape}".strip())
+    except FormatError:
+        raise
     except Exception as error:  # a damaged archive ends in many ways
         raise unreadable(path, "NPZ", error) from None
     raise FormatError(f"{path} must hold an array of shape (N, 3) or wider, got {', '.join(held)[:200] or 'none'}")
@@ -58,12 +65,21 @@ def _member(arrays: Mapping[str, Any], name: str) -> np.ndarray | None:
     return array if isinstance(array, np.ndarray) else None
 
 
-def _coordinates(array: np.ndarray) -> np.ndarray | None:
+def _metres(arrays: Mapping[str, Any]) -> float | None:
+    """Return the unit that an archive names in an array `unit`."""
+    unit = _member(arrays, "unit") if "unit" in arrays else None
+    return metres_of(str(unit)) if unit is not None and unit.dtype.kind == "U" and unit.ndim == 0 else None
+
+
+def _content(array: np.ndarray, wanted: Sequence[str]) -> Content | None:
     """Return x, y, z of an array with columns or with fields of these names; None where it has neither."""
-    if array.dtype.names and array.ndim == 1 and {"x", "y", "z"} <= set(array.dtype.names):
-        if any(array.dtype[axis].kind not in "fiu" or array.dtype[axis].shape for axis in "xyz"):
+    names = array.dtype.names
+    if names and array.ndim == 1 and {"x", "y", "z"} <= set(names):
+        found = {attribute: names[place] for attribute, place in find_attributes(names, wanted).items()}
+        if any(array.dtype[name].kind not in "fiu" or array.dtype[name].shape for name in (*"xyz", *found.values())):
             return None
-        return np.column_stack([array[axis] for axis in "xyz"])
+        points = np.column_stack([array[axis] for axis in "xyz"])
+        return Content(points, {attribute: array[name] for attribute, name in found.items()})
     if array.ndim == 2 and array.shape[1] >= 3 and array.dtype.kind in "fiu":
-        return array[:, :3]
+        return Content(array[:, :3])
     return None

@@ -28,6 +28,7 @@ class PointCloud:
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
     name: str = ""  #: file the points came from
+    notes: tuple[str, ...] = ()  #: what a user should know of how it was read
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -264,18 +265,18 @@ def _refine(
 
 def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
     """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
-    from ..kernels import spacing
+    from ..kernels import nearby
     from ..kernels.boxes import new_boxes
     from ..kernels.sites import put_all
 
     boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.0 * size, len(sample), len(sample))
     put_all(boxes, sample, np.arange(len(sample)))
     marked = np.zeros(1 << 16, np.bool_)
-    spacing.mark_around(boxes, sample, marked)
+    nearby.mark_around(boxes, sample, marked)
     squares = np.full((processors(), len(sample)), math.inf)
 
     def search_part(part: int, begin: int, end: int) -> None:
-        spacing.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
+        nearby.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
 
     in_parts(len(points), PART, search_part)
     nearest: np.ndarray = np.sqrt(squares.min(axis=0))

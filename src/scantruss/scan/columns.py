@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import InputError
 
 _BESIDE = "coordinates?|coord|position|pos|points?|pt|vertex|world|global|local|scan|axis|value|p|v"
 _DIRECT = tuple(re.compile(f"(?:{_BESIDE})?{axis}(?:{_BESIDE})?") for axis in "xyz")
@@ -56,3 +59,13 @@ def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[
     if sorted(found) == [0, 1, 2] or _NUMBER_OF_POINT.fullmatch(clean_name(names[0])):
         return found
     return None
+
+
+def check_not_degrees(path: Path, names: Sequence[str]) -> None:
+    """Refuse names of longitude and latitude where there are no lengths."""
+    clean = {clean_name(name) for name in names}
+    if clean & {"lon", "long", "lng", "longitude"} and clean & {"lat", "latitude"}:
+        raise InputError(
+            f"{path} has longitude and latitude in degrees, and a grid needs lengths; project it to a plane system such"
+            " as UTM first (QGIS, pyproj), with columns x, y, z"
+        )

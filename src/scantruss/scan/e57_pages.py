@@ -53,7 +53,7 @@ def checksums(pages: np.ndarray) -> np.ndarray:
 @cache
 def _table() -> np.ndarray:
     """Return what 16 shifts make of each pair of bytes, (65536,) uint32."""
-    table = np.arange(1 << 16, dtype=np.uint32)
+    table: np.ndarray = np.arange(1 << 16, dtype=np.uint32)
     for _ in range(16):
         table = (table >> 1) ^ np.where(table & 1, np.uint32(POLYNOMIAL), np.uint32(0))
     return table

@@ -17,6 +17,7 @@ _SIGNATURES = (
     (b"ASTM-E57", "an E57 file"),
     (b"PK\x03\x04", "a zip archive"),
     (b"PK\x05\x06", "a zip archive"),
+    (b"PAR1", "a Parquet file"),
     (b"\x1f\x8b", "a gzip archive"),
     (b"7z\xbc\xaf\x27\x1c", "a 7z archive"),
     (b"Rar!", "a RAR archive"),
@@ -35,7 +36,7 @@ _SIGNATURES = (
 _TEXTS = (
     (rb"\s*<(!doctype\s+html|html|head|body)", "a web page"),
     (rb"\s*<(\?xml|svg)", "an XML file"),
-    (rb"(#[^\n]*\n)*\s*VERSION\s[^\n]*\n\s*FIELDS\s", "a PCD file"),
+    (rb"(#[^\n]*\n)*\s*VERSION\s[^\n]*\n(\s*#[^\n]*\n)*\s*(FIELDS|COLUMNS)\s", "a PCD file"),
     (rb"# \.PCD", "a PCD file"),
     (rb"solid\b[^\n]*\n\s*(facet|endsolid)\b", "an STL file"),
     (rb"(\s*#[^\n]*\n)*\s*(ST)?C?N?4?n?OFF\b", "an OFF file"),
@@ -49,7 +50,7 @@ def read_head(path: Path) -> bytes:
     """Return the first bytes of a file; FormatError where it is missing, a folder or empty."""
     try:
         if path.is_dir():
-            raise FormatError(f"{path} is a folder; name one scan file")
+            raise FormatError(f"{path} is a folder; name a scan file, or a pattern such as '{path}/*.laz'")
         if not path.exists():
             raise FormatError(f"{path} does not exist; check the name of the scan")
         with path.open("rb") as file:

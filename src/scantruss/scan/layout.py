@@ -5,14 +5,15 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError
-from .columns import fit_columns
+from .columns import check_not_degrees, fit_columns
+from .content import find_attributes
 from .kinds import is_text, kind_of, read_head, wrong_kind
 
 PART = 1 << 16  # bytes looked at, at the start and in the middle
@@ -49,6 +50,9 @@ class Layout:
     skip: int  #: lines before the first point
     columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number
     promised: int | None  #: points that a count line promises
+    width: int = 0  #: fields of most lines
+    named: bool = False  #: the header names the columns
+    attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -85,8 +89,8 @@ def is_number(field: str, comma: bool) -> bool:
     return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or field.lower() in MISSING
 
 
-def find_layout(path: Path) -> Layout:
-    """Return the layout of a text file of points; FormatError where it is no such file."""
+def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
+    """Return the layout of a text file of points and wanted attributes; FormatError where it is no such file."""
     head = read_head(path)
     kind = kind_of(head)
     if not is_text(head) or kind in _REFUSED or kind.startswith("a raster"):
@@ -104,7 +108,14 @@ def find_layout(path: Path) -> Layout:
         raise FormatError(f"{path} has no line with three numbers, so no points")
     if len(data) * 2 < behind or len(columns) < 3:
         raise wrong_kind(path, head, "a text file of points")
-    return _finish(start, data, columns, encoding, separator, comma)
+    layout = _finish(start, data, columns, encoding, separator, comma)
+    lines = list(_header_names(start[: layout.skip], separator))
+    if not layout.named:
+        for names in lines:
+            check_not_degrees(path, names)
+    fitting = [names for names in lines if len(names) == layout.width]
+    found = [find_attributes(names, wanted) for names in fitting]
+    return replace(layout, attributes=tuple(max(found, key=len, default={}).items()))
 
 
 def _encoding(head: bytes) -> str:
@@ -167,14 +178,15 @@ def _finish(
     if _is_counted_header(data):  # pandas names the columns of an array 0, 1, 2
         first = int(not data[0][1][0])
         skip, columns = data[1][0], (first, first + 1, first + 2)
-        return Layout(encoding, separator, comma, skip, columns, None)
+        return Layout(encoding, separator, comma, skip, columns, None, width)
     skip = data[0][0]
     running = _is_running([row[0] for _, row in data])
     named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
     counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
     four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
     chosen = named or tuple(numeric[: 4 if four else 3])
-    return Layout(encoding, separator, comma, skip, chosen, int(counts[-1]) if counts else None)
+    promised = int(counts[-1]) if counts else None
+    return Layout(encoding, separator, comma, skip, chosen, promised, width, named is not None)
 
 
 def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
@@ -200,12 +212,17 @@ def _named_columns(
 ) -> tuple[int, int, int] | None:
     """Return the columns of x, y, z from the header line that names them, the one nearest to the points first."""
     for exact in (True, False):
-        for line in reversed(header):
-            text = line.strip().lstrip("#/%!;* \t").strip()
-            for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
-                names = split_fields(text, sign)
-                if len(names) >= 3 and (len(names) == width or not exact):
-                    columns = fit_columns(names, width, has_row_names)
-                    if columns:
-                        return columns
+        for names in _header_names(header, separator):
+            if len(names) >= 3 and (len(names) == width or not exact):
+                columns = fit_columns(names, width, has_row_names)
+                if columns:
+                    return columns
     return None
+
+
+def _header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
+    """Yield the header lines split by every separator in turn, the line nearest to the points first."""
+    for line in reversed(header):
+        text = line.strip().lstrip("#/%!;* \t").strip()
+        for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
+            yield split_fields(text, sign)

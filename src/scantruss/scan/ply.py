@@ -1,4 +1,4 @@
-"""Points of a PLY file: ascii or binary of either byte order; only x, y, z of the element `vertex` count.
+"""Points of a PLY file: ascii or binary of either byte order; of the element `vertex` x, y, z and wanted attributes count.
 
 An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that this package cannot take on.
 """
@@ -6,22 +6,24 @@ An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError
+from .content import Content, find_attributes
 from .kinds import read_head, wrong_kind
 from .ply_header import Element, Header, ends_early, read_header
 from .ply_text import read_ascii
+from .units import metres_of
 
 LONGEST_LIST = 1 << 26  # entries
 MOST_RUNS = 20_000  # changes of list length walked through behind the points
 
 
-def read_ply(path: Path) -> np.ndarray:
-    """Return the points of a PLY file, (N, 3) float64 [scan unit]."""
+def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of a PLY file and the wanted attributes."""
     head = read_head(path)
     if not re.match(rb"ply[ \t]*[\r\n]", head):
         raise wrong_kind(path, head, "a PLY file")
@@ -33,38 +35,45 @@ def read_ply(path: Path) -> np.ndarray:
     axes = [p.name for p in vertex.properties if not p.count_type]
     if missing := [axis for axis in "xyz" if axis not in axes]:
         raise FormatError(f"{path}: the element vertex has no property {missing[0]}")
+    found = find_attributes(axes, wanted)
+    columns = ("x", "y", "z", *(axes[place] for place in found.values()))
     if vertex.count == 0:
-        return np.empty((0, 3))
-    if not header.order:
-        return read_ascii(path, header, vertex)
-    return _read_binary(path, header, vertex)
+        table = np.empty((0, len(columns)))
+    elif not header.order:
+        table = read_ascii(path, header, vertex, columns)
+    else:
+        table = _read_binary(path, header, vertex, columns)
+    attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
+    return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=metres_of(header.unit))
 
 
-def _read_binary(path: Path, header: Header, vertex: Element) -> np.ndarray:
+def _read_binary(path: Path, header: Header, vertex: Element, columns: Sequence[str]) -> np.ndarray:
     data = np.memmap(path, dtype=np.uint8, mode="r")
     offset = header.start
-    points = np.empty((0, 3))
+    table = np.empty((0, len(columns)))
     behind = False
     for element in header.elements:
         if element is vertex:
-            points, offset = _read_points(path, data, offset, header.order, element)
+            table, offset = _read_rows(path, data, offset, header.order, element, columns)
             behind = True
         else:
             offset = _skip(path, data, offset, header.order, element, MOST_RUNS if behind else None)
-    return points
+    return table
 
 
-def _read_points(path: Path, data: np.ndarray, offset: int, order: str, vertex: Element) -> tuple[np.ndarray, int]:
-    """Return x, y, z of all rows and the byte behind them."""
+def _read_rows(
+    path: Path, data: np.ndarray, offset: int, order: str, vertex: Element, columns: Sequence[str]
+) -> tuple[np.ndarray, int]:
+    """Return the wanted columns of all rows and the byte behind them."""
     if len(data) - offset < vertex.count * _row_type(vertex, order, [0] * len(vertex.properties)).itemsize:
         raise ends_early(path, vertex)
-    points = np.empty((vertex.count, 3))
+    table = np.empty((vertex.count, len(columns)))
     begin = 0
     for rows, behind in _runs(path, data, offset, order, vertex):
-        for axis, name in enumerate("xyz"):
-            points[begin : begin + len(rows), axis] = rows[name]
+        for column, name in enumerate(columns):
+            table[begin : begin + len(rows), column] = rows[name]
         begin, offset = begin + len(rows), behind
-    return points, offset
+    return table, offset
 
 
 def _skip(path: Path, data: np.ndarray, offset: int, order: str, element: Element, most: int | None) -> int:
@@ -121,11 +130,12 @@ def _list_lengths(path: Path, data: np.ndarray, offset: int, order: str, element
 def _row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.void]:
     """Return the layout of a row whose lists have the given lengths."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    taken = set()
     for number, (p, length) in enumerate(zip(element.properties, lengths, strict=True)):
-        axis = p.name in ("x", "y", "z") and not p.count_type and p.name not in [f[0] for f in fields]
         if p.count_type:
             fields.append((f"count {number}", order + p.count_type))
             fields.append((f"list {number}", order + p.type, (length,)))
         else:
-            fields.append((p.name if axis else f"other {number}", order + p.type))
+            fields.append((f"other {number}" if p.name in taken else p.name, order + p.type))
+            taken.add(p.name)
     return np.dtype(fields)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import FormatError
+from .units import PATTERN
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "long": "i8", "ulong": "u8",
@@ -47,6 +48,7 @@ class Header:
     order: str  #: "" for ascii, "<" or ">" for binary
     elements: tuple[Element, ...]
     start: int  #: [byte]
+    unit: str = ""  #: word for the unit, where a comment says it
 
 
 def read_header(path: Path) -> Header:
@@ -79,7 +81,12 @@ def read_header(path: Path) -> Header:
         raise FormatError(f"{path}: the PLY header has no line format")
     if any(count < 0 for _, count, _ in elements):
         raise FormatError(f"{path}: the PLY header promises a negative number of rows")
-    return Header(order, tuple(Element(name, count, tuple(p)) for name, count, p in elements), start)
+    unit = re.search(
+        rf"(?:^|[\r\n])(?:comment|obj_info)\s[^\r\n]*?\b{PATTERN}", raw[: end.start()].decode("latin-1"), re.I
+    )
+    return Header(
+        order, tuple(Element(name, count, tuple(p)) for name, count, p in elements), start, unit[1] if unit else ""
+    )
 
 
 def ends_early(path: Path, element: Element) -> FormatError:

@@ -1,9 +1,9 @@
-"""The points of an ascii PLY file."""
+"""The rows of an ascii PLY file."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from io import TextIOWrapper
 from pathlib import Path
 
@@ -13,8 +13,8 @@ from ..errors import FormatError
 from .ply_header import Element, Header, ends_early
 
 
-def read_ascii(path: Path, header: Header, vertex: Element) -> np.ndarray:
-    """Return the points of an ascii PLY file, (N, 3) float64 [scan unit].
+def read_ascii(path: Path, header: Header, vertex: Element, names: Sequence[str]) -> np.ndarray:
+    """Return the named properties of all points of an ascii PLY file, (N, len(names)) float64.
 
     The usual layout, a row a line, is read by numpy; any other word by word, which takes longer.
     """
@@ -24,12 +24,12 @@ def read_ascii(path: Path, header: Header, vertex: Element) -> np.ndarray:
     with _open_data(path, header) as file:
         lines = (line for line in file if not line.isspace())
         _pass(lines, before)
-        points = _load_rows(lines, vertex)
+        points = _load_rows(lines, vertex, names)
         if points is not None and _pass(lines, behind) == behind:
             return points
     with _open_data(path, header) as file:
         words = file.read().split()
-    return _read_words(path, header, vertex, words)
+    return _read_words(path, header, vertex, names, words)
 
 
 def _open_data(path: Path, header: Header) -> TextIOWrapper:
@@ -43,7 +43,7 @@ def _pass(lines: Iterable[str], count: int) -> int:
     return sum(1 for _ in itertools.islice(lines, count))
 
 
-def _load_rows(lines: Iterator[str], vertex: Element) -> np.ndarray | None:
+def _load_rows(lines: Iterator[str], vertex: Element, names: Sequence[str]) -> np.ndarray | None:
     """Return the points where each row is a line; None where the rows are laid out in another way."""
     first = next(lines, "")
     if vertex.has_lists or len(first.split()) != len(vertex.properties):
@@ -53,21 +53,21 @@ def _load_rows(lines: Iterator[str], vertex: Element) -> np.ndarray | None:
         table = np.loadtxt(rows, comments=None, ndmin=2)  # all columns, so that a row of another width shows
     except ValueError:
         return None
-    return table[:, _columns(vertex)] if len(table) == vertex.count else None
+    return table[:, _columns(vertex, names)] if len(table) == vertex.count else None
 
 
-def _columns(vertex: Element) -> list[int]:
+def _columns(vertex: Element, wanted: Sequence[str]) -> list[int]:
     names = [p.name if not p.count_type else "" for p in vertex.properties]
-    return [names.index(axis) for axis in "xyz"]
+    return [names.index(name) for name in wanted]
 
 
-def _read_words(path: Path, header: Header, vertex: Element, words: list[str]) -> np.ndarray:
-    """Return the points of a file whose rows do not keep to lines."""
-    place, chosen = 0, np.empty((0, 3), dtype=np.int64)
+def _read_words(path: Path, header: Header, vertex: Element, wanted: Sequence[str], words: list[str]) -> np.ndarray:
+    """Return the wanted properties of a file whose rows do not keep to lines."""
+    place, chosen = 0, np.empty((0, len(wanted)), dtype=np.int64)
     for element in header.elements:
         starts, place = _walk(path, element, words, place)
         if element is vertex:
-            chosen = starts[:, _columns(vertex)]
+            chosen = starts[:, _columns(vertex, wanted)]
     try:
         return np.array([[float(words[i]) for i in row] for row in chosen.tolist()])
     except ValueError as error:

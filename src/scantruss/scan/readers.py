@@ -1,73 +1,182 @@
-"""From a file to a PointCloud: the table of formats and `read_points`."""
+"""From files to a PointCloud: the table of formats and `read_points`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError, InputError
+from ..selection import Selection
 from ..settings import UNITS
 from .arrays import read_npy, read_npz
+from .choose import check_attributes, choose, describe
 from .cloud import PointCloud
-from .extras import read_e57, read_pcd
+from .content import Content
+from .e57 import read_e57
 from .kinds import read_head
 from .las import read_las
+from .packed import unpacked
+from .parquet import read_parquet
+from .paths import Source, files_of, name_of_files
+from .pcd import read_pcd
 from .ply import read_ply
 from .solids import read_obj, read_off, read_stl
 from .text import read_text
+from .units import to_one_unit
 
-Reader = Callable[[Path], np.ndarray]
+Reader = Callable[[Path, Sequence[str]], Content]
 
-#: suffix -> function that returns the points of a file, (N, 3) numbers [scan unit]
+
+def _plain(read: Callable[[Path], np.ndarray]) -> Reader:
+    """Return a reader of a format that holds points alone."""
+    return lambda path, wanted: Content(read(path))
+
+
+#: suffix -> function that returns what a file holds: its points and the wanted attributes
 READERS: dict[str, Reader] = {
     ".ply": read_ply,
     ".xyz": read_text, ".txt": read_text, ".csv": read_text, ".pts": read_text, ".asc": read_text,
     ".las": read_las, ".laz": read_las,
-    ".obj": read_obj, ".stl": read_stl, ".off": read_off,
+    ".obj": _plain(read_obj), ".stl": _plain(read_stl), ".off": _plain(read_off),
     ".npy": read_npy, ".npz": read_npz,
-    ".e57": read_e57, ".pcd": read_pcd,
+    ".e57": read_e57, ".pcd": read_pcd, ".parquet": read_parquet,
 }  # fmt: skip
+PACKED = ".gz"
 
 
-def read_points(path: str | Path, unit: str = "") -> PointCloud:
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The points of one file after selection, in one unit."""
+
+    points: np.ndarray  #: (N, 3) [unit]
+    unit: str
+    system: str  #: reference system, "" where the file does not say it
+    count: int  #: points in the file
+    left_out: dict[str, int]  #: what each part of the selection left out
+    held: str  #: what could have been selected, where nothing was
+    notes: tuple[str, ...]
+
+
+def read_points(path: Source, unit: str = "", selection: Selection | None = None) -> PointCloud:
     """Return the points of a scan; the format is that of the suffix.
 
     Parameters
     ----------
-    path : str or Path
-        A file with one of the suffixes in `READERS`.
+    path : str, Path or several of them
+        A file with one of the suffixes in `READERS` (also packed: .xyz.gz), a pattern such as ``tiles/*.laz``, or several
+        of these that together are one scan.
     unit : str
-        Unit of the coordinates: mm, cm, m, inch, foot, or "" where it is not known.
+        Unit of the coordinates: mm, cm, m, inch, foot, or "" for what the file says.
+    selection : Selection, optional
+        Which points are taken; all by default.
 
     Returns
     -------
     PointCloud
-        All points of the file in its order; faces, normals, colours and other properties are left aside.
+        All points that are taken, in the order of the files; faces, normals, colours and other properties are left aside.
+        `notes` says what was left out or converted.
 
     Raises
     ------
     FormatError
-        The file is missing, empty, damaged, or of another kind than its suffix says.
+        A file is missing, empty, damaged, or of another kind than its suffix says.
     InputError
-        Its points cannot be used: too few, mostly NaN, all on a line; or the unit is not known.
+        The points cannot be used: too few, mostly NaN, all on a line; degrees; the unit is not known; nothing is selected.
     """
-    path = Path(path)
     if unit not in UNITS:
         raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
-    read_head(path)
-    try:
-        reader = READERS[path.suffix.lower()]
-    except KeyError:
-        known = " ".join(sorted(READERS))
-        raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
-    try:
-        points = reader(path)
-    except OSError as error:
-        raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
-    except MemoryError:
-        raise FormatError(f"{path} does not fit into the memory of this computer; thin the scan first") from None
+    selection = selection or Selection()
+    files = files_of(path)
+    parts: list[Part] = []
+    for file in files:
+        common = next((part.unit for part in parts if part.unit), "")
+        parts.append(read_part(file, unit, selection, common))
+    points, unit, notes = _join(files, parts)
     if not len(points):
-        raise FormatError(f"{path} holds no points")
-    return PointCloud.from_array(points, unit=unit, name=path.name)
+        raise _nothing_left(files, parts)
+    cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
+    return replace(cloud, notes=notes)
+
+
+def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
+    """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
+    content = read_content(path, selection.needs)
+    check_attributes(path, content.attributes, selection)
+    points, unit, notes = to_one_unit(path, content, unit, selection.z_unit)
+    feet = (content.feet,) if content.feet and unit != "foot" and not selection.z_unit else ()
+    size, own = UNITS[common], UNITS[unit]
+    if size and own and size != own:
+        notes = (*notes, f"{path.name} is in {unit} and is brought to {common}, the unit of the first file")
+        points, unit = points * (own / size), common
+    kept, left_out = choose(points, content.attributes, selection)
+    held = "" if kept.any() else describe(points, content.attributes)
+    if not kept.all():
+        points = points[kept]
+    return Part(points, unit, content.system, len(kept), left_out, held, (*content.notes, *notes, *feet))
+
+
+def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return what a file holds, as it stands in it: all points and the wanted attributes."""
+    read_head(path)
+    with ExitStack() as stack:
+        inner = path
+        if path.suffix.lower() == PACKED and Path(path.stem).suffix.lower() in READERS:
+            inner = stack.enter_context(unpacked(path))
+        try:
+            reader = READERS[inner.suffix.lower()]
+        except KeyError:
+            known = " ".join(sorted(READERS))
+            raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
+        try:
+            with np.errstate(all="ignore"):  # what is not finite is counted and left out later
+                return reader(inner, wanted)
+        except OSError as error:
+            raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
+        except MemoryError:
+            raise FormatError(f"{path} does not fit into the memory of this computer; thin the scan first") from None
+
+
+def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
+    """Return the points of all files in one unit, the unit, and what should be said."""
+    _check_systems(files, parts)
+    unit = next((part.unit for part in parts if part.unit), "")
+    notes: dict[str, None] = {}
+    for file, part in zip(files, parts, strict=True):
+        notes.update(dict.fromkeys(part.notes))
+        if unit and not part.unit:
+            notes[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
+    for words in parts[0].left_out:
+        count = sum(part.left_out[words] for part in parts)
+        notes[f"{count:,} points {words} are left out"] = None
+    points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
+    return points, unit, tuple(notes)
+
+
+def _check_systems(files: Sequence[Path], parts: Sequence[Part]) -> None:
+    """Refuse files whose reference systems are known to differ."""
+    for by_code in (True, False):
+        named = [(f, p.system) for f, p in zip(files, parts, strict=True) if p.system]
+        named = [(f, system) for f, system in named if system.startswith("EPSG:") == by_code]
+        for file, system in named[1:]:
+            if system != named[0][1]:
+                raise InputError(
+                    f"{file} is in {system} and {named[0][0]} in {named[0][1]}; files of one scan must share a reference"
+                    " system, so bring them to one first (PDAL filters.reprojection)"
+                )
+
+
+def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
+    count = sum(part.count for part in parts)
+    if not count:
+        return FormatError(
+            f"{files[0]} holds no points" if len(files) == 1 else f"none of {len(files)} files holds points"
+        )
+    left_out = {words: sum(part.left_out[words] for part in parts) for words in parts[0].left_out}
+    said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
+    return InputError(
+        f"no point of {name_of_files(files)} is left: of {count:,} points {said}; the scan has{parts[0].held}"
+    )

@@ -8,17 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..clean.duplicates import find_repeated, has_repeats
+from ..clean.strays import find_strays, has_strays
 from ..errors import InputError
 from ..kernels import normals as facing
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
+from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
-from .strays import find_strays, has_strays
-from .streamline import is_dense, streamlined
+from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
@@ -45,7 +47,9 @@ class Sites:
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     strays: int = 0  #: stray points that were left out
+    repeated: int = 0  #: points that were left out because they repeat another one
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
+    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
 
     @property
     def graded(self) -> bool:
@@ -53,7 +57,7 @@ class Sites:
         return is_graded(self.surface)
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, Wish | None], Sites]] = (
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, bool, Wish | None], Sites]] = (
     weakref.WeakKeyDictionary()
 )
 
@@ -65,10 +69,12 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `stray_distance` which points are left out, `length_field` where
-        members are to be longer.
+        `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
+        out, `length_field` where members are to be longer.
     """
-    key = (settings.length, settings.box_size, settings.stray_distance, wish_of(settings, cloud.origin))
+    strays = settings.stray_distance if settings.clean else 0.0
+    repeated = settings.clean and settings.drop_repeated
+    key = (settings.length, settings.box_size, strays, repeated, wish_of(settings, cloud.origin))
     kept = _KEPT.setdefault(cloud, {})
     if key not in kept:
         kept.clear()
@@ -91,8 +97,8 @@ def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Set
     points = sites.surface.points
     both = np.concatenate([points, added])
     wish = wish_of(settings, cloud.origin)
-    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, wish, len(points))
-    return replace(prepared, strays=sites.strays)
+    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, False, wish, len(points))
+    return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -108,6 +114,19 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     if np.isfinite(points):  # so many points, whatever the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
     return surface._replace(scale=scale)
+
+
+def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
+    """Return the surface with all points near some sites (R,), where it has only some of them: those of the rim tell where it is."""
+    if sites.whole is None or len(rim) == 0:
+        return surface
+    near = sites.whole[points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1])]
+    owner = np.empty(len(near), np.int64)
+    nearest_places(near, sites.boxes, surface.mean, 2.0 * surface.scale[1], owner)
+    owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
+    points = np.concatenate([surface.points, near[owner >= 0]])
+    grouped, start, _ = _group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
+    return surface._replace(points=grouped, start=start)
 
 
 def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
@@ -149,10 +168,16 @@ def _prepare(
     length: float,
     box_size: float,
     stray_distance: float,
+    drop_repeated: bool,
     wish: Wish | None,
     measured: int | None = None,
 ) -> Sites:
     radius = max(box_size * length, 0.25 * spacing)
+    repeated = 0
+    if drop_repeated and has_repeats(points):
+        kept = ~find_repeated(points)
+        repeated = int(len(points) - kept.sum())
+        points = np.ascontiguousarray(points[kept])
     whole, size = points, FINE * radius if measured is None else 0.0
     points = _fewer(whole, size, spacing)
     found = _linked(points, radius, length, spacing)
@@ -189,7 +214,7 @@ def _prepare(
     facing.orient_normals(mean, normals, neighbors, order, piece)
     smoothed = np.empty_like(normals)
     facing.smooth_normals(normals, neighbors, 0.7, smoothed)
-    _face_outside(mean, smoothed, piece)
+    face_outside(mean, smoothed, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     scratch = np.zeros(len(mean), np.int64)
     surface = Surface(
@@ -210,7 +235,8 @@ def _prepare(
     graded = area / surface.field**2
     large = _large_pieces(piece, area, graded, length)
     total, scaled = float(area.sum()), float(graded.sum())
-    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, measured)
+    dense = whole if len(points) < len(whole) else None
+    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, repeated, measured, dense)
 
 
 def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
@@ -326,7 +352,7 @@ def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, lengt
     return tuple(int(i) for i in np.flatnonzero(large))
 
 
-def _face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
+def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
     """Turn the normals of each piece away from its centre; upwards where that does not tell (a plate)."""
     _, inverse = np.unique(piece, return_inverse=True)
     inverse = inverse.ravel()

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kernels import nearby
 from ..kernels import streamline as kernels
 from ..kernels.boxes import new_boxes
+from ..kernels.sites import put_all
 from ..machine import in_parts, processors
 from .cloud import bounds_of
 
 DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
 PART = 200_000  # fewest points for a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
+MARKS = 1 << 18  # of boxes near a place
 ROOM = 1 << 16  # boxes that the first table has room for
 
 
@@ -66,3 +69,23 @@ def _first_of_boxes(
         chosen = np.concatenate([chosen[:count], np.empty(room - count, np.int64)])
         boxes = new_boxes(lower, upper, size, 0, room)
         kernels.choose_first(points, boxes, chosen[:count].copy(), chosen, 0, count, 0)
+
+
+def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
+    """Return which points (N, 3) lie within `reach` of any of the places (K, 3), and some more, (M,) int64 in order."""
+    boxes = new_boxes(places.min(axis=0), places.max(axis=0), 2.0 * reach, len(places), len(places))
+    put_all(boxes, places, np.arange(len(places)))
+    marked = np.zeros(MARKS, np.bool_)
+    nearby.mark_around(boxes, places, marked)
+    parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
+
+    def look(part: int, begin: int, end: int) -> None:
+        found = np.empty((end - begin) // 8 + 1024, np.int64)
+        count = nearby.list_marked(points, boxes, marked, begin, end, found)
+        if count > len(found):
+            found = np.empty(count, np.int64)
+            nearby.list_marked(points, boxes, marked, begin, end, found)
+        parts[part] = found[:count]
+
+    in_parts(len(points), PART, look)
+    return np.concatenate(parts)

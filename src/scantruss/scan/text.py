@@ -1,4 +1,4 @@
-"""Points of a text file (XYZ, TXT, CSV, PTS, ASC): by numpy where it can, line by line where it cannot."""
+"""Points of a text file (XYZ, TXT, CSV, PTS, ASC): by a compiled loop or numpy where they can, line by line where they cannot."""
 
 from __future__ import annotations
 
@@ -6,37 +6,45 @@ import math
 import mmap
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError
+from .content import Content
 from .layout import ANY, MISSING, NUMBER, NUMBER_COMMA, Layout, find_layout, is_number, split_line
+from .lines import LARGE, read_regular
 
 
-def read_text(path: Path) -> np.ndarray:
-    """Return the points of a text file, (N, 3) float64 [scan unit]."""
-    layout = find_layout(path)
-    promised = layout.promised
+def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of a text file and the wanted attributes that its header names."""
+    layout = find_layout(path, wanted)
+    width, promised = len(layout.columns), layout.promised
+    columns = (*layout.columns, *(column for _, column in layout.attributes))
     try:
-        rows = _read_fast(path, layout)
+        rows = _read_fast(path, layout, columns)
     except ValueError:
-        rows, promised = _read_lines(path, layout)
+        rows, promised = _read_lines(path, layout, columns)
     if promised is not None and len(rows) < promised:
         raise FormatError(
             f"{path} ends early: its count line promises {promised:,} points, got {len(rows):,}; copy it again"
         )
-    if rows.shape[1] == 4:  # the first column may be a running number
-        running = bool((np.diff(rows[:, 0]) == 1).all())
-        rows = rows[:, 1:] if running else rows[:, :3]
-    return rows
+    points, more = rows[:, :width], rows[:, width:]
+    if width == 4:  # the first column may be a running number
+        running = bool((np.diff(points[:, 0]) == 1).all())
+        points = points[:, 1:] if running else points[:, :3]
+    return Content(points, {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)})
 
 
-def _read_fast(path: Path, layout: Layout) -> np.ndarray:
+def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
     """Return the columns of a regular file; ValueError where it is not."""
-    if layout.separator == ANY or _holds(path, b".#"):
+    if layout.separator == ANY:
+        raise ValueError
+    if path.stat().st_size > LARGE and (rows := read_regular(path, layout, columns)) is not None:
+        return rows
+    if _holds(path, b".#"):
         raise ValueError
     source: Path | StringIO = path
     if layout.comma:
@@ -46,7 +54,7 @@ def _read_fast(path: Path, layout: Layout) -> np.ndarray:
         comments="#",
         delimiter=layout.separator,
         skiprows=layout.skip,
-        usecols=layout.columns,
+        usecols=columns,
         encoding=layout.encoding,
         ndmin=2,
     )
@@ -57,12 +65,12 @@ def _holds(path: Path, sign: bytes) -> bool:
         return data.find(sign) >= 0
 
 
-def _read_lines(path: Path, layout: Layout) -> tuple[np.ndarray, int | None]:
+def _read_lines(path: Path, layout: Layout, columns: Sequence[int]) -> tuple[np.ndarray, int | None]:
     """Return the columns of any file, and the sum of its count lines."""
     values, promised = array("d"), layout.promised
     for number, row in _rows(path, layout):
         try:
-            point = [_number(row[column], layout) for column in layout.columns]
+            point = [_number(row[column], layout) for column in columns]
         except (ValueError, IndexError):
             if promised is not None and len(row) == 1 and row[0].isdecimal():  # a PTS file of several scans
                 promised += int(row[0])
@@ -71,7 +79,7 @@ def _read_lines(path: Path, layout: Layout) -> tuple[np.ndarray, int | None]:
             continue
         if any(row[column] for column in layout.columns):
             values.extend(point)
-    return np.array(values).reshape(-1, len(layout.columns)), promised
+    return np.array(values).reshape(-1, len(columns)), promised
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:

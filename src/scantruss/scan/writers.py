@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -147,9 +147,11 @@ def _write_npy(path: Path, cloud: Cloud) -> None:
 
 
 def _write_npz(path: Path, cloud: Cloud) -> None:
-    more = {} if cloud.normals is None else {"normals": cloud.normals}
+    arrays: dict[str, Any] = {"points": cloud.points, "unit": np.array(cloud.unit)}
+    if cloud.normals is not None:
+        arrays["normals"] = cloud.normals
     with path.open("wb") as file:
-        np.savez_compressed(file, points=cloud.points, **more, unit=np.array(cloud.unit))
+        np.savez_compressed(file, **arrays)
 
 
 def _write_las(path: Path, cloud: Cloud) -> None:

@@ -1,4 +1,4 @@
-"""The distance from some points of a scan to their nearest neighbours, in one pass over all points."""
+"""Points of a large scan that lie near a few places, in one pass over all points."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .compile import kernel
 
 @kernel
 def mark_around(boxes: SearchBoxes, sample: np.ndarray, marked: np.ndarray) -> None:
-    """Mark the 27 search boxes around each point of a sample (K, 3); marked (2^m,) bool, several boxes may share a mark."""
+    """Mark the 27 search boxes around each place (K, 3); marked (2^m,) bool, several boxes may share a mark."""
     for s in range(len(sample)):
         i, j, k = (
             box_index(boxes, 0, sample[s, 0]),
@@ -57,3 +57,39 @@ def lower_to_nearest(
                 dd = dx * dx + dy * dy + dz * dz
                 if same * same < dd < square[s]:
                     square[s] = dd
+
+
+@kernel
+def list_marked(
+    points: np.ndarray, boxes: SearchBoxes, marked: np.ndarray, begin: int, end: int, found: np.ndarray
+) -> int:
+    """List the points from `begin` to `end` - 1 that lie in a marked box; returns how many, which may be more than `found` has room for."""
+    count, mask = 0, len(marked) - 1
+    for p in range(begin, end):
+        i, j, k = (
+            box_index(boxes, 0, points[p, 0]),
+            box_index(boxes, 1, points[p, 1]),
+            box_index(boxes, 2, points[p, 2]),
+        )
+        if marked[_mark_of(boxes, i, j, k) & mask]:
+            if count < len(found):
+                found[count] = p
+            count += 1
+    return count
+
+
+@kernel
+def nearest_places(
+    points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, nearest: np.ndarray
+) -> None:
+    """The place (S, 3) nearest to each point (N, 3) within reach, -1 where there is none; boxes : of the places."""
+    found = np.empty(4096, np.int64)
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        nearest[p], least = -1, 1e300
+        for f in range(search(boxes, places, x, y, z, reach, found)):
+            s = found[f]
+            dx, dy, dz = places[s, 0] - x, places[s, 1] - y, places[s, 2] - z
+            dd = dx * dx + dy * dy + dz * dz
+            if dd < least or (dd == least and s < nearest[p]):
+                nearest[p], least = s, dd

@@ -1,0 +1,164 @@
+"""Points of an E57 file (ASTM E2807): all its scans by their poses, or each in its own frame.
+
+An own reader on numpy: the package e57 is right on every whole file that was tried, but prints the panic of its Rust code
+on a damaged one, and ends the process where a header claims more points than fit into memory.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import FormatError
+from .content import Content
+from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
+from .e57_pages import logical
+from .kinds import read_head, wrong_kind
+
+BLOCK = 1 << 18  # records taken out of their bits in one go
+
+
+class ScanPoints(NamedTuple):
+    """One scan of a file, in its own frame."""
+
+    name: str
+    points: np.ndarray  #: (N, 3) float64 [m]
+    rotation: np.ndarray  #: (3, 3); the place in the common frame is rotation @ place + translation
+    translation: np.ndarray  #: (3,) [m]
+    invalid: int  #: points that the scanner marked as invalid; they are left out
+
+
+def read_e57(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of all scans of an E57 file in their common frame [m]; its fields have no wanted attributes."""
+    parts, invalid = [], 0
+    for scan in e57_scans(path):
+        points = scan.points
+        if not np.array_equal(scan.rotation, np.eye(3)):
+            points = points @ scan.rotation.T
+        parts.append(points + scan.translation if scan.translation.any() else points)
+        invalid += scan.invalid
+    points = np.concatenate(parts) if len(parts) != 1 and parts else (parts or [np.empty((0, 3))])[0]
+    notes = (f"{invalid:,} points that the scanner marked as invalid are left out",) if invalid else ()
+    return Content(points, metres=1.0, z_metres=1.0, notes=notes)
+
+
+def e57_scans(path: Path) -> Iterator[ScanPoints]:
+    """Yield the scans of an E57 file, each in its own frame.
+
+    Raises
+    ------
+    FormatError
+        The file is no E57 file, cut off or damaged, or a scan has no coordinates.
+    """
+    head = read_head(path)
+    if not head.startswith(b"ASTM-E57"):
+        raise wrong_kind(path, head, "an E57 file")
+    data = read_pages(path)
+    for scan in read_scans(path, data):
+        axes = scan.axes
+        if not axes:
+            raise FormatError(f"{path}: {scan.name} has neither cartesian nor spherical coordinates")
+        state = "sphericalInvalidState" if axes == SPHERICAL else "cartesianInvalidState"
+        columns = _read_columns(path, data, scan, (*axes, state))
+        points = np.column_stack(columns[:3]) if scan.count else np.empty((0, 3))
+        if axes == SPHERICAL:
+            points = _to_cartesian(points)
+        invalid = columns[3] != 0 if len(columns) > 3 else np.zeros(len(points), dtype=bool)
+        if invalid.any():
+            points = points[~invalid]
+        yield ScanPoints(scan.name, points, scan.rotation, scan.translation, int(invalid.sum()))
+
+
+def _to_cartesian(places: np.ndarray) -> np.ndarray:
+    distance, azimuth, elevation = places.T
+    flat = distance * np.cos(elevation)
+    return np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)])
+
+
+def _read_columns(path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]) -> list[np.ndarray]:
+    """Return the named fields of all records, float64 each; those that a scan does not have are left out."""
+    place = [field.name for field in scan.fields]
+    wanted = [place.index(name) for name in names if name in place]
+    width = sum(field.bits for field in scan.fields)
+    if scan.count * max(width, 1) > 8 * len(data):
+        raise FormatError(
+            f"{path} ends early: its header promises {scan.count:,} points, but it has {len(data):,} bytes; copy it again"
+        )
+    if not scan.count:
+        return [np.empty(0) for _ in wanted]
+    streams = _collect(path, data, scan, wanted)
+    return [_decode(stream, scan.fields[i], scan.count) for stream, i in zip(streams, wanted, strict=True)]
+
+
+def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> list[np.ndarray]:
+    """Return the bytes of the wanted fields, gathered from the data packets."""
+    early = FormatError(f"{path} ends early: {scan.name} promises {scan.count:,} points; copy it again")
+    try:
+        kind, _, first = struct.unpack("<B7xQQ", data[scan.start : scan.start + 24].tobytes())
+    except struct.error:
+        raise early from None
+    if kind != 1:
+        raise FormatError(f"{path}: no points where {scan.name} should have them; the file is damaged")
+    place = logical(first)
+    parts: list[list[np.ndarray]] = [[] for _ in wanted]
+    missing = [scan.count * scan.fields[i].bits for i in wanted]
+    while max(missing) > 0:
+        if place + 6 > len(data):
+            raise early
+        kind, size = int(data[place]), int(data[place + 2]) + 256 * int(data[place + 3]) + 1
+        if kind > 2 or size < 4 or place + size > len(data):
+            raise early
+        if kind == 1:
+            streams = _streams(data[place : place + size], len(scan.fields))
+            if streams is None:
+                raise FormatError(f"{path}: a packet of {scan.name} does not hold its fields; the file is damaged")
+            for number, i in enumerate(wanted):
+                parts[number].append(streams[i])
+                missing[number] -= 8 * len(streams[i])
+        place += size
+    return [np.concatenate(found) if found else np.empty(0, dtype=np.uint8) for found in parts]
+
+
+def _streams(packet: np.ndarray, count: int) -> list[np.ndarray] | None:
+    """Return the bytes of each field in a data packet; None where it does not hold so many fields."""
+    told, begin = int(packet[4]) + 256 * int(packet[5]), 6 + 2 * count
+    if told != count or begin > len(packet):
+        return None
+    ends = begin + np.cumsum(packet[6:begin].view("<u2").astype(np.int64))
+    if ends[-1] > len(packet):
+        return None
+    return [packet[a:b] for a, b in zip([begin, *ends[:-1]], ends, strict=True)]
+
+
+def _decode(stream: np.ndarray, field: Field, count: int) -> np.ndarray:
+    """Return the values of a field, (count,) float64."""
+    if field.kind != "integer":
+        size = field.bits // 8
+        return stream[: count * size].view(f"<f{size}").astype(np.float64, copy=False)
+    values = np.empty(count)
+    padded = np.concatenate([stream, np.zeros(16, dtype=np.uint8)])
+    for begin in range(0, count, BLOCK):
+        end = min(begin + BLOCK, count)
+        whole = _unpack(padded, field.bits, begin, end) + np.uint64(field.low % (1 << 64))  # wraps to the signed number
+        values[begin:end] = whole.view(np.int64)
+    if (field.scale, field.offset) != (1.0, 0.0):
+        values = values * field.scale + field.offset
+    return values
+
+
+def _unpack(stream: np.ndarray, bits: int, begin: int, end: int) -> np.ndarray:
+    """Return whole numbers of some bits, lowest bit first, (end - begin,) uint64; 16 bytes follow the last of them."""
+    if bits == 0:
+        return np.zeros(end - begin, dtype=np.uint64)
+    first = np.arange(begin, end, dtype=np.int64) * bits
+    place, shift = first >> 3, (first & 7).astype(np.uint64)
+    words = np.ndarray((len(stream) - 7,), "<u8", stream, strides=(1,))
+    found = words[place] >> shift
+    if bits > 57:
+        late = shift > 0
+        found[late] |= stream[place[late] + 8].astype(np.uint64) << (np.uint64(64) - shift[late])
+    return found & np.uint64((1 << bits) - 1)

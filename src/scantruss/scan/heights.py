@@ -1,0 +1,62 @@
+"""Whether the heights of an airborne scan look like feet: trees tell it where the file says nothing.
+
+Where a laser pulse comes back in several parts it went through leaves, so that the points around reach from the ground to the
+crowns. In woods that is 10 to 30 m; half of such places being more than 45 units high means that the unit is no metre.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+TALL = 45.0  # units; the median of woods, in metres, stays below
+SAMPLE = 400_000  # points
+PLACES = 100  # boxes of either kind that are enough to tell
+
+
+def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
+    """Return a note where heights look like feet, else "".
+
+    Parameters
+    ----------
+    points : (N, 3) array
+    returns : (N,) array
+        Number of returns of the pulse of each point.
+    """
+    if len(points) < 1000 or int(returns.max(initial=0)) < 2:
+        return ""
+    high = _height_of_woods(points, returns)
+    if high < TALL:
+        return ""
+    return (
+        f"where a pulse came back in several parts the points span a height of {high:.0f} (median): trees are rarely so"
+        " tall in metres, so heights look like feet; if x and y are metres, say --unit m --z-unit foot"
+    )
+
+
+def _height_of_woods(points: np.ndarray, returns: np.ndarray) -> float:
+    """Return the median span of heights in boxes with several returns, less that in boxes without; 0 where there are few."""
+    x, y = points[:, 0], points[:, 1]
+    if len(points) > SAMPLE:  # a strip of the scan, with all its points
+        share = 0.5 * SAMPLE / len(points)
+        low, high = np.quantile(x[:: max(1, len(x) // 100_000)], [0.5 - share, 0.5 + share])
+        inside = np.flatnonzero((x >= low) & (x <= high))
+        points, returns = points[inside], returns[inside]
+        x, y = points[:, 0], points[:, 1]
+    if len(points) < 1000:
+        return 0.0
+    size = math.sqrt(6.0 * float(np.ptp(x)) * float(np.ptp(y)) / len(points))
+    if not size > 0 or not math.isfinite(size):
+        return 0.0
+    box = np.floor((x - x.min()) / size) * (float(np.ptp(y)) // size + 2) + np.floor((y - y.min()) / size)
+    order = np.argsort(box, kind="stable")
+    box, z, several = box[order], points[order, 2], returns[order] > 1
+    start = np.flatnonzero(np.r_[True, box[1:] != box[:-1]])
+    enough = np.diff(np.r_[start, len(box)]) >= 4
+    span = np.maximum.reduceat(z, start) - np.minimum.reduceat(z, start)
+    wooded = np.maximum.reduceat(several, start)
+    bare, woods = span[enough & ~wooded], span[enough & wooded]
+    if len(woods) < PLACES:
+        return 0.0
+    return float(np.median(woods) - (np.median(bare) if len(bare) >= PLACES else 0.0))

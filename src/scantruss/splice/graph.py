@@ -1,0 +1,258 @@
+"""The pose graph: scans put together pair by pair, the surest pairs first; a pair that contradicts what stands is not taken.
+
+Scans that stand together are a group. A pair between two groups puts every scan of the one over every scan of the other, and all of
+them must agree with it: that is what tells a wrong pair, which may look right by itself, from a right one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fine import Fit, add_pairs, judge, solve
+from .pairs import REACH, Pair, judge_views, nearness
+from .poses import invert, move, small_motion
+from .scans import Scan
+from .views import View
+
+SURE = 0.88  # agreement of two groups at which they belong together
+ENOUGH = 0.08  # share of the smaller group's places that must agree
+CONTRADICTION = 0.6  # agreement of two scans, over each other, below which they contradict a pair of groups
+CONTRADICTED = 0.08  # share of the places of the smaller one from which on that counts
+DOUBT = 0.03  # how much better the agreement of one way must be than that of another
+MOST_WAYS = 12  # pairs that are tried between two groups
+LINKED = 0.02  # overlap from which on two scans hold each other
+FEW = 2000  # places of a scan that are taken in a step of all
+
+
+@dataclass
+class Group:
+    """Scans in one frame."""
+
+    members: list[int]
+    poses: dict[int, np.ndarray]  #: (4, 4) into the frame of the group
+    turns: dict[int, float]  #: 1, or -1 for those whose normals face the other side
+
+
+def assemble(
+    scans: list[Scan], pairs: list[Pair], progress: Callable[[str, float], None]
+) -> tuple[list[Group], set[int]]:
+    """Return the groups that the pairs make, the one with most scans first, and the scans that fit in more ways than one.
+
+    Two groups that fit in several ways, as parts of a symmetric body do, wait until others settle which way holds.
+    """
+    group_of = {i: Group([i], {i: np.eye(4)}, {i: 1.0}) for i in range(len(scans))}
+    waiting = sorted(pairs, key=lambda pair: (-pair.fit.score, pair.first, pair.second))
+    tried: dict[
+        tuple[int, ...], bool
+    ] = {}  # two groups between which nothing has come of it, and whether for too many ways
+    at = 0
+    while at < len(waiting):
+        progress("assemble", 1.0 - len({id(group) for group in group_of.values()}) / len(scans))
+        one, other = (group_of[k] for k in (waiting[at].first, waiting[at].second))
+        key = (*one.members, -1, *other.members)
+        at += 1
+        if one is other or key in tried:
+            continue
+        ways = _ways(scans, one, other, [pair for pair in waiting if _links(pair, one, other)])
+        if len(ways) == 1:
+            group_of |= dict.fromkeys(ways[0].members, ways[0])
+            at = 0  # what was too little, or too much, between two scans may be settled between groups
+        else:
+            tried[key] = tried[(*other.members, -1, *one.members)] = len(ways) > 1
+    groups = sorted(
+        {id(group): group for group in group_of.values()}.values(), key=lambda g: (-len(g.members), min(g.members))
+    )
+    doubtful = set()
+    for key, several in tried.items():
+        members = [tuple(group.members) for group in groups]
+        middle = key.index(-1)
+        if several and key[:middle] in members and key[middle + 1 :] in members:
+            doubtful |= set(key) - {-1}
+    return groups, doubtful
+
+
+def _links(pair: Pair, one: Group, other: Group) -> bool:
+    """Whether a pair is between two groups."""
+    return (pair.first in one.members and pair.second in other.members) or (
+        pair.second in one.members and pair.first in other.members
+    )
+
+
+def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> list[Group]:
+    """Return the different ways in which two groups make a whole, the best first; only those that are about as good."""
+    found: list[tuple[Fit, Group]] = []
+    for pair in pairs[:MOST_WAYS]:
+        if any(_says_the_same(pair, whole, scans) for _, whole in found):
+            continue
+        joined = _join(scans, one, other, pair) if pair.first in one.members else _join(scans, other, one, pair)
+        if joined is not None and not any(_is_same(joined[1], whole, one, other, scans) for _, whole in found):
+            found.append(joined)
+    found.sort(key=lambda way: -way[0].score)
+    return [whole for fit, whole in found if _rivals(fit, found[0][0])]
+
+
+def _rivals(fit: Fit, best: Fit) -> bool:
+    """Whether a way holds about as well as the best, however much of the scans overlaps in it."""
+    return (
+        fit.agreement > best.agreement - DOUBT
+        and fit.residual < (1.0 + 8.0 * DOUBT) * best.residual
+        and fit.agreeing > 0.4 * best.agreeing
+    )
+
+
+def _says_the_same(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
+    """Whether two scans lie in the whole as a pair says."""
+    lies = invert(whole.poses[pair.second]) @ whole.poses[pair.first]
+    return _apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing
+
+
+def _is_same(whole: Group, before: Group, one: Group, other: Group, scans: list[Scan]) -> bool:
+    """Whether two groups lie to each other alike in two wholes."""
+    i, j = one.members[0], other.members[0]
+    lies, lay = (invert(group.poses[j]) @ group.poses[i] for group in (whole, before))
+    return _apart(lies, lay, scans[i].coarse) < 1.5 * scans[i].coarse.spacing
+
+
+def _apart(one: np.ndarray, other: np.ndarray, view: View) -> float:
+    """Return how far apart two poses put the places of a view [scan unit], root of the mean square."""
+    points = view.points[:: max(len(view.points) // 100, 1)]
+    return float(np.sqrt(((move(one, points) - move(other, points)) ** 2).sum(axis=1).mean()))
+
+
+def _join(scans: list[Scan], one: Group, other: Group, pair: Pair) -> tuple[Fit, Group] | None:
+    """Return both groups in the frame of the second as the pair says, and how they agree; None where that does not hold."""
+    into = other.poses[pair.second] @ pair.pose @ invert(one.poses[pair.first])
+    turn = other.turns[pair.second] * pair.turn * one.turns[pair.first]
+    poses = {i: into @ one.poses[i] for i in one.members} | other.poses
+    turns = {i: turn * one.turns[i] for i in one.members} | other.turns
+    whole = Group(sorted(one.members + other.members), poses, turns)
+    if _fit_between(scans, whole, one, other, loose=True) is None:
+        return None
+    settle(scans, whole, [scan.middle for scan in scans], (2.0, 1.0), steps=4)
+    fit = _fit_between(scans, whole, one, other, loose=False)
+    return None if fit is None else (fit, whole)
+
+
+def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, loose: bool) -> Fit | None:
+    """Return how the scans of two groups agree as they lie in the whole, None where they do not.
+
+    loose : before they are aligned with each other
+    """
+    fits = []
+    for i in one.members:
+        for j in other.members:
+            fit = fit_of(scans, whole, i, j)
+            over = (fit.agreeing + fit.against) / (2.0 * min(len(scans[k].middle.points) for k in (i, j)))
+            if over > CONTRADICTED and fit.agreement < (0.5 if loose else 1.0) * CONTRADICTION:
+                return None
+            fits.append(fit)
+    agreeing, against = sum(fit.agreeing for fit in fits), sum(fit.against for fit in fits)
+    squares = sum(fit.residual**2 * fit.agreeing for fit in fits)
+    near = max(fit.near for fit in fits)
+    all_of_them = Fit(agreeing, against, 0.0, math.sqrt(squares / max(agreeing, 1)), near)
+    smaller = min(
+        sum(len(scans[i].middle.points) for i in group.members) / len(group.members) for group in (one, other)
+    )
+    if agreeing <= 2.0 * ENOUGH * smaller or all_of_them.agreement < (0.6 if loose else SURE):
+        return None
+    return all_of_them
+
+
+def fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit:
+    """Return how two scans of a group agree."""
+    pose = invert(group.poses[second]) @ group.poses[first]
+    return judge_views(scans[first].middle, scans[second].middle, pose, group.turns[first] * group.turns[second])
+
+
+def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit:
+    """Return how the fine views of two scans of a group agree, within the distance in which the middle ones do."""
+    one, other = scans[first], scans[second]
+    pose = invert(group.poses[second]) @ group.poses[first]
+    near, reach = nearness(one.middle, other.middle), REACH * one.middle.spacing
+    return judge(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
+
+
+def links_of(scans: list[Scan], group: Group) -> dict[tuple[int, int], Fit]:
+    """Return how the scans of a group agree that overlap, two by two."""
+    found = {}
+    for place, i in enumerate(group.members):
+        for j in group.members[:place]:
+            fit = fit_of(scans, group, j, i)
+            if fit.share >= LINKED:
+                found[j, i] = fit
+    return found
+
+
+def settle(
+    scans: list[Scan],
+    group: Group,
+    views: list[View],
+    reaches: tuple[float, ...],
+    *,
+    steps: int,
+    few: int = FEW,
+    progress: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Move all scans of a group at once so that all that overlap agree best (generalized ICP of all pairs); the first stays.
+
+    A pair weighs by the square of its overlap: scans with a small one look from different sides, so that what both see they see
+    aslant, where scanners err most.
+
+    reaches : distances within which places pair, one after the other, in spacings of the views
+    """
+    links = links_of(scans, group)
+    if not links:
+        return
+    place = {i: k for k, i in enumerate(group.members)}
+    centres = {i: group.poses[i][:3, :3] @ views[i].points.mean(axis=0) + group.poses[i][:3, 3] for i in group.members}
+    centre = np.mean(list(centres.values()), axis=0)[None]
+    size = max(float(np.linalg.norm(np.ptp(views[i].points, axis=0))) for i in group.members)
+    for turn, reach in enumerate(reaches):
+        for step in range(steps):
+            progress((turn * steps + step) / (len(reaches) * steps))
+            moves = _step(group, views, links, place, reach, centre, size, few)
+            for i, k in place.items():
+                if k > 0:
+                    group.poses[i] = small_motion(moves[k, :3], moves[k, 3:], centre[0]) @ group.poses[i]
+            spacing = views[group.members[0]].spacing
+            if (
+                np.linalg.norm(moves[:, :3], axis=1) * size + np.linalg.norm(moves[:, 3:], axis=1)
+            ).max() < 2e-3 * spacing:
+                break
+
+
+def _step(
+    group: Group,
+    views: list[View],
+    links: dict[tuple[int, int], Fit],
+    place: dict[int, int],
+    reach: float,
+    centre: np.ndarray,
+    size: float,
+    few: int,
+) -> np.ndarray:
+    """Return how each scan of a group turns and moves (M, 6) in one step of all; the first does not."""
+    count = len(group.members)
+    stiffness, load = np.zeros((6 * count, 6 * count)), np.zeros(6 * count)
+    for (i, j), fit in links.items():
+        sums = np.zeros((7, 7))
+        a, b = views[i], views[j]
+        turn = group.turns[i] * group.turns[j]
+        every = max(min(len(a.points), len(b.points)) // few, 1)
+        add_pairs(sums, a, b, group.poses[i], group.poses[j], turn, reach * a.spacing, centre, every)
+        sums *= fit.share**2
+        p, q = (slice(6 * place[k], 6 * place[k] + 6) for k in (i, j))
+        stiffness[p, p] += sums[:6, :6]
+        stiffness[q, q] += sums[:6, :6]
+        stiffness[p, q] -= sums[:6, :6]
+        stiffness[q, p] -= sums[:6, :6]
+        load[p] += sums[:6, 6]
+        load[q] -= sums[:6, 6]
+    moves = np.zeros((count, 6))
+    if count > 1:
+        moves[1:] = solve(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)
+    return moves

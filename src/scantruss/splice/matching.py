@@ -1,0 +1,171 @@
+"""Coarse alignment of two scans: poses that bring many alike places together.
+
+Pairs of places with alike features are mostly wrong. Those that are right keep all that a rigid motion keeps: the distance of any two
+places and the angles of their normals with the line and with each other. Groups of pairs that agree in this give the candidates
+(second order: two pairs count by how many others agree with both; Chen, Sun, Yang and Tao 2022). Nothing is left to chance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .features import flip
+from .poses import make_pose, move, turn_by
+from .views import View
+
+ALIKE = 3  # places of the other scan that may be the same, for each place
+MOST_PAIRS = 800  # pairs of alike places that are looked at
+DISTANCE = 1.2  # difference of distances that two agreeing pairs may have, in spacings
+ANGLE = 0.30  # the same for the cosines of the normals
+APART = 3.0  # least distance between the places of two agreeing pairs, in spacings
+SEEDS = 60  # groups that become candidates
+GROUP = 24  # pairs in a group
+FEWEST = 5  # pairs below which a group says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pose that may bring a scan onto another."""
+
+    pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
+    turn: float  #: 1, or -1 where the normals of the two views face opposite sides
+    support: int  #: pairs of alike places that agree with it
+
+
+def find_candidates(
+    first: View, second: View, first_features: np.ndarray, second_features: np.ndarray, turn: float, most: int
+) -> list[Candidate]:
+    """Return up to `most` different candidates, those with most support first.
+
+    Parameters
+    ----------
+    turn : 1, or -1 where the normals of the two views are taken to face opposite sides
+    """
+    features = first_features if turn > 0 else flip(first_features)
+    pairs = _alike(features, second_features)
+    if len(pairs) < FEWEST:
+        return []
+    found = _from_pairs(first, second, pairs, turn)
+    found.sort(key=lambda candidate: -candidate.support)
+    return _different(found, first, most)
+
+
+def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return pairs of places (M, 2) with alike features: near ones for either side, the most alike first.
+
+    Features are whole numbers, so that the sums are exact in whatever order they are taken.
+    """
+    apart = (first * first).sum(axis=1)[:, None] + (second * second).sum(axis=1) - 2.0 * (first @ second.T)
+    count = min(ALIKE, len(first), len(second))
+    if count == 0:
+        return np.zeros((0, 2), np.int64)
+    there = np.argpartition(apart, count - 1, axis=1)[:, :count]
+    back = np.argpartition(apart, count - 1, axis=0)[:count].T
+    one = np.stack([np.repeat(np.arange(len(first)), count), there.ravel()], axis=1)
+    two = np.stack([back.ravel(), np.repeat(np.arange(len(second)), count)], axis=1)
+    code, times = np.unique(np.concatenate([one, two]) @ np.array([len(second), 1]), return_counts=True)
+    pairs = np.stack([code // len(second), code % len(second)], axis=1)
+    # how alike two places are counts against how alike others are to them: places on plain parts are alike to all
+    usual = np.partition(apart, count - 1, axis=1)[:, count - 1]
+    other = np.partition(apart, count - 1, axis=0)[count - 1]
+    i, j = pairs.T
+    rank = apart[i, j] / np.sqrt(np.maximum(usual[i] * other[j], 1e-12))
+    order = np.lexsort((code, rank, -times))
+    kept: np.ndarray = pairs[order[:MOST_PAIRS]]
+    return kept
+
+
+def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> list[Candidate]:
+    """Return the candidates that groups of agreeing pairs give."""
+    p, n = first.points[pairs[:, 0]], turn * first.normals[pairs[:, 0]]
+    q, m = second.points[pairs[:, 1]], second.normals[pairs[:, 1]]
+    agree = _agree(p, n, q, m, first.spacing)
+    shared = agree * (agree @ agree)
+    weight = shared.sum(axis=1)
+    found: list[Candidate] = []
+    free = np.ones(len(pairs), bool)
+    for seed in np.argsort(-weight, kind="stable"):
+        if len(found) >= SEEDS or weight[seed] <= 0.0:
+            break
+        if not free[seed]:
+            continue
+        group = np.argsort(-shared[seed], kind="stable")[:GROUP]
+        group = np.append(group[shared[seed, group] > 0.0], seed)
+        if len(group) < FEWEST:
+            continue
+        pose = np.eye(4)
+        for _ in range(3):
+            pose = fit_pose(p[group], n[group], q[group], m[group], first.spacing)
+            off = np.linalg.norm(move(pose, p) - q, axis=1)
+            facing = (turn_by(pose, n) * m).sum(axis=1)
+            inside = (off < 1.5 * first.spacing) & (facing > 0.7)
+            if inside.sum() < FEWEST:
+                break
+            group = np.flatnonzero(inside)
+        if inside.sum() >= FEWEST:
+            found.append(Candidate(pose, turn, int(inside.sum())))
+            free[inside] = False
+        free[seed] = False
+    return found
+
+
+def _agree(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: float) -> np.ndarray:
+    """Return which pairs agree with which (M, M) float32: distances and angles are those of one rigid body."""
+    one, two = _between(p, n), _between(q, m)
+    length = one[0]
+    agree = (np.abs(length - two[0]) < DISTANCE * spacing) & (length > APART * spacing)
+    for a, b in zip(one[1:], two[1:], strict=True):
+        agree &= np.abs(a - b) < ANGLE
+    agree &= agree.T
+    return agree.astype(np.float32)
+
+
+def _between(p: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return for all two points their distance, the cosine of their normals, and that of the first normal with the line."""
+    p, n = (p - p.mean(axis=0)).astype(np.float32), n.astype(np.float32)
+    square, rise, cosine = (np.zeros((len(p), len(p)), np.float32) for _ in range(3))
+    for axis in range(3):  # sums of three by hand: a matrix product may round differently with other threads
+        d = p[:, axis] - p[:, axis, None]
+        square += d * d
+        rise += n[:, axis, None] * d
+        cosine += n[:, axis, None] * n[:, axis]
+    length = np.sqrt(square)
+    return length, cosine, rise / np.maximum(length, np.float32(1e-6) * length.max() + np.float32(1e-30))
+
+
+def fit_pose(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: float) -> np.ndarray:
+    """Return the pose that best brings points p with normals n to q with normals m, all (M, 3) (Kabsch)."""
+    a, b = p.mean(axis=0), q.mean(axis=0)
+    arm = spacing * spacing
+    u, _, v = np.linalg.svd(_products(p - a, q - b) + arm * _products(n, m))
+    turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
+    rotation = (u @ turn @ v).T
+    return make_pose(rotation, b - rotation @ a)
+
+
+def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a' b (3, 3) of two (M, 3) arrays."""
+    return (a[:, :, None] * b[:, None, :]).sum(axis=0)
+
+
+def _different(found: list[Candidate], view: View, most: int) -> list[Candidate]:
+    """Return the first `most` candidates that put the scan to different places."""
+    corners = _corners(view.points)
+    kept: list[Candidate] = []
+    places: list[np.ndarray] = []
+    for candidate in found:
+        place = move(candidate.pose, corners)
+        if all(np.linalg.norm(place - other, axis=1).max() > 3.0 * view.spacing for other in places):
+            kept.append(candidate)
+            places.append(place)
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """Return the corners (8, 3) of the box around the points."""
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    return np.array([[(lower, upper)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])

@@ -1,0 +1,77 @@
+"""Range scans of a body with known poses: what a scanner sees from one side, each in a frame of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def random_rotation(chance):
+    """A rotation (3, 3), all alike likely."""
+    q, r = np.linalg.qr(chance.normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.sign(np.linalg.det(q))
+
+
+def random_pose(chance, far=3.0):
+    """A pose (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = random_rotation(chance), far * chance.normal(size=3)
+    return pose
+
+
+def body(seed, bumps=14, height=0.3):
+    """A star-shaped body about the origin: a function from directions (N, 3) to radii (N,)."""
+    chance = np.random.default_rng(seed)
+    centre = chance.normal(size=(bumps, 3))
+    centre /= np.linalg.norm(centre, axis=1)[:, None]
+    size, width = chance.uniform(-height, height, bumps), chance.uniform(0.15, 0.5, bumps)
+    return lambda u: 1.0 + (size * np.exp(-(((u[:, None] - centre) / width[:, None]) ** 2).sum(axis=2))).sum(axis=1)
+
+
+def surface(radius, u):
+    """Points (N, 3) and outward normals of a body in given directions (N, 3)."""
+    u = u / np.linalg.norm(u, axis=1)[:, None]
+    a = np.linalg.svd(u[:, :, None], full_matrices=True)[0][:, :, 1:]
+    step, points = 1e-4, radius(u)[:, None] * u
+    ahead = []
+    for k in range(2):
+        v = u + step * a[:, :, k]
+        v /= np.linalg.norm(v, axis=1)[:, None]
+        ahead.append(radius(v)[:, None] * v - points)
+    normal = np.cross(ahead[0], ahead[1])
+    normal *= np.sign((normal * u).sum(axis=1))[:, None]
+    return points, normal / np.linalg.norm(normal, axis=1)[:, None]
+
+
+def scans_of(radius, views, chance, count=12_000, noise=0.0, scale=1.0):
+    """Scans [(N, 3)] of a body from view directions, and the poses (4, 4) from the frame of each into that of the body."""
+    scans, poses = [], []
+    for view in views:
+        points, normal = surface(radius, chance.normal(size=(count, 3)))
+        seen = points[normal @ (view / np.linalg.norm(view)) > 0.3]
+        spacing = np.sqrt(4 * np.pi / count) * 0.5
+        pose = random_pose(chance)
+        world = scale * (seen + noise * spacing * chance.normal(size=seen.shape))
+        pose[:3, 3] *= scale
+        poses.append(pose)
+        scans.append((world - pose[:3, 3]) @ pose[:3, :3])
+    return scans, poses
+
+
+def around(count, chance):
+    """View directions (count, 3) around a body, some from above and some from below."""
+    turn = 2 * np.pi * np.arange(count) / count
+    return np.stack([np.cos(turn), np.sin(turn), chance.uniform(-0.5, 0.5, count)], axis=1)
+
+
+def errors_of(found, true, scans, names):
+    """Largest rotation [degree] and mean displacement [scan unit] of poses by name against true ones, in the frame of the first."""
+    home_found, home_true = (np.linalg.inv(p) for p in (found[names[0]], true[0]))
+    turned, moved = [], []
+    for name, pose, points in zip(names, true, scans, strict=True):
+        if name in found:
+            a, b = home_found @ found[name], home_true @ pose
+            cosine = 0.5 * (np.trace(a[:3, :3].T @ b[:3, :3]) - 1.0)
+            turned.append(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+            moved.append(np.linalg.norm(points @ (a - b)[:3, :3].T + (a - b)[:3, 3], axis=1).mean())
+    return max(turned), max(moved)
