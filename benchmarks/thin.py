@@ -24,7 +24,7 @@ from scantruss.scan.chunks import read_chunks
 from scantruss.scan.tiles import find_source, tiles_of
 if __name__ == "__main__":
     begun = time.perf_counter()
-    count = sum(len(points) for tile in tiles_of([find_source(sys.argv[1])]) for points in read_chunks(tile))
+    count = sum(len(chunk.points) for tile in tiles_of([find_source(sys.argv[1])]) for chunk in read_chunks(tile))
     print(count, time.perf_counter() - begun)
 """
 THIN = """

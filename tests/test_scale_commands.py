@@ -14,7 +14,7 @@ from scantruss import scale_commands
 from scantruss.cli import main
 from scantruss.machine import available_memory
 from scantruss.options import size_of_memory
-from scantruss.scan import streaming
+from scantruss.scan import fit
 from scantruss.scan.thin import thin_points
 
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
@@ -78,7 +78,7 @@ def test_thin_writes_one_point_a_box(place, capsys):
         (("scan.npy", "-o", "thin.ply", "--spacing", "1", "--keep", "middle"), "keep must be one of mean nearest"),
         (("scan.npy", "-o", "thin.ply", "--spacing", "1", "--workers", "0"), "workers must be 1 or more"),
         (("other.npy", "-o", "thin.ply", "--spacing", "1"), "does not exist"),
-        (("other-*.npy", "-o", "thin.ply", "--spacing", "1"), "no file is named as"),
+        (("other-*.npy", "-o", "thin.ply", "--spacing", "1"), "no file fits the pattern"),
         (("scan.npy", "-o", "thin.ply", "--spacing", "1e-16"), "too small for points so far from zero"),
     ],
 )
@@ -126,7 +126,7 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     points = plate(600_000)
     np.save(tmp_path / "scan.npy", points)
     settings = st.Settings(length=4.0, effort="quick")
-    cloud, thinned = streaming.read_to_fit([tmp_path / "scan.npy"], settings, memory=1e6)
+    cloud, thinned = fit.read_to_fit([tmp_path / "scan.npy"], settings, memory=1e6)
     assert thinned.thin_spacing == 0.2 and len(cloud.points) < len(points) / 10
     whole, found = st.grid_from_points(points, settings), st.grid_from_points(cloud.points + cloud.origin, thinned)
     assert found.topology == whole.topology
@@ -139,7 +139,7 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
 
 
 def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, monkeypatch):
-    monkeypatch.setattr(streaming, "FEWEST", 1000)
+    monkeypatch.setattr(fit, "FEWEST", 1000)
     words = ["grid", "scan.npy", "grid.obj", "--length", "4", "--effort", "quick"]
     assert main([*words, "--memory", "1MB"]) == 0
     assert "thinned while it was read, from 5" in capsys.readouterr().out
@@ -154,9 +154,9 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
 
 def test_what_fits_into_memory_is_taken_as_it_is(place):
     settings = st.Settings(length=4.0)
-    assert streaming.spacing_to_fit(["scan.npy"], settings) == 0.0
-    assert streaming.spacing_to_fit(["scan.npy"], settings, memory=1.0) == 0.0  # so few are never too many
-    cloud, same = streaming.read_to_fit(["scan.npy"], settings)
+    assert fit.spacing_to_fit(["scan.npy"], settings) == 0.0
+    assert fit.spacing_to_fit(["scan.npy"], settings, memory=1.0) == 0.0  # so few are never too many
+    cloud, same = fit.read_to_fit(["scan.npy"], settings)
     assert same is settings and np.array_equal(cloud.points, st.read_points("scan.npy").points)
 
 

@@ -9,7 +9,7 @@ from scantruss.scan import chunks
 from scantruss.scan.chunks import read_ahead, read_chunks
 from scantruss.scan.readers import READERS
 from scantruss.scan.streaming import thin_scan
-from scantruss.scan.tiles import find_files, find_source, tiles_of
+from scantruss.scan.tiles import find_source, tiles_of
 
 COUNT = 700
 
@@ -94,7 +94,7 @@ def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(way, tmp_path,
     for tile, chunk, alone in ((10**9, 10**9, True), (97, 50, False), (250, 64, True), (10, 3, False)):
         monkeypatch.setattr(chunks, "BLOCK", 24 * chunk)
         tiles = list(tiles_of([find_source(path)], tile))
-        found = [points for part in tiles for points in read_ahead(read_chunks(part, chunk, alone=alone))]
+        found = [one.points for part in tiles for one in read_ahead(read_chunks(part, None, chunk, alone=alone))]
         both = np.concatenate(found)
         assert all(points.dtype == np.float64 and points.flags.c_contiguous for points in found)
         assert np.array_equal(both, wanted, equal_nan=True)
@@ -112,15 +112,6 @@ def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path, monkeypatch):
             found = thin_scan([tmp_path / name for name in names], 2.0, keep=keep)
             assert found.points.tobytes() == wanted.points.tobytes() and found.read == wanted.read == COUNT
     assert whole.rim and len(whole.points) - whole.rim == len(thin_scan([tmp_path / "all.npy"], 2.0).points)
-
-
-def test_a_pattern_names_files_in_the_order_of_their_numbers(tmp_path):
-    for name in ("tile-10.npy", "tile-2.npy", "other.xyz"):
-        (tmp_path / name).write_bytes(b"x")
-    found = find_files([str(tmp_path / "tile-*.npy"), tmp_path / "tile-2.npy", tmp_path / "other.xyz"])
-    assert [path.name for path in found] == ["tile-2.npy", "tile-10.npy", "other.xyz"]
-    with pytest.raises(FormatError, match="no file is named"):
-        find_files([str(tmp_path / "nothing-*.laz")])
 
 
 def damaged_las(path):

@@ -111,7 +111,7 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
-        settings = thin_to_fit([values.scan], settings, values.memory)
+        settings = thin_to_fit(values.scan, settings, values.memory)
         cloud = read_scan(values.scan, settings, bars)
         result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
     from .export.formats import write
@@ -161,12 +161,10 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     from .scan.readers import read_points
 
     bars("read", 0.0)
-    thin = bool(settings.thin_spacing)
-    cloud = (
-        read_thinned_scan([path], settings, bars)
-        if thin
-        else read_points(path, unit=settings.unit, selection=settings.selection)
-    )
+    if settings.thin_spacing:
+        cloud = read_thinned_scan(path, settings, bars)
+    else:
+        cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     bars("read", 1.0)
     for note in cloud.notes:
         bars.note(note)
@@ -175,20 +173,20 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def thin_to_fit(names: Sequence[str], settings: Settings, memory: float | None) -> Settings:
+def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
     """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
-    from .scan.streaming import spacing_to_fit
+    from .scan.fit import spacing_to_fit
 
-    spacing = spacing_to_fit(names, settings, memory)
+    spacing = spacing_to_fit(path, settings, memory)
     return settings.replace(thin_spacing=spacing) if spacing else settings
 
 
-def read_thinned_scan(names: Sequence[str], settings: Settings, bars: Bars) -> PointCloud:
+def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     """Read a scan that is thinned while it is read, and say so."""
-    from .scan.streaming import read_thinned
+    from .scan.fit import read_thinned
 
-    cloud, read = read_thinned(names, settings, bars)
-    unit = f" {settings.unit}" if settings.unit else ""
+    cloud, read = read_thinned(path, settings, bars)
+    unit = f" {cloud.unit}" if cloud.unit else ""
     bars.note(
         f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
         " --thin-spacing 0 takes all"

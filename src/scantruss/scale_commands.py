@@ -22,7 +22,7 @@ MANY = 20_000_000  # points of which several workers thin a scan by default
 
 def thin_parser() -> Parser:
     """Options of ``scantruss thin``."""
-    from .options import Parser, add_settings, number
+    from .options import Parser, add_reading, number
 
     parser = Parser(
         "thin",
@@ -37,7 +37,7 @@ def thin_parser() -> Parser:
     )
     parser.add_argument("--rim", action="store_true", help="also keep the outermost points along the rim")
     _add_workers(parser)
-    add_settings(parser, ("unit",))
+    add_reading(parser)
     return parser
 
 
@@ -52,30 +52,37 @@ def _add_workers(parser: Parser) -> None:
 
 def thin(values: Namespace) -> None:
     """Thin a scan and write it."""
+    from .options import selection_of
     from .report.saving import SaveTogether
     from .report.terminal import Bars, print_lines
-    from .scan.streaming import thin_scan
+    from .scan.opened import open_scan
+    from .scan.paths import files_of
+    from .scan.streaming import thin_open_scan
     from .scan.thin import check_spacing
-    from .scan.tiles import find_files, find_source
     from .scan.writers import check_cloud_output, write_points
 
     check_spacing(values.spacing)
     out = check_cloud_output(values.out)
-    files = find_files(values.scans)
-    if out.resolve() in {file.resolve() for file in files}:
-        raise FormatError(f"the thinned scan {out} would overwrite the scan; name another file")
-    sources = [find_source(file) for file in files]
+    files = files_of(values.scans)
+    polygons = [Path(name) for name in getattr(values, "crop", ())]
+    for what, taken in (("scan", files), ("polygon", polygons)):
+        if out.resolve() in {file.resolve() for file in taken}:
+            raise FormatError(f"the thinned scan {out} would overwrite the {what}; name another file")
+    scan = open_scan(files, getattr(values, "unit", ""), selection_of(values))
+    sources = scan.sources
     few = sum(source.points for source in sources) < MANY
     with Bars() as bars, _workers(values, bars, 1 if few else None) as workers:
         for source in sources:
             if source.whole and source.points > MANY:
                 bars.note(f"{source.path} cannot be read in parts, so it is read whole")
-        result = thin_scan(files, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars)
+        result = thin_open_scan(scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars)
+        for note in result.notes:
+            bars.note(note)
         if result.dropped:
             bars.note(f"{result.dropped:,} points with NaN or infinite coordinates are left out")
         bars("write", 0.0)
         with SaveTogether() as save:
-            write_points(save.beside(out), result.points, unit=vars(values).get("unit", ""))
+            write_points(save.beside(out), result.points, unit=result.unit)
     rim = f", {result.rim:,} of them along the rim" if values.rim else ""
     print_lines([f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"])
 
@@ -115,7 +122,17 @@ def sweep_parser() -> Parser:
     return parser
 
 
-ONE = ("memory", "workers", "fixed", "fixed_lines", "unit", "thin_spacing")  # no several values
+ONE = (
+    "memory",
+    "workers",
+    "fixed",
+    "fixed_lines",
+    "unit",
+    "z_unit",
+    "returns",
+    "confidence",
+    "thin_spacing",
+)  # no several values
 
 
 def _several(kind: Any) -> Callable[[str], list[Any]]:
@@ -143,7 +160,7 @@ def sweep(values: Namespace) -> None:
     trials, varied = trials_of_words(values)
     shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
     with Bars() as bars:
-        fitting = thin_to_fit([values.scan], shortest, values.memory)
+        fitting = thin_to_fit(values.scan, shortest, values.memory)
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]

@@ -6,14 +6,20 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..errors import FormatError
+from ..selection import Selection
+from .choose import check_attributes, choose
+from .content import Content, find_attributes
 from .kinds import unreadable
+from .las import FIELDS
 from .layout import MISSING, NUMBER, NUMBER_COMMA, Layout, split_line
+from .units import to_common_unit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,13 +30,35 @@ CHUNK = 1_000_000  # points
 BLOCK = 1 << 24  # bytes of text
 
 
-def read_chunks(tile: Tile, size: int = CHUNK, *, alone: bool = True) -> Iterator[np.ndarray]:
-    """Yield the points of a tile, (K, 3) float64 each in the scan's own frame [scan unit].
+@dataclass(frozen=True)
+class Reading:
+    """How points are taken from all files of a scan."""
+
+    unit: str = ""  #: what the user says
+    selection: Selection = field(default_factory=Selection)
+    common: str = ""  #: unit of the first file that says one; others are brought to it
+
+
+class Chunk(NamedTuple):
+    """Some points of a file after selection."""
+
+    points: np.ndarray  #: (K, 3) float64 [unit of the scan], in the scan's own frame
+    read: int  #: points that were read
+    left_out: dict[str, int]  #: of these, what each part of the selection left out
+    notes: tuple[str, ...] = ()  #: what the reader of a whole file says
+
+
+def read_chunks(
+    tile: Tile, reading: Reading | None = None, size: int = CHUNK, *, alone: bool = True
+) -> Iterator[Chunk]:
+    """Yield the points of a tile: those that are selected, in the unit of the scan.
 
     Parameters
     ----------
     tile : Tile
         A part of a file.
+    reading : Reading, optional
+        Unit and selection; all points in the file's own unit by default.
     size : int
         Most points of a chunk, where the file can be read in chunks.
     alone : bool
@@ -40,16 +68,33 @@ def read_chunks(tile: Tile, size: int = CHUNK, *, alone: bool = True) -> Iterato
     ------
     FormatError
         The file is damaged, or ends before its points do.
+    InputError
+        The file does not hold what is to be selected.
     """
-    kind = tile.source.kind
+    reading = reading or Reading()
+    kind, wanted = tile.source.kind, reading.selection.needs
     if kind == "las":
-        return _las(tile, size, alone)
-    if kind == "rows":
-        return _fixed_rows(tile, size)
-    return _text(tile) if kind == "text" else _whole(tile)
+        contents = _las(tile, wanted, size, alone)
+    elif kind == "rows":
+        contents = _fixed_rows(tile, wanted, size)
+    else:
+        contents = _text(tile) if kind == "text" else _whole(tile, wanted)
+    for content in contents:
+        yield _taken(tile.source.path, content, reading)
 
 
-def read_ahead(chunks: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
+    """Return what is selected of some points, in the unit of the scan; as `readers.read_part` does with all of them."""
+    selection = reading.selection
+    check_attributes(path, content.attributes, selection)
+    points, _, _ = to_common_unit(path, content, reading.unit, selection.z_unit, reading.common)
+    kept, left_out = choose(points, content.attributes, selection)
+    if not kept.all():
+        points = points[kept]
+    return Chunk(np.ascontiguousarray(points, np.float64), len(kept), left_out, content.notes)
+
+
+def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
     """Yield the same chunks, each read while the one before is worked on."""
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(next, chunks, None)
@@ -58,26 +103,31 @@ def read_ahead(chunks: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
             yield chunk
 
 
-def _las(tile: Tile, size: int, alone: bool) -> Iterator[np.ndarray]:
+def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[Content]:
     import laspy
 
     path = tile.source.path
+    names = [name for name in wanted if name in FIELDS]
     backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
     begin, short = tile.begin, False
     try:
-        selection = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z
-        with laspy.open(path, laz_backend=backend, decompression_selection=selection) as file:
+        fields = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z
+        if "class" in names:
+            fields |= laspy.DecompressionSelection.CLASSIFICATION
+        with laspy.open(path, laz_backend=backend, decompression_selection=fields) as file:
             if begin:
                 file.seek(begin)
             while begin < tile.end and not short:
-                wanted = min(size, tile.end - begin)
-                record = file.read_points(wanted)
-                short = len(record) < wanted
+                expected = min(size, tile.end - begin)
+                record: Any = file.read_points(expected)
+                short = len(record) < expected
                 begin += len(record)
                 points = np.empty((len(record), 3))
                 for axis, name in enumerate("xyz"):
                     points[:, axis] = record[name]
-                yield points
+                yield tile.source.content(points, {name: np.array(record[FIELDS[name]]) for name in names})
+    except GeneratorExit:
+        raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
     if short:
@@ -85,33 +135,37 @@ def _las(tile: Tile, size: int, alone: bool) -> Iterator[np.ndarray]:
         raise FormatError(f"{path} ends early: its header promises {promised:,} points, got {begin:,}; copy it again")
 
 
-def _fixed_rows(tile: Tile, size: int) -> Iterator[np.ndarray]:
+def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Content]:
     source, kind = tile.source, tile.source.rows
     assert kind is not None
+    names = kind.names or ()
+    found = {attribute: names[place] for attribute, place in find_attributes(names, wanted).items()}
     with source.path.open("rb") as file:
         file.seek(source.begin + tile.begin * kind.itemsize)
         for begin in range(tile.begin, tile.end, size):
-            wanted = min(size, tile.end - begin)
-            rows = np.fromfile(file, kind, wanted)
-            if len(rows) < wanted:
+            expected = min(size, tile.end - begin)
+            rows = np.fromfile(file, kind, expected)
+            if len(rows) < expected:
                 raise FormatError(f"{source.path} ends early: it has become shorter while it was read")
-            yield np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
+            points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
+            yield source.content(points, {attribute: rows[name] for attribute, name in found.items()})
 
 
-def _whole(tile: Tile) -> Iterator[np.ndarray]:
-    from .readers import read_points
+def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
+    from .readers import read_content
 
-    cloud = read_points(tile.source.path)
-    points = cloud.points + cloud.origin
-    if cloud.dropped:
-        points = np.concatenate([points, np.full((cloud.dropped, 3), np.nan)])  # so that they are counted
-    yield points
+    source = tile.source
+    content = read_content(source.path, wanted)
+    if content.metres != source.metres:
+        raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
+    yield content
 
 
-def _text(tile: Tile) -> Iterator[np.ndarray]:
+def _text(tile: Tile) -> Iterator[Content]:
     """Read the lines that begin in a range of bytes."""
     source, layout = tile.source, tile.source.layout
     assert layout is not None
+    columns = (*source.columns, *(column for _, column in layout.attributes))
     with source.path.open("rb") as file:
         file.seek(tile.begin)
         if tile.begin > source.begin:
@@ -122,7 +176,9 @@ def _text(tile: Tile) -> Iterator[np.ndarray]:
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
-                yield text_rows(source.path, block, layout, source.columns, at=f", after byte {at:,}")
+                rows = text_rows(source.path, block, layout, columns, at=f", after byte {at:,}")
+                more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
+                yield source.content(rows[:, :3], more)
 
 
 def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str) -> np.ndarray:
@@ -153,7 +209,7 @@ def _line_by_line(path: Path, block: bytes, layout: Layout, columns: Sequence[in
                 continue
             said = " ".join(fields)[:60]
             raise FormatError(f"{path}{at}: {said!r} has no numbers x, y, z; mend or delete the line") from None
-        if any(fields[column] for column in columns):
+        if any(fields[column] for column in columns[:3]):
             rows.append(row)
     return np.array(rows).reshape(-1, len(columns))
 

@@ -3,71 +3,70 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import FormatError, InputError
-from ..machine import available_memory
+from ..selection import Selection
 from ..workers import Workers
-from .chunks import read_ahead, read_chunks
-from .cloud import PointCloud
-from .readers import read_points
+from .chunks import Chunk, Reading, read_ahead, read_chunks
+from .opened import OpenScan, open_scan
+from .paths import Source as Names
+from .paths import name_of_files
+from .readers import said_of_left_out
 from .thin import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_rim
-from .tiles import TILE, Source, Tile, find_files, find_source, tiles_of
-
-if TYPE_CHECKING:
-    from ..settings import Settings
+from .tiles import TILE, Source, Tile, tiles_of
 
 Progress = Callable[[str, float], None]
 
 KEEP = ("mean", "nearest")
 SMALLEST = 500_000  # points of a tile that is worth a worker
 TILES = 4  # for each worker at least, so that all end at about the same time
-FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into memory
-BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
-FEWEST = 100_000  # points that are never too many
-SHARE = 0.5  # of the memory at hand that a scan may take
 
 
 @dataclass(frozen=True)
 class Thinned:
     """A scan with one point a box."""
 
-    points: (
-        np.ndarray
-    )  #: (C, 3) float64 in the scan's own frame [scan unit], by the number of their boxes; then those at the rim
-    read: int  #: points that were read
+    #: (C, 3) float64 in the scan's own frame [unit], by the number of their boxes; then those at the rim
+    points: np.ndarray
+    read: int  #: points that were taken
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
     rim: int  #: points that stand for the rim, the last of `points`
+    unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
+    notes: tuple[str, ...] = ()  #: what was left out or converted
 
 
 def thin_scan(
-    names: Sequence[str | Path],
+    names: Names,
     spacing: float,
     *,
     keep: str = "mean",
     rim: bool = False,
+    unit: str = "",
+    selection: Selection | None = None,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Thinned:
     """Return one point for each box of a scan in one or more files, with memory for the result only.
 
-    The same to the byte for any order of the files, and for any number of workers.
+    The same to the byte for any order of the files (of one unit), and for any number of workers.
 
     Parameters
     ----------
-    names : sequence of str or Path
+    names : str, Path or several of them
         Files, or patterns as ``tiles/*.laz``; all in one frame.
     spacing : float
-        Side of a box [scan unit]; the boxes are a lattice through the zero of the scan's frame.
+        Side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame.
     keep : str
         "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
     rim : bool
         Also keep the outermost points of boxes at the rim.
+    unit, selection
+        As for `readers.read_points`: unit of the coordinates, and which points are taken.
     workers : Workers, optional
         Who does it; this process by default.
     progress : callable, optional
@@ -78,27 +77,38 @@ def thin_scan(
     FormatError
         A file is missing, damaged or no scan.
     InputError
-        The spacing does not do.
+        The spacing does not do; the units do not; nothing is selected.
     """
+    scan = open_scan(names, unit, selection)
+    return thin_open_scan(scan, spacing, keep=keep, rim=rim, workers=workers, progress=progress)
+
+
+def thin_open_scan(
+    scan: OpenScan,
+    spacing: float,
+    *,
+    keep: str = "mean",
+    rim: bool = False,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Thinned:
+    """Return one point for each box of a scan whose headers are read; see `thin_scan`."""
     check_spacing(spacing)
     if keep not in KEEP:
         raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
     workers = workers or Workers()
-    sources = [find_source(path) for path in find_files(names)]
-    if not sources:
-        raise InputError("no scan is named")
-    stages = ("read", "read again") if keep == "nearest" else ("read",)
-    rows = _all_rows(sources, spacing, rim, workers, _Share(progress, stages[0], sources))
+    sources, reading, notes = scan
+    rows, told = _all_rows(sources, reading, spacing, rim, workers, _Share(progress, "read", sources))
     if rows.points == rows.dropped:
-        raise FormatError(f"{_words(sources)} holds no points" + (" but NaN or infinite ones" if rows.dropped else ""))
+        raise _nothing(sources, rows, told)
     if keep == "nearest":
-        chosen = _all_nearest(sources, rows, spacing, workers, _Share(progress, stages[-1], sources))
+        chosen = _all_nearest(sources, reading, rows, spacing, workers, _Share(progress, "read again", sources))
     else:
         chosen = means_of(rows.rows, spacing)
-    if not rim:
-        return Thinned(chosen, rows.points, rows.dropped, 0)
-    added = points_at_rim(rows, spacing)
-    return Thinned(np.concatenate([chosen, added]), rows.points, rows.dropped, len(added))
+    added = points_at_rim(rows, spacing) if rim else chosen[:0]
+    notes = (*dict.fromkeys([*told.notes, *notes]), *said_of_left_out([told.left_out]))
+    both = np.concatenate([chosen, added]) if rim else chosen
+    return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
 
 
 class _Share:
@@ -115,31 +125,55 @@ class _Share:
             self._progress(self._stage, min(self._done / self._total, 1.0))
 
 
-def _all_rows(sources: Sequence[Source], spacing: float, rim: bool, workers: Workers, report: _Share) -> Rows:
-    """Return the boxes of all points."""
-    thinning = Thinning(spacing, rim=rim)
+class Told:
+    """What the chunks of a scan, or of a part of it, tell beside their points."""
+
+    def __init__(self) -> None:
+        self.read = 0  #: points that were read
+        self.left_out: dict[str, int] = {}  #: of these, what each part of the selection left out
+        self.notes: tuple[str, ...] = ()
+
+    def add(self, other: Told | Chunk) -> None:
+        """Add what another chunk or part tells."""
+        self.read += other.read
+        for words, count in other.left_out.items():
+            self.left_out[words] = self.left_out.get(words, 0) + count
+        self.notes = (*self.notes, *other.notes)
+
+
+def _all_rows(
+    sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: _Share
+) -> tuple[Rows, Told]:
+    """Return the boxes of all points that are taken."""
+    thinning, told = Thinning(spacing, rim=rim), Told()
     read: dict[Path, int] = {}
     if workers.alone:
         for tile in tiles_of(sources):
-            for points in read_ahead(read_chunks(tile)):
-                thinning.add(points)
-                read[tile.source.path] = read.get(tile.source.path, 0) + len(points)
-                report(len(points))
+            for chunk in read_ahead(read_chunks(tile, reading)):
+                thinning.add(chunk.points)
+                told.add(chunk)
+                read[tile.source.path] = read.get(tile.source.path, 0) + chunk.read
+                report(chunk.read)
     else:
         tiles = _tiles_for(sources, workers)
-        for number, part in workers.run(_rows_of, tiles, (spacing, rim)):
-            thinning.add_rows(part)
+        for number, (rows, part) in workers.run(_rows_of, tiles, (reading, spacing, rim)):
+            thinning.add_rows(rows)
+            told.add(part)
             path = tiles.taken[number].source.path
-            read[path] = read.get(path, 0) + part.points
+            read[path] = read.get(path, 0) + part.read
             report(tiles.taken[number].points)
+    _check_counts(sources, read)
+    return thinning.take_rows(), told
+
+
+def _check_counts(sources: Sequence[Source], read: Mapping[Path, int]) -> None:
+    """Refuse texts with fewer points than their count lines promise."""
     for source in sources:
         promised = source.layout.promised if source.layout else None
-        if promised and read.get(source.path, promised) < promised:
+        if source.kind == "text" and promised and (got := read.get(source.path, promised)) < promised:
             raise FormatError(
-                f"{source.path} ends early: its count line promises {promised:,} points,"
-                f" got {read[source.path]:,}; copy it again"
+                f"{source.path} ends early: its count line promises {promised:,} points, got {got:,}; copy it again"
             )
-    return thinning.take_rows()
 
 
 class _Tiles:
@@ -162,93 +196,58 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
 
 
-def _rows_of(tile: Tile, shared: tuple[float, bool]) -> Rows:
-    """Return the boxes of a tile: the work of a worker."""
-    spacing, rim = shared
-    thinning = Thinning(spacing, rim=rim)
-    for points in _chunks_there(tile):
-        thinning.add(points)
-    return thinning.take_rows()
+def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Told]:
+    """Return the boxes of a tile and what its chunks tell: the work of a worker."""
+    reading, spacing, rim = shared
+    thinning, told = Thinning(spacing, rim=rim), Told()
+    for chunk in _chunks_there(tile, reading):
+        thinning.add(chunk.points)
+        told.add(chunk)
+    return thinning.take_rows(), told
 
 
-def _all_nearest(sources: Sequence[Source], rows: Rows, spacing: float, workers: Workers, report: _Share) -> np.ndarray:
+def _all_nearest(
+    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: _Share
+) -> np.ndarray:
     """Return the points nearest to the means of all boxes."""
     if workers.alone:
 
         def chunks() -> Iterator[np.ndarray]:
             for tile in tiles_of(sources):
-                for points in read_ahead(read_chunks(tile)):
-                    report(len(points))
-                    yield points
+                for chunk in read_ahead(read_chunks(tile, reading)):
+                    report(chunk.read)
+                    yield chunk.points
 
         return nearest_points(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
     tiles = _tiles_for(sources, workers)
 
     def parts() -> Iterator[Nearest]:
-        for number, part in workers.run(_nearest_of, tiles, (rows.rows, spacing)):
+        for number, part in workers.run(_nearest_of, tiles, (reading, rows.rows, spacing)):
             report(tiles.taken[number].points)
             yield part
 
     return nearest_points(len(rows.rows), parts())
 
 
-def _nearest_of(tile: Tile, shared: tuple[np.ndarray, float]) -> Nearest:
+def _nearest_of(tile: Tile, shared: tuple[Reading, np.ndarray, float]) -> Nearest:
     """Return the points of a tile nearest to the means of boxes: the work of a worker."""
-    return nearest_in(_chunks_there(tile), *shared)
+    reading, rows, spacing = shared
+    return nearest_in((chunk.points for chunk in _chunks_there(tile, reading)), rows, spacing)
 
 
-def _chunks_there(tile: Tile) -> Iterator[np.ndarray]:
+def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
     """Yield the chunks of a tile; say which machine does not have it."""
     path = tile.source.path
     if not path.exists():
         raise FormatError(f"{path} is not there on {socket.gethostname()}; all workers need the files under one name")
-    return read_chunks(tile, alone=False)
+    return read_chunks(tile, reading, alone=False)
 
 
-def _words(sources: Sequence[Source]) -> str:
-    return str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
-
-
-def spacing_to_fit(names: Sequence[str | Path], settings: Settings, memory: float | None = None) -> float:
-    """Return the spacing to which a scan must be thinned while it is read, 0 where it need not be [scan unit].
-
-    Parameters
-    ----------
-    names : sequence of str or Path
-        Files or patterns.
-    settings : Settings
-        Tell the desired length, and a spacing that somebody has chosen.
-    memory : float, optional
-        Bytes that the scan may take; half of what is available by default.
-    """
-    if settings.thin_spacing is not None:
-        return float(settings.thin_spacing)
-    points = sum(find_source(path).points for path in find_files(names))
-    if points <= FEWEST:
-        return 0.0
-    memory = SHARE * available_memory() if memory is None else memory
-    return settings.length / FINENESS if points * BYTES > memory else 0.0
-
-
-def read_thinned(
-    names: Sequence[str | Path], settings: Settings, progress: Progress | None = None
-) -> tuple[PointCloud, int]:
-    """Return a scan thinned to `settings.thin_spacing` with its rim kept, and how many points were read.
-
-    The mean of a box has less noise than its points, but lies up to half a box inside at the rim; so the outermost points there stay.
-    """
-    thinned = thin_scan(names, float(settings.thin_spacing or 0.0), rim=True, progress=progress)
-    name = Path(names[0]).name if len(names) == 1 else ""
-    cloud = PointCloud.from_array(thinned.points, unit=settings.unit, name=name)
-    return replace(cloud, dropped=thinned.dropped), thinned.read
-
-
-def read_to_fit(
-    names: Sequence[str | Path], settings: Settings, *, memory: float | None = None, progress: Progress | None = None
-) -> tuple[PointCloud, Settings]:
-    """Return a scan as it is, or thinned where it is larger than memory, and the settings with which it comes out so again."""
-    spacing = spacing_to_fit(names, settings, memory)
-    if not spacing:
-        return read_points(names[0], unit=settings.unit), settings
-    settings = settings.replace(thin_spacing=spacing)
-    return read_thinned(names, settings, progress)[0], settings
+def _nothing(sources: Sequence[Source], rows: Rows, told: Told) -> Exception:
+    """Return why there is no point to keep."""
+    where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
+    if rows.points or not told.read:
+        return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
+    said = ", ".join(f"{number:,} {words}" for words, number in told.left_out.items() if number)
+    name = name_of_files([source.path for source in sources])
+    return InputError(f"no point of {name} is left: of {told.read:,} points {said}; select others")

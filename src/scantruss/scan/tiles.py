@@ -5,23 +5,30 @@ A file that cannot be entered in its middle (faces before points, lists, compres
 
 from __future__ import annotations
 
-import glob
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError
-from .kinds import read_head, unreadable, wrong_kind
+from .arrays import metres_of_npz
+from .content import NAMES, Content, find_attributes
+from .kinds import kind_of, read_head, unreadable, wrong_kind
+from .las_header import check_header
 from .layout import ANY, Layout, find_layout
-from .ply import _row_type
+from .packed import unpacked
+from .pcd import read_pcd_header
+from .ply import row_type
 from .ply_header import read_header
-from .readers import READERS
+from .readers import PACKED, READERS
+from .systems import system_of
+from .units import metres_of
 
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
+PLY = re.compile(rb"ply[ \t]*[\r\n]")
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
 
@@ -37,11 +44,19 @@ class Source:
     rows: np.dtype[np.void] | None = None  #: layout of a row
     columns: tuple[int, ...] = ()  #: of the coordinates: text
     layout: Layout | None = None  #: of a text
+    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
+    z_metres: float | None = None  #: ... of z
+    system: str = ""  #: reference system
+    degrees: bool = False  #: x and y are longitude and latitude
 
     @property
     def whole(self) -> bool:
         """Whether it can only be read whole, with memory for all of its points."""
         return self.kind == "whole"
+
+    def content(self, points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> Content:
+        """Return some of its points (K, 3) with attributes (K,) and what the header says of their units."""
+        return Content(points, dict(attributes), self.metres, self.z_metres, self.system, self.degrees)
 
 
 @dataclass(frozen=True)
@@ -61,34 +76,8 @@ class Tile:
         return max(round(share * self.source.points), 1)
 
 
-def find_files(names: Iterable[str | Path]) -> list[Path]:
-    """Return the files of a scan in several pieces: names, or patterns such as ``tiles/*.laz``; each once, in the order of names.
-
-    Raises
-    ------
-    FormatError
-        Nothing has such a name.
-    """
-    found: dict[Path, None] = {}
-    for name in names:
-        text = str(name)
-        if not glob.has_magic(text) or Path(text).exists():
-            found[Path(text)] = None
-            continue
-        matches = sorted(glob.glob(text, recursive=True), key=_by_number)  # noqa: PTH207 - absolute patterns too
-        if not matches:
-            raise FormatError(f"no file is named as {text}; check the pattern")
-        found.update(dict.fromkeys(map(Path, matches)))
-    return list(found)
-
-
-def _by_number(name: str) -> list[tuple[int, str]]:
-    """Order tile-2 before tile-10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
-
-
-def find_source(path: str | Path) -> Source:
-    """Return what the header of a file says of its points, without reading them.
+def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
+    """Return what the header of a file says of its points and of wanted attributes, without reading them.
 
     Raises
     ------
@@ -105,11 +94,26 @@ def find_source(path: str | Path) -> Source:
             return source
         if suffix == ".npy" and (source := _npy(path)) is not None:
             return source
-        if suffix in TEXTS and (source := _text(path, head)) is not None:
+        if suffix in TEXTS and (source := _text(path, head, wanted)) is not None:
             return source
+        if suffix == PACKED and Path(path.stem).suffix.lower() in READERS:
+            with unpacked(path) as inner:
+                return replace(find_source(inner, wanted), path=path, kind="whole")
+        return Source(path, "whole", max(path.stat().st_size // TEXT_POINT, 1), metres=_metres(path))
     except OSError as error:
         raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
-    return Source(path, "whole", max(path.stat().st_size // TEXT_POINT, 1))
+
+
+def _metres(path: Path) -> float | None:
+    """Return what a file that is read whole says of its unit."""
+    suffix, head = path.suffix.lower(), read_head(path)
+    if suffix == ".ply" and PLY.match(head):
+        return metres_of(read_header(path).unit)
+    if suffix == ".pcd" and kind_of(head) == "a PCD file":
+        return read_pcd_header(path).metres
+    if suffix == ".npz" and head.startswith(b"PK"):
+        return metres_of_npz(path)
+    return 1.0 if suffix == ".e57" else None
 
 
 def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
@@ -132,24 +136,37 @@ def _las(path: Path, head: bytes) -> Source:
     import laspy
 
     try:
+        check_header(path)
         with laspy.open(path) as file:
-            return Source(path, "las", int(file.header.point_count))
+            header = file.header
+            system = system_of([*header.vlrs, *(header.evlrs or [])])
+            return Source(
+                path,
+                "las",
+                int(header.point_count),
+                metres=system.metres,
+                z_metres=system.z_metres,
+                system=system.name,
+                degrees=system.degrees,
+            )
+    except FormatError:
+        raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
 
 
 def _ply(path: Path) -> Source | None:
     """Return a binary PLY file whose first element is vertex, without lists."""
-    if not re.match(rb"ply[ \t]*[\r\n]", read_head(path)):
+    if not PLY.match(read_head(path)):
         return None
     header = read_header(path)
     vertex = header.elements[0] if header.elements else None
     if not header.order or vertex is None or vertex.name != "vertex" or vertex.has_lists:
         return None
-    rows = _row_type(vertex, header.order, [0] * len(vertex.properties))
+    rows = row_type(vertex, header.order, [0] * len(vertex.properties))
     if not {"x", "y", "z"} <= set(rows.names or ()):
         return None
-    return _rows(path, vertex.count, header.start, rows)
+    return replace(_rows(path, vertex.count, header.start, rows), metres=metres_of(header.unit))
 
 
 def _npy(path: Path) -> Source | None:
@@ -163,7 +180,8 @@ def _npy(path: Path) -> Source | None:
     except (ValueError, EOFError):
         return None
     if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
-        if all(kind[axis].kind in "fiu" and not kind[axis].shape for axis in "xyz"):
+        needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(NAMES)).values())]
+        if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
             return _rows(path, shape[0], start, kind)
         return None
     if len(shape) != 2 or shape[1] < 3 or by_columns or kind.kind not in "fiu":
@@ -179,9 +197,9 @@ def _rows(path: Path, count: int, start: int, rows: np.dtype[np.void]) -> Source
     return Source(path, "rows", count, start, rows=rows)
 
 
-def _text(path: Path, head: bytes) -> Source | None:
+def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     """Return a text file in which a line is a point wherever one enters it."""
-    layout = find_layout(path)
+    layout = find_layout(path, wanted)
     if layout.encoding == "utf-16" or layout.separator == ANY or b"\r" in head.replace(b"\r\n", b""):
         return None
     size = path.stat().st_size
