@@ -2,12 +2,12 @@
 
 import builtins
 import os
-import time
 import warnings
-from pathlib import Path
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from jobs import add, die_always, die_once, leave_once, refuse
 
 from scantruss import workers as module
 from scantruss.errors import FormatError, InputError, ScanTrussError
@@ -16,51 +16,26 @@ from scantruss.scan import streaming
 from scantruss.workers import Cluster, Processes, Workers, open_workers
 
 
-def add(job, shared):
-    return job + (shared or 0)
-
-
-def refuse(job, shared):
-    raise FormatError(f"job {job} is refused")
-
-
-def die_once(job, folder):
-    """Die in the first worker that is asked for job 2."""
-    marker = Path(folder) / "died"
-    if job == 2 and not marker.exists():
-        marker.touch()
-        os._exit(1)
-    return job, os.getpid()
-
-
-def leave_once(job, folder):
-    """End the first worker of a cluster within this process that is asked for job 2."""
-    from distributed import get_worker
-
-    marker = Path(folder) / "left"
-    if job == 2 and not marker.exists():
-        marker.touch()
-        worker = get_worker()
-        worker.loop.add_callback(worker.close, timeout=1, executor_wait=False)
-        time.sleep(0.5)
-    return job
-
-
-def die_always(job, shared):
-    os._exit(1)
-
-
-@pytest.fixture
-def address():
-    """A cluster within this process."""
+@contextmanager
+def small_cluster():
+    """Give the address of a cluster within this process."""
     distributed = pytest.importorskip("distributed")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         cluster = distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
         )
-    yield cluster.scheduler_address
-    cluster.close()
+    try:
+        yield cluster.scheduler_address
+    finally:
+        cluster.close()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A cluster for all tests that leave it whole."""
+    with small_cluster() as found:
+        yield found
 
 
 def test_work_is_done_here_in_turn():
@@ -143,8 +118,8 @@ def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(keep, address, tm
     assert len(shares) > 8 and shares[-1] == 1.0
 
 
-def test_a_worker_of_a_cluster_that_dies_is_made_good(address, tmp_path):
-    with open_workers(scheduler=address) as crew:
+def test_a_worker_of_a_cluster_that_dies_is_made_good(tmp_path):
+    with small_cluster() as address, open_workers(scheduler=address) as crew:
         found = dict(crew.run(leave_once, range(5), str(tmp_path)))
     assert (tmp_path / "left").exists()
     assert found == {number: number for number in range(5)}

@@ -19,6 +19,7 @@ from .content import Content, find_attributes
 from .kinds import unreadable
 from .las import FIELDS
 from .layout import MISSING, NUMBER, NUMBER_COMMA, Layout, split_line
+from .lines import LARGE, read_block
 from .units import to_common_unit
 
 if TYPE_CHECKING:
@@ -183,6 +184,8 @@ def _text(tile: Tile) -> Iterator[Content]:
 
 def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str) -> np.ndarray:
     """Return the columns of the lines of a block of text, (K, columns) float64."""
+    if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
+        return rows
     try:
         if b".#" in block:
             raise ValueError
