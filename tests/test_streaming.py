@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scan_files import axes, e57, las, pcd, plate, text, written
+from test_bad_input import BROKEN
+from test_bad_input import FILES as WHOLE
 from test_scan_units import FOOT, GEOGRAPHIC, HEIGHT, METRE, SURVEY, plane, wkt, woods
 from test_selection import CASES, CLASS, COUNT, FILES, HOLE, NUMBER, RING
 
 from scantruss.cli import main
-from scantruss.errors import InputError
+from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.scale_commands import sweep_parser, trials_of_words
 from scantruss.scan import chunks, fit, streaming
 from scantruss.scan.chunks import text_rows
@@ -168,11 +170,50 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_
     layout = find_layout(path, ("class",))
     columns = (*layout.columns, layout.attributes[0][1])
     block = FILES["a.csv"].split(b"\n", 1)[1]
-    wanted = text_rows(path, block, layout, columns, "")
+    wanted = text_rows(path, block, layout, columns)
     monkeypatch.setattr(chunks, "LARGE", 100)
     monkeypatch.setattr(np, "loadtxt", None)
-    found = text_rows(path, block, layout, columns, "")
+    found = text_rows(path, block, layout, columns)
     assert found.tobytes() == wanted.tobytes() and np.array_equal(found[:, 3], CLASS)
+
+
+FEW = ("columns.csv", "long-line.xyz")  # have points, but too few for a grid
+
+
+def test_count_lines_of_several_scans_in_a_text_are_kept():
+    lines = text(P).splitlines(keepends=True)
+    Path("a.pts").write_bytes(b"".join([b"200\n", *lines[:200], b"400\n", *lines[200:]]))
+    check("a.pts")
+    Path("a.pts").write_bytes(b"".join([b"200\n", *lines[:200], b"400\n", *lines[200:-1]]))
+    for crew in (None, Others()):
+        with pytest.raises(FormatError, match="promise 600 points, got 599"):
+            thin_scan("a.pts", S, workers=crew)
+
+
+@pytest.mark.parametrize("name", sorted(set(BROKEN).difference(FEW)))
+def test_a_broken_file_is_refused_in_one_line(name):
+    Path(name).write_bytes(BROKEN[name])
+    with pytest.raises(ScanTrussError) as caught:
+        thin_scan(name, S)
+    assert "\n" not in str(caught.value) and (name in str(caught.value) or "points" in str(caught.value))
+
+
+@pytest.mark.parametrize("name", sorted(WHOLE))
+def test_whole_files_are_thinned_and_parts_of_them_are_not(name):
+    whole = WHOLE[name]
+    Path(name).write_bytes(whole)
+    check(name)
+    for share in (0.0, 0.02, 0.2, 0.5, 0.8, 0.97):
+        Path(name).write_bytes(whole[: int(share * len(whole))])
+        try:
+            count = len(read_points(name).points)
+        except FormatError:
+            with pytest.raises(FormatError):
+                thin_scan(name, S)
+        except InputError:  # too few points for a grid
+            continue
+        else:
+            assert thin_scan(name, S).read == count
 
 
 # ---- the commands --------------------------------------------------------------------------------------------------

@@ -47,6 +47,7 @@ class Chunk(NamedTuple):
     read: int  #: points that were read
     left_out: dict[str, int]  #: of these, what each part of the selection left out
     notes: tuple[str, ...] = ()  #: what the reader of a whole file says
+    promised: int = 0  #: points that count lines among them promise: texts of several scans
 
 
 def read_chunks(
@@ -74,14 +75,16 @@ def read_chunks(
     """
     reading = reading or Reading()
     kind, wanted = tile.source.kind, reading.selection.needs
+    counts: list[int] = []
     if kind == "las":
         contents = _las(tile, wanted, size, alone)
     elif kind == "rows":
         contents = _fixed_rows(tile, wanted, size)
     else:
-        contents = _text(tile) if kind == "text" else _whole(tile, wanted)
+        contents = _text(tile, counts) if kind == "text" else _whole(tile, wanted)
     for content in contents:
-        yield _taken(tile.source.path, content, reading)
+        yield _taken(tile.source.path, content, reading)._replace(promised=sum(counts))
+        counts.clear()
 
 
 def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
@@ -162,8 +165,8 @@ def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
     yield content
 
 
-def _text(tile: Tile) -> Iterator[Content]:
-    """Read the lines that begin in a range of bytes."""
+def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
+    """Read the lines that begin in a range of bytes; `counts` takes what count lines promise."""
     source, layout = tile.source, tile.source.layout
     assert layout is not None
     columns = (*source.columns, *(column for _, column in layout.attributes))
@@ -177,12 +180,14 @@ def _text(tile: Tile) -> Iterator[Content]:
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
-                rows = text_rows(source.path, block, layout, columns, at=f", after byte {at:,}")
+                rows = text_rows(source.path, block, layout, columns, f", after byte {at:,}", counts)
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
                 yield source.content(rows[:, :3], more)
 
 
-def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str) -> np.ndarray:
+def text_rows(
+    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str = "", counts: list[int] | None = None
+) -> np.ndarray:
     """Return the columns of the lines of a block of text, (K, columns) float64."""
     if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
         return rows
@@ -194,16 +199,21 @@ def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], 
             BytesIO(lines), comments="#", delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2
         )
     except ValueError:
-        return _line_by_line(path, block, layout, columns, at)
+        return _line_by_line(path, block, layout, columns, at, [] if counts is None else counts)
 
 
-def _line_by_line(path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str) -> np.ndarray:
+def _line_by_line(
+    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str, counts: list[int]
+) -> np.ndarray:
     """Return the columns of lines that numpy cannot read: missing values, other comments, lines that count."""
     rows = []
     encoding = "utf-8" if layout.encoding.startswith("utf-8") else layout.encoding
     for line in block.decode(encoding, errors="replace").splitlines():
         fields = split_line(line, layout.separator)
-        if not fields or (len(fields) == 1 and fields[0].isdecimal()):
+        if not fields:
+            continue
+        if layout.promised is not None and len(fields) == 1 and fields[0].isdecimal():
+            counts.append(int(fields[0]))
             continue
         try:
             row = [_number(fields[column], layout) for column in columns]

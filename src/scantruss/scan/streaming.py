@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -132,6 +131,7 @@ class Told:
         self.read = 0  #: points that were read
         self.left_out: dict[str, int] = {}  #: of these, what each part of the selection left out
         self.notes: tuple[str, ...] = ()
+        self.promised = 0  #: points that count lines promise
 
     def add(self, other: Told | Chunk) -> None:
         """Add what another chunk or part tells."""
@@ -139,40 +139,42 @@ class Told:
         for words, count in other.left_out.items():
             self.left_out[words] = self.left_out.get(words, 0) + count
         self.notes = (*self.notes, *other.notes)
+        self.promised += other.promised
 
 
 def _all_rows(
     sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: _Share
 ) -> tuple[Rows, Told]:
     """Return the boxes of all points that are taken."""
-    thinning, told = Thinning(spacing, rim=rim), Told()
-    read: dict[Path, int] = {}
+    thinning = Thinning(spacing, rim=rim)
+    told = {source.path.absolute(): Told() for source in sources}
     if workers.alone:
         for tile in tiles_of(sources):
             for chunk in read_ahead(read_chunks(tile, reading)):
                 thinning.add(chunk.points)
-                told.add(chunk)
-                read[tile.source.path] = read.get(tile.source.path, 0) + chunk.read
+                told[tile.source.path.absolute()].add(chunk)
                 report(chunk.read)
     else:
         tiles = _tiles_for(sources, workers)
         for number, (rows, part) in workers.run(_rows_of, tiles, (reading, spacing, rim)):
             thinning.add_rows(rows)
-            told.add(part)
-            path = tiles.taken[number].source.path
-            read[path] = read.get(path, 0) + part.read
+            told[tiles.taken[number].source.path].add(part)
             report(tiles.taken[number].points)
-    _check_counts(sources, read)
-    return thinning.take_rows(), told
-
-
-def _check_counts(sources: Sequence[Source], read: Mapping[Path, int]) -> None:
-    """Refuse texts with fewer points than their count lines promise."""
+    whole = Told()
     for source in sources:
-        promised = source.layout.promised if source.layout else None
-        if source.kind == "text" and promised and (got := read.get(source.path, promised)) < promised:
+        part = told[source.path.absolute()]
+        _check_counts(source, part)
+        whole.add(part)
+    return thinning.take_rows(), whole
+
+
+def _check_counts(source: Source, told: Told) -> None:
+    """Refuse a text with fewer points than its count lines promise."""
+    if source.kind == "text" and source.layout and source.layout.promised is not None:
+        promised = source.layout.promised + told.promised
+        if told.read < promised:
             raise FormatError(
-                f"{source.path} ends early: its count line promises {promised:,} points, got {got:,}; copy it again"
+                f"{source.path} ends early: its count lines promise {promised:,} points, got {told.read:,}; copy it again"
             )
 
 
@@ -191,7 +193,7 @@ class _Tiles:
 
 def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     """Return tiles for several workers, who may not be where we are."""
-    there = [replace(source, path=source.path.resolve()) for source in sources]
+    there = [replace(source, path=source.path.absolute()) for source in sources]
     total = sum(source.points for source in sources)
     return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
 

@@ -28,7 +28,9 @@ from .units import metres_of
 
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
+MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
 PLY = re.compile(rb"ply[ \t]*[\r\n]")
+LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
 
@@ -177,14 +179,14 @@ def _npy(path: Path) -> Source | None:
             read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
             shape, by_columns, kind = read(file)
             start = file.tell()
-    except (ValueError, EOFError):
+    except Exception:  # a damaged header ends in many ways; who reads it whole says in which
         return None
     if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
         needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(NAMES)).values())]
         if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
             return _rows(path, shape[0], start, kind)
         return None
-    if len(shape) != 2 or shape[1] < 3 or by_columns or kind.kind not in "fiu":
+    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or by_columns or kind.kind not in "fiu":
         return None
     names = ["x", "y", "z", *(f"other {c}" for c in range(3, shape[1]))]
     return _rows(path, shape[0], start, np.dtype([(name, kind) for name in names]))
@@ -210,6 +212,7 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
         sample = file.read(1 << 16)
     lines = max(sample.count(b"\n"), 1)
     points = layout.promised or max(round((size - start) * lines / max(len(sample), 1)), 1)
+    points = min(points, (size - start) // LEAST_LINE + 1)
     columns = layout.columns
     if len(columns) == 4:
         columns = columns[1:] if _counts(path, layout, size) else columns[:3]
@@ -225,7 +228,7 @@ def _counts(path: Path, layout: Layout, size: int) -> bool:
             file.seek(begin)
             lines = file.read(1 << 14).split(b"\n")
         lines = lines[layout.skip if begin == 0 else 1 : -1 if begin + (1 << 14) < size else None]
-        rows = text_rows(path, b"\n".join(lines), layout, layout.columns, at="")
+        rows = text_rows(path, b"\n".join(lines), layout, layout.columns)
         if len(rows) > 1 and not (np.diff(rows[:, 0]) == 1).all():
             return False
     return True
