@@ -19,9 +19,17 @@ def grid_of(shape, effort, **others):
     return st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, effort=effort), **others)
 
 
-def test_more_effort_leaves_less_energy(shape):
-    energies = [grid_energy(grid_of(shape, effort), 1.4 * shape.length) for effort in ("quick", "normal", "best")]
-    assert energies[0] > energies[1] > energies[2]
+def test_more_effort_leaves_less_energy():
+    """On the mean of some shapes, for a node; a single grid may be lucky."""
+    energies = []
+    for effort in ("quick", "normal", "best"):
+        shares = []
+        for name in ("scallop", "l_plate", "two_holes"):
+            shape = make(name, 20_000)
+            grid = grid_of(shape, effort)
+            shares.append(grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
+        energies.append(np.mean(shares))
+    assert 0.95 * energies[0] > energies[1] > 1.03 * energies[2]
 
 
 def test_lengths_or_shapes_can_be_preferred(shape):

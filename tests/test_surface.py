@@ -68,6 +68,19 @@ def test_planes_are_reproduced_exactly_at_their_rim_too():
 
 
 @pytest.mark.kernels
+@pytest.mark.parametrize("place", [(0.5, 0.2, 0.6), (-0.6, 0.4, -0.3), (0.3, -0.7, 0.5)])
+def test_the_foot_is_the_nearest_place_of_the_patch(place):
+    """Aside of the middle, where the patch is steep: the nearest of a fine raster of its places."""
+    patch = np.zeros(PATCH)
+    patch[3:6], patch[6:9], patch[9:15] = (0, 0, 1), (1, 0, 0), (0.05, 0.1, -0.2, 0.3, 0.1, -0.25)
+    x, y = np.meshgrid(np.linspace(-1.5, 1.5, 1501), np.linspace(-1.5, 1.5, 1501))
+    z = patch[9] + patch[10] * x + patch[11] * y + patch[12] * x * x + patch[13] * x * y + patch[14] * y * y
+    away = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2)
+    foot = np.array(onto_patch(patch, place))
+    assert np.linalg.norm(foot - place) == pytest.approx(away.min(), rel=0.01)
+
+
+@pytest.mark.kernels
 @pytest.mark.parametrize("coefficients", [(0.1, 0.05, -0.08), (0.12, 0.0, 0.12), (0.0, 0.2, 0.0)])
 def test_quadrics_are_reproduced_nearly_exactly(coefficients):
     """Z = a x^2 + b x y + c y^2: a graph over its own tangent plane at the middle, nearly one elsewhere."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 UNKNOWN_MEMORY = 4e9  # bytes, where a machine tells nothing
@@ -28,8 +29,23 @@ def in_parts(count: int, least: int, work: Callable[[int, int, int], object]) ->
         work(0, 0, count)
         return
     bounds = [count * part // parts for part in range(parts + 1)]
-    with ThreadPoolExecutor(parts) as pool:
-        list(pool.map(work, range(parts), bounds[:-1], bounds[1:]))
+    others = [_pool(parts - 1).submit(work, part, bounds[part], bounds[part + 1]) for part in range(1, parts)]
+    try:
+        work(0, 0, bounds[1])
+    finally:
+        wait(others)
+    for other in others:
+        other.result()
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that are kept: starting some takes as long as many a kernel. Their work asks for no parts, or they would wait."""
+    return ThreadPoolExecutor(threads, thread_name_prefix="scantruss")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def available_memory() -> float:

@@ -270,15 +270,15 @@ def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
     u = (patch[6], patch[7], patch[8])
     v = cross(normal, u)
     d = subtract(place, centre)
-    a, b, h = dot(d, u), dot(d, v), dot(d, normal)
-    for _ in range(2):
-        z = height(patch, a, b)
+    x, y, h = dot(d, u), dot(d, v), dot(d, normal)
+    a, b = x, y
+    for _ in range(2):  # of the foot on the tangent plane
         slope_a = patch[10] + 2.0 * a * patch[12] + b * patch[13]
         slope_b = patch[11] + 2.0 * b * patch[14] + a * patch[13]
-        t = (h - z) / (1.0 + slope_a * slope_a + slope_b * slope_b)
-        a, b, h = a - t * slope_a, b - t * slope_b, z + t * (slope_a * slope_a + slope_b * slope_b)
-        h = height(patch, a, b)
-    return along(along(along(centre, a, u), b, v), h, normal)
+        over = h - height(patch, a, b) - slope_a * (x - a) - slope_b * (y - b)
+        t = over / (1.0 + slope_a * slope_a + slope_b * slope_b)
+        a, b = x + t * slope_a, y + t * slope_b
+    return along(along(along(centre, a, u), b, v), height(patch, a, b), normal)
 
 
 @kernel

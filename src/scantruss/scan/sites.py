@@ -195,8 +195,7 @@ def _prepare(
         if fine is not None:
             points, (found, radius) = whole, fine
     measured = len(found.chosen) if measured is None else int((found.chosen < measured).sum())
-    owner, _, boxes, mean, neighbors, normals, thickness = found
-    grouped, start, _ = _group(points, owner, len(mean))
+    owner, _, grouped, start, boxes, mean, neighbors, normals, thickness = found
     if _is_rough(found, rough):
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
@@ -249,6 +248,8 @@ class _Linked(NamedTuple):
 
     owner: np.ndarray  #: (N,) int64 site of each point
     chosen: np.ndarray  #: (S,) int64 point of each site
+    grouped: np.ndarray  #: (N, 3) the points sorted by site
+    start: np.ndarray  #: (S + 1,) int64 where each site's points start
     boxes: SearchBoxes
     mean: np.ndarray  #: (S, 3)
     neighbors: np.ndarray  #: (S, NEIGHBORS) int64
@@ -259,8 +260,10 @@ class _Linked(NamedTuple):
 def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
     """Return the sites of points for one thinning radius."""
     owner, chosen, boxes = _thin(points, radius)
-    _, _, mean = _group(points, owner, len(chosen))
-    return _Linked(owner, chosen, boxes, mean, *_link(points[chosen], mean, boxes, length, radius, spacing))
+    grouped, start, mean = _group(points, owner, len(chosen))
+    return _Linked(
+        owner, chosen, grouped, start, boxes, mean, *_link(points[chosen], mean, boxes, length, radius, spacing)
+    )
 
 
 def _linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[_Linked, float] | None:
