@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import FormatError
 from ..selection import Selection
-from .choose import check_attributes, choose
+from .choose import check_attributes, choose, describe
 from .content import Content, find_attributes
 from .kinds import unreadable
 from .las import FIELDS
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .tiles import Tile
 
 CHUNK = 1_000_000  # points
+SAMPLE = 10_000  # points that are described where none is taken
 BLOCK = 1 << 24  # bytes of text
 
 
@@ -47,6 +48,7 @@ class Chunk(NamedTuple):
     read: int  #: points that were read
     left_out: dict[str, int]  #: of these, what each part of the selection left out
     notes: tuple[str, ...] = ()  #: what the reader of a whole file says
+    held: str = ""  #: what could have been selected, where nothing was
     promised: int = 0  #: points that count lines among them promise: texts of several scans
 
 
@@ -93,9 +95,11 @@ def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
     check_attributes(path, content.attributes, selection)
     points, _, _ = to_common_unit(path, content, reading.unit, selection.z_unit, reading.common)
     kept, left_out = choose(points, content.attributes, selection)
+    some = {name: values[:SAMPLE] for name, values in content.attributes.items()}
+    held = "" if kept.any() else describe(points[:SAMPLE], some)
     if not kept.all():
         points = points[kept]
-    return Chunk(np.ascontiguousarray(points, np.float64), len(kept), left_out, content.notes)
+    return Chunk(np.ascontiguousarray(points, np.float64), len(kept), left_out, content.notes, held)
 
 
 def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:

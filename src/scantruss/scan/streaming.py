@@ -131,6 +131,7 @@ class Told:
         self.read = 0  #: points that were read
         self.left_out: dict[str, int] = {}  #: of these, what each part of the selection left out
         self.notes: tuple[str, ...] = ()
+        self.held = ""  #: what could have been selected, of a part of which nothing was
         self.promised = 0  #: points that count lines promise
 
     def add(self, other: Told | Chunk) -> None:
@@ -140,6 +141,7 @@ class Told:
             self.left_out[words] = self.left_out.get(words, 0) + count
         self.notes = (*self.notes, *other.notes)
         self.promised += other.promised
+        self.held = self.held or other.held
 
 
 def _all_rows(
@@ -252,4 +254,4 @@ def _nothing(sources: Sequence[Source], rows: Rows, told: Told) -> Exception:
         return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
     said = ", ".join(f"{number:,} {words}" for words, number in told.left_out.items() if number)
     name = name_of_files([source.path for source in sources])
-    return InputError(f"no point of {name} is left: of {told.read:,} points {said}; select others")
+    return InputError(f"no point of {name} is left: of {told.read:,} points {said}; some of them have{told.held}")
