@@ -107,7 +107,7 @@ def sweep_parser() -> Parser:
         "sweep",
         "SCAN --length 3,4,5 [--effort quick,normal ...] -o FOLDER [options]",
         "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
-        "Every setting takes one value, or several with commas between them.",
+        "Every setting takes one value, or several with commas between them; the scan is read once, in one way.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
