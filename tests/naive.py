@@ -150,3 +150,12 @@ def topology(triangles):
     whole = {tuple(sorted(e)) for e in edges}
     nodes = {n for e in edges for n in e}
     return len(groups(edges)), len(groups(open_edges)), len(nodes) - len(whole) + len(triangles)
+
+
+def means_by_box(points, spacing):
+    """Mean of the points in each cube of a lattice through zero, in the order of the numbers of the cubes."""
+    boxes = {}
+    for point in points:
+        if np.isfinite(point).all():
+            boxes.setdefault(tuple(np.floor(point / spacing).astype(int)), []).append(point)
+    return np.array([np.mean(np.array(boxes[box]) - boxes[box][0], axis=0) + boxes[box][0] for box in sorted(boxes)])

@@ -8,7 +8,7 @@ import pytest
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "scantruss"
 LAYERS = (  # lowest first; a module imports from its own line and from lines above
     ("errors", "kernels", "__init__"),  # __init__: the version
-    ("selection", "settings", "machine"),
+    ("selection", "settings", "machine", "workers"),
     ("scan", "clean"),
     ("splice",),
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
@@ -23,8 +23,9 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("ahead",),
     ("structure",),
     ("export",),
+    ("sweep",),
     ("report", "demo"),
-    ("options", "studio", "commands", "commands_clean", "splice_command"),
+    ("options", "studio", "commands", "commands_clean", "scale_commands", "splice_command"),
     ("cli", "__main__"),
 )
 MODULES = sorted(path.relative_to(SOURCE).with_suffix("").parts for path in SOURCE.rglob("*.py"))

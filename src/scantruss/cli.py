@@ -23,6 +23,10 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
   scantruss clean SCAN OUT                 without repeated and stray points, loose pieces, layers, noise
   scantruss grid  SCAN OUT [OUT ...] --length L
                                            the grid; the suffix of each OUT names its format
+  scantruss thin  SCAN... -o OUT --spacing S
+                                           a scan of any size, thinned to one point a box while it is read
+  scantruss sweep SCAN --length 3,4,5 --effort quick,normal -o FOLDER
+                                           many grids side by side: a table and pictures, for choosing
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            one watertight solid of a grid saved as .json
   scantruss splice SCAN SCAN [SCAN ...] -o OUT

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .errors import CertificateError, FormatError, InputError
+from .scale_commands import sweep, sweep_parser, thin, thin_parser
 from .settings import CURVATURE
 from .splice_command import splice, splice_parser
 
@@ -67,7 +68,7 @@ def info(values: Namespace) -> None:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_settings
+    from .options import Parser, add_settings, size_of_memory
 
     parser = Parser(
         "grid",
@@ -87,6 +88,12 @@ def grid_parser() -> Parser:
         action="store_true",
         help="write a grid that fails its certificate too; the exit status is 3 either way",
     )
+    parser.add_argument(
+        "--memory",
+        metavar="SIZE",
+        type=size_of_memory,
+        help="a larger scan is thinned, as 4GB (default: half of what is free)",
+    )
     add_settings(parser)
     return parser
 
@@ -104,6 +111,7 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
+        settings = thin_to_fit(values.scan, settings, values.memory)
         cloud = read_scan(values.scan, settings, bars)
         result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
     from .export.formats import write
@@ -153,12 +161,36 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     from .scan.readers import read_points
 
     bars("read", 0.0)
-    cloud = read_points(path, unit=settings.unit, selection=settings.selection)
+    if settings.thin_spacing:
+        cloud = read_thinned_scan(path, settings, bars)
+    else:
+        cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     bars("read", 1.0)
     for note in cloud.notes:
         bars.note(note)
     if cloud.dropped:
         bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
+    return cloud
+
+
+def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
+    """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
+    from .scan.fit import spacing_to_fit
+
+    spacing = spacing_to_fit(path, settings, memory)
+    return settings.replace(thin_spacing=spacing) if spacing else settings
+
+
+def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan that is thinned while it is read, and say so."""
+    from .scan.fit import read_thinned
+
+    cloud, read = read_thinned(path, settings, bars)
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    bars.note(
+        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
+        " --thin-spacing 0 takes all"
+    )
     return cloud
 
 
@@ -298,6 +330,8 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "info": (info_parser, info),
     "clean": (clean_parser, clean),
     "grid": (grid_parser, grid),
+    "thin": (thin_parser, thin),
+    "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, demo),

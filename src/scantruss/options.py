@@ -102,6 +102,14 @@ def whole_number(text: str) -> int:
         raise argparse.ArgumentTypeError(f"needs a whole number, got {text!r}") from None
 
 
+def size_of_memory(text: str) -> float:
+    """Return the bytes of "4GB", "500 MB" or "123456"."""
+    found = re.fullmatch(r"(\d+\.?\d*|\.\d+)\s*([kmgt]?)i?b?", text.strip().lower())
+    if not found or float(found[1]) <= 0:
+        raise argparse.ArgumentTypeError(f"needs a size such as 4GB or 500MB, got {text!r}")
+    return float(found[1]) * 1000.0 ** " kmgt".index(found[2] or " ")
+
+
 def position(text: str) -> Position:
     """Return the three coordinates of "X,Y,Z" (comma, semicolon or space between them)."""
     try:

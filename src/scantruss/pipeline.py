@@ -61,11 +61,11 @@ def grid_from_points(
 def grid_from_scan(
     path: str | Path, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
 ) -> Grid:
-    """Return the grid of a scan file; see `grid_from_points`."""
-    from .scan.readers import read_points
+    """Return the grid of a scan file; see `grid_from_points`. One that is larger than memory is thinned while it is read."""
+    from .scan.fit import read_to_fit
 
     started = perf_counter()
-    cloud = read_points(path, unit=settings.unit, selection=settings.selection)
+    cloud, settings = read_to_fit(path, settings, progress=progress)
     spent = perf_counter() - started
     return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 

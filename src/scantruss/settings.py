@@ -138,6 +138,12 @@ class Settings:
     box_size: float = _setting(
         0.2, "distance of the sites to which the scan is thinned, in lengths; search boxes are larger", source="Eq. 1"
     )
+    thin_spacing: float | None = _setting(
+        None,
+        "a scan file is thinned to this by search boxes while it is read; 0: never; none: to length / 20, where it is larger than memory",
+        unit="scan unit",
+        source="Sec. 2",
+    )
     clean: bool = _setting(
         True, "leave out what does not belong to the scan, by the steps below; --no-clean keeps all", source="Sec. 2"
     )
@@ -201,6 +207,10 @@ class Settings:
         object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
         if self.fill_holes is not None and not (isinstance(self.fill_holes, int | float) and self.fill_holes >= 0):
             raise InputError(f"fill_holes must be a length of 0 or more, got {self.fill_holes}")
+        if self.thin_spacing is not None and not (
+            isinstance(self.thin_spacing, int | float) and self.thin_spacing >= 0
+        ):
+            raise InputError(f"thin_spacing must be a length of 0 or more, got {self.thin_spacing}")
         try:
             fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)
         except (TypeError, ValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,13 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
     except Exception as error:  # a damaged archive ends in many ways
         raise unreadable(path, "NPZ", error) from None
     raise FormatError(f"{path} must hold an array of shape (N, 3) or wider, got {', '.join(held)[:200] or 'none'}")
+
+
+def metres_of_npz(path: Path) -> float | None:
+    """Return the metres of the unit that an NPZ file names, without reading its points; None where it names none."""
+    with suppress(Exception), path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        return _metres(arrays)
+    return None  # damaged in some way: reading its points says in which
 
 
 def _member(arrays: Mapping[str, Any], name: str) -> np.ndarray | None:

@@ -54,11 +54,11 @@ def choose(
         What to take.
     """
     kept = np.ones(len(points), dtype=bool)
-    left_out = {}
+    left_out: dict[str, int] = {}
     for words, test in _tests(points, attributes, selection):
         rows = np.flatnonzero(kept)
         passed = test(rows)
-        left_out[words] = len(rows) - int(passed.sum())
+        left_out[words] = left_out.get(words, 0) + len(rows) - int(passed.sum())
         kept[rows[~passed]] = False
     return kept, left_out
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import FormatError
 from .content import Content
-from .heights import look_like_feet
+from .heights import SAMPLE, look_like_feet
 from .kinds import read_head, unreadable, wrong_kind
 from .las_header import check_header
 from .systems import System, system_of
@@ -43,6 +43,19 @@ def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
     attributes = dict(zip(names, columns, strict=True))
     feet = look_like_feet(points, attributes["return_count"]) if system.z_metres is None else ""
     return Content(points, attributes, system.metres, system.z_metres, system.name, system.degrees, feet=feet)
+
+
+def note_on_heights(path: Path) -> str:
+    """Return a note where the heights of a LAS or LAZ file look like feet, by its first points; "" where it says their unit."""
+    import laspy
+
+    try:
+        with laspy.open(path) as file:
+            record: Any = file.read_points(min(SAMPLE, int(file.header.point_count)))
+            points = np.column_stack([record[name] for name in "xyz"]).astype(float, copy=False)
+            return look_like_feet(points, np.array(record[FIELDS["return_count"]]))
+    except BaseException as error:
+        raise unreadable(path, "LAS or LAZ", error) from None
 
 
 def _read(path: Path, names: Sequence[str]) -> tuple[int, System, list[list[np.ndarray]]]:

@@ -29,11 +29,6 @@ def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int 
     block : int
         Bytes read at a time.
     """
-    if layout.encoding == "utf-16" or layout.separator not in (None, *",;|\t") or len(set(columns)) < len(columns):
-        return None
-    place = np.full(max(columns) + 1, -1, dtype=np.int64)
-    place[list(columns)] = np.arange(len(columns))
-    separator = ord(layout.separator) if layout.separator else 0
     tables = []
     with path.open("rb") as file:
         for _ in range(layout.skip):
@@ -42,20 +37,26 @@ def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int 
         while raw := bytearray(file.read(block)):
             rest = file.readline(LONGEST)
             raw += rest
-            data = np.frombuffer(raw, dtype=np.uint8)
-            table = _read_block(data, separator, layout.comma, place, len(columns)) if len(rest) < LONGEST else None
+            table = read_block(raw, layout, columns) if len(rest) < LONGEST else None
             if table is None:
                 return None
             tables.append(table)
     return np.concatenate(tables) if tables else None
 
 
-def _read_block(data: np.ndarray, separator: int, comma: bool, place: np.ndarray, width: int) -> np.ndarray | None:
+def read_block(raw: bytearray, layout: Layout, columns: Sequence[int]) -> np.ndarray | None:
+    """Return some columns of whole lines of a text file; None where a line is not of plain numbers."""
+    if layout.encoding == "utf-16" or layout.separator not in (None, *",;|\t") or len(set(columns)) < len(columns):
+        return None
     from ..kernels.decimals import read_rows
 
-    table = np.empty((int(np.count_nonzero(data == 10)) + 1, width))
+    place = np.full(max(columns) + 1, -1, dtype=np.int64)
+    place[list(columns)] = np.arange(len(columns))
+    separator = ord(layout.separator) if layout.separator else 0
+    data = np.frombuffer(raw, dtype=np.uint8)
+    table = np.empty((int(np.count_nonzero(data == 10)) + 1, len(columns)))
     slow = np.empty((MOST_SLOW, 4), dtype=np.int64)
-    rows, late = read_rows(data, len(data), separator, comma, place, table, slow)
+    rows, late = read_rows(data, len(data), separator, layout.comma, place, table, slow)
     if rows < 0:
         return None
     for row, column, start, stop in slow[:late].tolist():

@@ -49,7 +49,7 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if kind_of(head) != "a PCD file":
         raise wrong_kind(path, head, "a PCD file")
-    header = _read_header(path)
+    header = read_pcd_header(path)
     names = [name.lower() for name in header.names]
     if missing := [axis for axis in "xyz" if axis not in names]:
         raise FormatError(f"{path} has no field {missing[0]}; it has {' '.join(header.names)[:80]}")
@@ -64,7 +64,8 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     )
 
 
-def _read_header(path: Path) -> Header:
+def read_pcd_header(path: Path) -> Header:
+    """Return what the header of a PCD file says; FormatError where it is none."""
     with path.open("rb") as file:
         raw = file.read(LONGEST_HEADER)
     end = re.search(rb"(?:^|\n)[ \t]*DATA[ \t]+(\w+)[ \t]*\r?(\n|$)", raw)

@@ -65,7 +65,7 @@ def _read_rows(
     path: Path, data: np.ndarray, offset: int, order: str, vertex: Element, columns: Sequence[str]
 ) -> tuple[np.ndarray, int]:
     """Return the wanted columns of all rows and the byte behind them."""
-    if len(data) - offset < vertex.count * _row_type(vertex, order, [0] * len(vertex.properties)).itemsize:
+    if len(data) - offset < vertex.count * row_type(vertex, order, [0] * len(vertex.properties)).itemsize:
         raise ends_early(path, vertex)
     table = np.empty((vertex.count, len(columns)))
     begin = 0
@@ -92,7 +92,7 @@ def _runs(path: Path, data: np.ndarray, offset: int, order: str, element: Elemen
     begin, window = 0, element.count if not element.has_lists else 64
     while begin < element.count:
         lengths = _list_lengths(path, data, offset, order, element)
-        row = _row_type(element, order, lengths)
+        row = row_type(element, order, lengths)
         room = min(window, element.count - begin, (len(data) - offset) // row.itemsize)
         if room < 1 or (not element.has_lists and room < element.count):
             raise ends_early(path, element)
@@ -127,7 +127,7 @@ def _list_lengths(path: Path, data: np.ndarray, offset: int, order: str, element
     return lengths
 
 
-def _row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.void]:
+def row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.void]:
     """Return the layout of a row whose lists have the given lengths."""
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     taken = set()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +26,7 @@ from .pcd import read_pcd
 from .ply import read_ply
 from .solids import read_obj, read_off, read_stl
 from .text import read_text
-from .units import to_one_unit
+from .units import to_common_unit
 
 Reader = Callable[[Path, Sequence[str]], Content]
 
@@ -87,8 +87,7 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     InputError
         The points cannot be used: too few, mostly NaN, all on a line; degrees; the unit is not known; nothing is selected.
     """
-    if unit not in UNITS:
-        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+    check_unit(unit)
     selection = selection or Selection()
     files = files_of(path)
     parts: list[Part] = []
@@ -106,17 +105,12 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
     content = read_content(path, selection.needs)
     check_attributes(path, content.attributes, selection)
-    points, unit, notes = to_one_unit(path, content, unit, selection.z_unit)
-    feet = (content.feet,) if content.feet and unit != "foot" and not selection.z_unit else ()
-    size, own = UNITS[common], UNITS[unit]
-    if size and own and size != own:
-        notes = (*notes, f"{path.name} is in {unit} and is brought to {common}, the unit of the first file")
-        points, unit = points * (own / size), common
+    points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, left_out = choose(points, content.attributes, selection)
     held = "" if kept.any() else describe(points, content.attributes)
     if not kept.all():
         points = points[kept]
-    return Part(points, unit, content.system, len(kept), left_out, held, (*content.notes, *notes, *feet))
+    return Part(points, unit, content.system, len(kept), left_out, held, notes)
 
 
 def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -142,24 +136,40 @@ def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
     """Return the points of all files in one unit, the unit, and what should be said."""
-    _check_systems(files, parts)
-    unit = next((part.unit for part in parts if part.unit), "")
-    notes: dict[str, None] = {}
-    for file, part in zip(files, parts, strict=True):
-        notes.update(dict.fromkeys(part.notes))
-        if unit and not part.unit:
-            notes[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
-    for words in parts[0].left_out:
-        count = sum(part.left_out[words] for part in parts)
-        notes[f"{count:,} points {words} are left out"] = None
+    check_systems(files, [part.system for part in parts])
+    unit, notes = said_together(files, [part.unit for part in parts], [part.notes for part in parts])
     points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
-    return points, unit, tuple(notes)
+    return points, unit, (*notes, *said_of_left_out([part.left_out for part in parts]))
 
 
-def _check_systems(files: Sequence[Path], parts: Sequence[Part]) -> None:
+def said_together(
+    files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
+) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of all files of a scan, "" where none says one, and what should be said of them, each thing once."""
+    unit = next((unit for unit in units if unit), "")
+    said: dict[str, None] = {}
+    for file, own, words in zip(files, units, notes, strict=True):
+        said.update(dict.fromkeys(words))
+        if unit and not own:
+            said[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
+    return unit, tuple(said)
+
+
+def said_of_left_out(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
+    """Return what should be said of the points that a selection has left out of the parts of a scan."""
+    return tuple(f"{sum(part[words] for part in parts):,} points {words} are left out" for words in parts[0])
+
+
+def check_unit(unit: str) -> None:
+    """Refuse a unit that is not known."""
+    if unit not in UNITS:
+        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+
+
+def check_systems(files: Sequence[Path], systems: Sequence[str]) -> None:
     """Refuse files whose reference systems are known to differ."""
     for by_code in (True, False):
-        named = [(f, p.system) for f, p in zip(files, parts, strict=True) if p.system]
+        named = [(f, system) for f, system in zip(files, systems, strict=True) if system]
         named = [(f, system) for f, system in named if system.startswith("EPSG:") == by_code]
         for file, system in named[1:]:
             if system != named[0][1]:

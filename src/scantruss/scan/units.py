@@ -34,6 +34,27 @@ def name_of(metres: float | None) -> str:
     return ""
 
 
+def to_common_unit(
+    path: Path, content: Content, unit: str, z_unit: str, common: str
+) -> tuple[np.ndarray, str, tuple[str, ...]]:
+    """Return points brought to the unit that other files have, where their own is known; see `to_one_unit`.
+
+    Parameters
+    ----------
+    path, content, unit, z_unit
+        As for `to_one_unit`.
+    common : str
+        Unit of the files before; "" where none has one.
+    """
+    points, own, notes = to_one_unit(path, content, unit, z_unit)
+    feet = (content.feet,) if content.feet and own != "foot" and not z_unit else ()
+    size, metres = UNITS[common], UNITS[own]
+    if size and metres and size != metres:
+        notes = (*notes, f"{path.name} is in {own} and is brought to {common}, the unit of the first file")
+        points, own = points * (metres / size), common
+    return points, own, (*content.notes, *notes, *feet)
+
+
 def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
     """Return points whose heights have the unit of x and y, that unit, and what should be said.
 

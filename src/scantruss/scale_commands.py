@@ -1,0 +1,224 @@
+"""The commands for what outgrows memory or a machine: thin a scan of any size, sweep over settings."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .errors import FormatError, InputError
+
+if TYPE_CHECKING:
+    from .options import Parser
+    from .report.terminal import Bars
+    from .settings import Settings
+    from .sweep import Trial
+    from .workers import Workers
+
+MANY = 20_000_000  # points of which several workers thin a scan by default
+
+
+def thin_parser() -> Parser:
+    """Options of ``scantruss thin``."""
+    from .options import Parser, add_reading, number
+
+    parser = Parser(
+        "thin",
+        "SCAN... -o OUT --spacing S [options]",
+        "Thin a scan of any size to one point a box, with memory for the result only.",
+    )
+    parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns as 'tiles/*.laz'")
+    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="thinned scan; the suffix names the format")
+    parser.add_argument("--spacing", metavar="S", type=number, required=True, help="side of a box [scan unit]")
+    parser.add_argument(
+        "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
+    )
+    parser.add_argument("--rim", action="store_true", help="also keep the outermost points along the rim")
+    _add_workers(parser)
+    add_reading(parser)
+    return parser
+
+
+def _add_workers(parser: Parser) -> None:
+    from .options import whole_number
+
+    parser.add_argument(
+        "--workers", metavar="N", type=whole_number, help="workers on this machine; 1: this process alone"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="Dask cluster, as tcp://10.0.0.5:8786")
+
+
+def thin(values: Namespace) -> None:
+    """Thin a scan and write it."""
+    from .options import selection_of
+    from .report.saving import SaveTogether
+    from .report.terminal import Bars, print_lines
+    from .scan.opened import open_scan
+    from .scan.paths import files_of
+    from .scan.streaming import thin_open_scan
+    from .scan.thin import check_spacing
+    from .scan.writers import check_cloud_output, write_points
+
+    check_spacing(values.spacing)
+    out = check_cloud_output(values.out)
+    files = files_of(values.scans)
+    polygons = [Path(name) for name in getattr(values, "crop", ())]
+    for what, taken in (("scan", files), ("polygon", polygons)):
+        if out.resolve() in {file.resolve() for file in taken}:
+            raise FormatError(f"the thinned scan {out} would overwrite the {what}; name another file")
+    scan = open_scan(files, getattr(values, "unit", ""), selection_of(values))
+    sources = scan.sources
+    few = sum(source.points for source in sources) < MANY
+    with Bars() as bars, _workers(values, bars, 1 if few else None) as workers:
+        for source in sources:
+            if source.whole and source.points > MANY:
+                bars.note(f"{source.path} cannot be read in parts, so it is read whole")
+        result = thin_open_scan(scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars)
+        for note in result.notes:
+            bars.note(note)
+        if result.dropped:
+            bars.note(f"{result.dropped:,} points with NaN or infinite coordinates are left out")
+        bars("write", 0.0)
+        with SaveTogether() as save:
+            write_points(save.beside(out), result.points, unit=result.unit)
+    rim = f", {result.rim:,} of them along the rim" if values.rim else ""
+    print_lines([f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"])
+
+
+def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
+    """Return the workers of the command line, and say who they are where they are several."""
+    from .workers import NEEDS_DASK, Processes, open_workers
+
+    workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
+    if isinstance(workers, Processes):
+        bars.note(f"{workers.words}; a cluster {NEEDS_DASK}")
+    elif workers.count > 1 or values.scheduler:
+        bars.note(workers.words)
+    return workers
+
+
+def sweep_parser() -> Parser:
+    """Options of ``scantruss sweep``."""
+    from .options import Parser, add_settings, size_of_memory
+
+    parser = Parser(
+        "sweep",
+        "SCAN --length 3,4,5 [--effort quick,normal ...] -o FOLDER [options]",
+        "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
+        "Every setting takes one value, or several with commas between them; the scan is read once, in one way.",
+    )
+    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
+    parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
+    parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    parser.add_argument("--memory", metavar="SIZE", type=size_of_memory, help="a larger scan is thinned, as 4GB")
+    _add_workers(parser)
+    add_settings(parser)
+    for action in parser._actions:
+        if action.dest not in ("help", "scan", "out", "settings", *ONE) and action.type is not None:
+            action.type = _several(action.type)
+    return parser
+
+
+ONE = (
+    "memory",
+    "workers",
+    "fixed",
+    "fixed_lines",
+    "unit",
+    "z_unit",
+    "returns",
+    "confidence",
+    "thin_spacing",
+)  # no several values
+
+
+def _several(kind: Any) -> Callable[[str], list[Any]]:
+    """Return a reader of values with commas between them, each kept with its word."""
+
+    def read(text: str) -> list[Any]:
+        words = [word.strip() for word in text.split(",") if word.strip()]
+        if not words:
+            raise argparse.ArgumentTypeError(f"needs a value, or several with commas between them, got {text!r}")
+        return [(word, kind(word)) for word in words]
+
+    return read
+
+
+def sweep(values: Namespace) -> None:
+    """Make many grids and tell of them."""
+    from .commands import note_compiling, read_scan, thin_to_fit
+    from .report.choosing import head_of, rows_of
+    from .report.terminal import Bars, print_lines, print_table
+    from .sweep import sweep as make_grids
+
+    folder = Path(values.out)
+    if folder.exists() and not folder.is_dir():
+        raise FormatError(f"{folder} is a file; name a folder for the grids")
+    trials, varied = trials_of_words(values)
+    shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
+    with Bars() as bars:
+        fitting = thin_to_fit(values.scan, shortest, values.memory)
+        cloud = read_scan(values.scan, fitting, bars)
+        if fitting.thin_spacing:
+            trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
+        note_compiling(bars, shortest.method, "boundary", "front", "optimize")
+        with _workers(values, bars, None if len(trials) > 1 else 1) as workers:
+            outcomes = make_grids(cloud, trials, workers, bars)
+        head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
+        if not any(outcome.grid for outcome in outcomes):
+            raise InputError(f"no grid came out of {len(trials)} trials; the first: {outcomes[0].fault}")
+        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
+    print_table(head, rows)
+    print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+
+
+def _thinned(trial: Trial, spacing: float) -> Trial:
+    from dataclasses import replace
+
+    return replace(trial, settings=trial.settings.replace(thin_spacing=spacing))
+
+
+def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:
+    """Return a trial for every combination of the values on the command line, and the names of what is varied."""
+    from .options import option_of, settings_of
+    from .sweep import trials_of
+
+    lists = {name: value for name, value in vars(values).items() if _is_list(value)}
+    varied = {name: value for name, value in lists.items() if len(value) > 1}
+
+    def choose(pick: tuple[int, ...]) -> Settings:
+        one = {name: value[0][1] for name, value in lists.items()}
+        one |= {name: varied[name][number][1] for name, number in zip(varied, pick, strict=True)}
+        return settings_of(Namespace(**(vars(values) | one)))
+
+    words = {option_of(name).removeprefix("--"): [word for word, _ in value] for name, value in varied.items()}
+    return trials_of(words, choose), tuple(words)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], tuple) and len(value[0]) == 2
+
+
+def _save(
+    folder: Path, title: str, trials: list[Trial], outcomes: list[Any], head: tuple[str, ...], rows: list[Any]
+) -> None:
+    """Save grids, pictures and tables together, or nothing."""
+    from .export.sheet import encode_sheet
+    from .report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
+    from .report.saving import SaveTogether
+
+    with SaveTogether() as save:
+        save.make_folder(folder)
+        for trial, outcome in zip(trials, outcomes, strict=True):
+            if outcome.grid:
+                save.beside(folder / f"{trial.name}.json").write_bytes(outcome.grid)
+                save.beside(folder / f"{trial.name}.png").write_bytes(outcome.picture)
+        save.beside(folder / "table.csv").write_bytes(encode_table_csv(head, rows))
+        save.beside(folder / "table.md").write_bytes(encode_table_markdown(head, rows))
+        save.beside(folder / "index.html").write_bytes(encode_page(title, head, rows, trials, outcomes))
+        both = zip(trials, outcomes, strict=True)
+        pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
+        save.beside(folder / "overview.png").write_bytes(encode_sheet(pictures))

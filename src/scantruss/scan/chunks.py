@@ -1,0 +1,240 @@
+"""The points of a tile, some at a time, so that memory does not grow with the scan."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..errors import FormatError
+from ..selection import Selection
+from .choose import check_attributes, choose, describe
+from .content import Content, find_attributes
+from .kinds import unreadable
+from .las import FIELDS
+from .layout import MISSING, NUMBER, NUMBER_COMMA, Layout, split_line
+from .lines import LARGE, read_block
+from .units import to_common_unit
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from .tiles import Tile
+
+CHUNK = 1_000_000  # points
+SAMPLE = 10_000  # points that are described where none is taken
+BLOCK = 1 << 24  # bytes of text
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How points are taken from all files of a scan."""
+
+    unit: str = ""  #: what the user says
+    selection: Selection = field(default_factory=Selection)
+    common: str = ""  #: unit of the first file that says one; others are brought to it
+
+
+class Chunk(NamedTuple):
+    """Some points of a file after selection."""
+
+    points: np.ndarray  #: (K, 3) float64 [unit of the scan], in the scan's own frame
+    read: int  #: points that were read
+    left_out: dict[str, int]  #: of these, what each part of the selection left out
+    notes: tuple[str, ...] = ()  #: what the reader of a whole file says
+    held: str = ""  #: what could have been selected, where nothing was
+    promised: int = 0  #: points that count lines among them promise: texts of several scans
+
+
+def read_chunks(
+    tile: Tile, reading: Reading | None = None, size: int = CHUNK, *, alone: bool = True
+) -> Iterator[Chunk]:
+    """Yield the points of a tile: those that are selected, in the unit of the scan.
+
+    Parameters
+    ----------
+    tile : Tile
+        A part of a file.
+    reading : Reading, optional
+        Unit and selection; all points in the file's own unit by default.
+    size : int
+        Most points of a chunk, where the file can be read in chunks.
+    alone : bool
+        Nobody else reads, so that a reader may use all processors.
+
+    Raises
+    ------
+    FormatError
+        The file is damaged, or ends before its points do.
+    InputError
+        The file does not hold what is to be selected.
+    """
+    reading = reading or Reading()
+    kind, wanted = tile.source.kind, reading.selection.needs
+    counts: list[int] = []
+    if kind == "las":
+        contents = _las(tile, wanted, size, alone)
+    elif kind == "rows":
+        contents = _fixed_rows(tile, wanted, size)
+    else:
+        contents = _text(tile, counts) if kind == "text" else _whole(tile, wanted)
+    for content in contents:
+        yield _taken(tile.source.path, content, reading)._replace(promised=sum(counts))
+        counts.clear()
+
+
+def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
+    """Return what is selected of some points, in the unit of the scan; as `readers.read_part` does with all of them."""
+    selection = reading.selection
+    check_attributes(path, content.attributes, selection)
+    points, _, _ = to_common_unit(path, content, reading.unit, selection.z_unit, reading.common)
+    kept, left_out = choose(points, content.attributes, selection)
+    some = {name: values[:SAMPLE] for name, values in content.attributes.items()}
+    held = "" if kept.any() else describe(points[:SAMPLE], some)
+    if not kept.all():
+        points = points[kept]
+    return Chunk(np.ascontiguousarray(points, np.float64), len(kept), left_out, content.notes, held)
+
+
+def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
+    """Yield the same chunks, each read while the one before is worked on."""
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(next, chunks, None)
+        while (chunk := waiting.result()) is not None:
+            waiting = pool.submit(next, chunks, None)
+            yield chunk
+
+
+def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[Content]:
+    import laspy
+
+    path = tile.source.path
+    names = [name for name in wanted if name in FIELDS]
+    backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
+    begin, short = tile.begin, False
+    try:
+        fields = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z
+        if "class" in names:
+            fields |= laspy.DecompressionSelection.CLASSIFICATION
+        with laspy.open(path, laz_backend=backend, decompression_selection=fields) as file:
+            if begin:
+                file.seek(begin)
+            while begin < tile.end and not short:
+                expected = min(size, tile.end - begin)
+                record: Any = file.read_points(expected)
+                short = len(record) < expected
+                begin += len(record)
+                points = np.empty((len(record), 3))
+                for axis, name in enumerate("xyz"):
+                    points[:, axis] = record[name]
+                yield tile.source.content(points, {name: np.array(record[FIELDS[name]]) for name in names})
+    except GeneratorExit:
+        raise
+    except BaseException as error:
+        raise unreadable(path, "LAS or LAZ", error) from None
+    if short:
+        promised = tile.source.points
+        raise FormatError(f"{path} ends early: its header promises {promised:,} points, got {begin:,}; copy it again")
+
+
+def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Content]:
+    source, kind = tile.source, tile.source.rows
+    assert kind is not None
+    names = kind.names or ()
+    found = {attribute: names[place] for attribute, place in find_attributes(names, wanted).items()}
+    with source.path.open("rb") as file:
+        file.seek(source.begin + tile.begin * kind.itemsize)
+        for begin in range(tile.begin, tile.end, size):
+            expected = min(size, tile.end - begin)
+            rows = np.fromfile(file, kind, expected)
+            if len(rows) < expected:
+                raise FormatError(f"{source.path} ends early: it has become shorter while it was read")
+            points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
+            yield source.content(points, {attribute: rows[name] for attribute, name in found.items()})
+
+
+def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
+    from .readers import read_content
+
+    source = tile.source
+    content = read_content(source.path, wanted)
+    if content.metres != source.metres:
+        raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
+    yield content
+
+
+def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
+    """Read the lines that begin in a range of bytes; `counts` takes what count lines promise."""
+    source, layout = tile.source, tile.source.layout
+    assert layout is not None
+    columns = (*source.columns, *(column for _, column in layout.attributes))
+    with source.path.open("rb") as file:
+        file.seek(tile.begin)
+        if tile.begin > source.begin:
+            file.seek(tile.begin - 1)
+            file.readline()  # of a line that began before: another tile has it
+        while (at := file.tell()) < tile.end:
+            block = file.read(min(BLOCK, tile.end - at))
+            if not block.endswith(b"\n"):
+                block += file.readline()
+            if block.strip():
+                rows = text_rows(source.path, block, layout, columns, f", after byte {at:,}", counts)
+                more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
+                yield source.content(rows[:, :3], more)
+
+
+def text_rows(
+    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str = "", counts: list[int] | None = None
+) -> np.ndarray:
+    """Return the columns of the lines of a block of text, (K, columns) float64."""
+    if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
+        return rows
+    try:
+        if b".#" in block:
+            raise ValueError
+        lines = block.replace(b",", b".") if layout.comma else block
+        return np.loadtxt(
+            BytesIO(lines), comments="#", delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2
+        )
+    except ValueError:
+        return _line_by_line(path, block, layout, columns, at, [] if counts is None else counts)
+
+
+def _line_by_line(
+    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str, counts: list[int]
+) -> np.ndarray:
+    """Return the columns of lines that numpy cannot read: missing values, other comments, lines that count."""
+    rows = []
+    encoding = "utf-8" if layout.encoding.startswith("utf-8") else layout.encoding
+    for line in block.decode(encoding, errors="replace").splitlines():
+        fields = split_line(line, layout.separator)
+        if not fields:
+            continue
+        if layout.promised is not None and len(fields) == 1 and fields[0].isdecimal():
+            counts.append(int(fields[0]))
+            continue
+        try:
+            row = [_number(fields[column], layout) for column in columns]
+        except (ValueError, IndexError):
+            if not any(NUMBER.fullmatch(field) for field in fields):
+                continue
+            said = " ".join(fields)[:60]
+            raise FormatError(f"{path}{at}: {said!r} has no numbers x, y, z; mend or delete the line") from None
+        if any(fields[column] for column in columns[:3]):
+            rows.append(row)
+    return np.array(rows).reshape(-1, len(columns))
+
+
+def _number(field: str, layout: Layout) -> float:
+    """Return the value of a field, NaN where it is empty or says that it is missing."""
+    if (NUMBER_COMMA if layout.comma else NUMBER).fullmatch(field):
+        return float(re.sub("[dD]", "e", field.replace(",", ".")))
+    if not field or field.lower() in MISSING:
+        return math.nan
+    raise ValueError(field)

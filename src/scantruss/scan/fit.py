@@ -1,0 +1,84 @@
+"""Scans that are larger than memory: thinned while they are read, as finely as a grid of the desired length needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..machine import available_memory
+from .cloud import PointCloud
+from .kinds import read_head
+from .paths import Source as Names
+from .paths import files_of, name_of_files
+from .readers import PACKED, read_points
+from .streaming import Progress, thin_scan
+from .tiles import find_source
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+
+FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into memory
+BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
+PACKED_POINT = 8  # bytes; a point of a packed text has about as many
+FEWEST = 100_000  # points that are never too many
+SHARE = 0.5  # of the memory at hand that a scan may take
+
+
+def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None) -> float:
+    """Return the spacing to which a scan must be thinned while it is read, 0 where it need not be [scan unit].
+
+    All points count, as all of them are in memory when some are selected.
+
+    Parameters
+    ----------
+    names : str, Path or several of them
+        Files or patterns.
+    settings : Settings
+        Tell the desired length, and a spacing that somebody has chosen.
+    memory : float, optional
+        Bytes that the scan may take; half of what is available by default.
+    """
+    if settings.thin_spacing is not None:
+        return float(settings.thin_spacing)
+    points = sum(map(_guess, files_of(names)))
+    if points <= FEWEST:
+        return 0.0
+    memory = SHARE * available_memory() if memory is None else memory
+    return settings.length / FINENESS if points * BYTES > memory else 0.0
+
+
+def _guess(path: Path) -> int:
+    """Return about how many points a file holds; it is not unpacked for that."""
+    if path.suffix.lower() != PACKED:
+        return find_source(path).points
+    read_head(path)
+    return path.stat().st_size // PACKED_POINT
+
+
+def read_thinned(names: Names, settings: Settings, progress: Progress | None = None) -> tuple[PointCloud, int]:
+    """Return a scan thinned to `settings.thin_spacing` with its rim kept, and how many points were read.
+
+    The mean of a box has less noise than its points, but lies up to half a box inside at the rim; so the outermost points there stay.
+    """
+    thinned = thin_scan(
+        names,
+        float(settings.thin_spacing or 0.0),
+        rim=True,
+        unit=settings.unit,
+        selection=settings.selection,
+        progress=progress,
+    )
+    cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
+    return replace(cloud, dropped=thinned.dropped, notes=thinned.notes), thinned.read
+
+
+def read_to_fit(
+    names: Names, settings: Settings, *, memory: float | None = None, progress: Progress | None = None
+) -> tuple[PointCloud, Settings]:
+    """Return a scan as it is, or thinned where it is larger than memory, and the settings with which it comes out so again."""
+    spacing = spacing_to_fit(names, settings, memory)
+    if not spacing:
+        return read_points(names, unit=settings.unit, selection=settings.selection), settings
+    settings = settings.replace(thin_spacing=spacing)
+    return read_thinned(names, settings, progress)[0], settings

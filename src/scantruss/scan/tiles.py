@@ -1,0 +1,234 @@
+"""Tiles: files, or ranges of files, that can be read by themselves and by anybody.
+
+A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FormatError
+from .arrays import metres_of_npz
+from .content import NAMES, Content, find_attributes
+from .kinds import kind_of, read_head, unreadable, wrong_kind
+from .las_header import check_header
+from .layout import ANY, Layout, find_layout
+from .packed import unpacked
+from .pcd import read_pcd_header
+from .ply import row_type
+from .ply_header import read_header
+from .readers import PACKED, READERS
+from .systems import system_of
+from .units import metres_of
+
+TILE = 8_000_000  # points of a tile
+TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
+MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
+PLY = re.compile(rb"ply[ \t]*[\r\n]")
+LEAST_LINE = 6  # bytes: "1 2 3" and its end
+TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of points as its header describes it."""
+
+    path: Path
+    kind: str  #: las, rows (of fixed size), text, or whole
+    points: int  #: points that the header promises; a guess for text, or for a file that is read whole
+    begin: int = 0  #: byte at which points begin: rows, text
+    end: int = 0  #: byte behind the points: text
+    rows: np.dtype[np.void] | None = None  #: layout of a row
+    columns: tuple[int, ...] = ()  #: of the coordinates: text
+    layout: Layout | None = None  #: of a text
+    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
+    z_metres: float | None = None  #: ... of z
+    system: str = ""  #: reference system
+    degrees: bool = False  #: x and y are longitude and latitude
+
+    @property
+    def whole(self) -> bool:
+        """Whether it can only be read whole, with memory for all of its points."""
+        return self.kind == "whole"
+
+    def content(self, points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> Content:
+        """Return some of its points (K, 3) with attributes (K,) and what the header says of their units."""
+        return Content(points, dict(attributes), self.metres, self.z_metres, self.system, self.degrees)
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A part of a file: points, or bytes of a text."""
+
+    source: Source
+    begin: int
+    end: int
+
+    @property
+    def points(self) -> int:
+        """About how many points are in it."""
+        if self.source.kind != "text":
+            return self.end - self.begin
+        share = (self.end - self.begin) / max(self.source.end - self.source.begin, 1)
+        return max(round(share * self.source.points), 1)
+
+
+def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
+    """Return what the header of a file says of its points and of wanted attributes, without reading them.
+
+    Raises
+    ------
+    FormatError
+        The file is missing, empty, damaged, or of another kind than its suffix says.
+    """
+    path = Path(path)
+    head = read_head(path)
+    suffix = path.suffix.lower()
+    try:
+        if suffix in (".las", ".laz"):
+            return _las(path, head)
+        if suffix == ".ply" and (source := _ply(path)) is not None:
+            return source
+        if suffix == ".npy" and (source := _npy(path)) is not None:
+            return source
+        if suffix in TEXTS and (source := _text(path, head, wanted)) is not None:
+            return source
+        if suffix == PACKED and Path(path.stem).suffix.lower() in READERS:
+            with unpacked(path) as inner:
+                return replace(find_source(inner, wanted), path=path, kind="whole")
+        return Source(path, "whole", max(path.stat().st_size // TEXT_POINT, 1), metres=_metres(path))
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
+
+
+def _metres(path: Path) -> float | None:
+    """Return what a file that is read whole says of its unit."""
+    suffix, head = path.suffix.lower(), read_head(path)
+    if suffix == ".ply" and PLY.match(head):
+        return metres_of(read_header(path).unit)
+    if suffix == ".pcd" and kind_of(head) == "a PCD file":
+        return read_pcd_header(path).metres
+    if suffix == ".npz" and head.startswith(b"PK"):
+        return metres_of_npz(path)
+    return 1.0 if suffix == ".e57" else None
+
+
+def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
+    """Yield the tiles of some files, of about so many points each."""
+    for source in sources:
+        if source.whole:
+            yield Tile(source, 0, source.points)
+            continue
+        first, last, step = 0, source.points, points
+        if source.kind == "text":
+            first, last = source.begin, source.end
+            step = max(points * (last - first) // max(source.points, 1), 1)
+        for begin in range(first, last, step):
+            yield Tile(source, begin, min(begin + step, last))
+
+
+def _las(path: Path, head: bytes) -> Source:
+    if not head.startswith(b"LASF"):
+        raise wrong_kind(path, head, "a LAS or LAZ file")
+    import laspy
+
+    try:
+        check_header(path)
+        with laspy.open(path) as file:
+            header = file.header
+            system = system_of([*header.vlrs, *(header.evlrs or [])])
+            return Source(
+                path,
+                "las",
+                int(header.point_count),
+                metres=system.metres,
+                z_metres=system.z_metres,
+                system=system.name,
+                degrees=system.degrees,
+            )
+    except FormatError:
+        raise
+    except BaseException as error:
+        raise unreadable(path, "LAS or LAZ", error) from None
+
+
+def _ply(path: Path) -> Source | None:
+    """Return a binary PLY file whose first element is vertex, without lists."""
+    if not PLY.match(read_head(path)):
+        return None
+    header = read_header(path)
+    vertex = header.elements[0] if header.elements else None
+    if not header.order or vertex is None or vertex.name != "vertex" or vertex.has_lists:
+        return None
+    rows = row_type(vertex, header.order, [0] * len(vertex.properties))
+    if not {"x", "y", "z"} <= set(rows.names or ()):
+        return None
+    return replace(_rows(path, vertex.count, header.start, rows), metres=metres_of(header.unit))
+
+
+def _npy(path: Path) -> Source | None:
+    """Return an NPY file of rows; None for one by columns, of objects, or another shape."""
+    try:
+        with path.open("rb") as file:
+            version = np.lib.format.read_magic(file)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, by_columns, kind = read(file)
+            start = file.tell()
+    except Exception:  # a damaged header ends in many ways; who reads it whole says in which
+        return None
+    if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
+        needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(NAMES)).values())]
+        if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
+            return _rows(path, shape[0], start, kind)
+        return None
+    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or by_columns or kind.kind not in "fiu":
+        return None
+    names = ["x", "y", "z", *(f"other {c}" for c in range(3, shape[1]))]
+    return _rows(path, shape[0], start, np.dtype([(name, kind) for name in names]))
+
+
+def _rows(path: Path, count: int, start: int, rows: np.dtype[np.void]) -> Source:
+    held = max(path.stat().st_size - start, 0) // rows.itemsize
+    if held < count:
+        raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
+    return Source(path, "rows", count, start, rows=rows)
+
+
+def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
+    """Return a text file in which a line is a point wherever one enters it."""
+    layout = find_layout(path, wanted)
+    if layout.encoding == "utf-16" or layout.separator == ANY or b"\r" in head.replace(b"\r\n", b""):
+        return None
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        for _ in range(layout.skip):
+            file.readline()
+        start = file.tell()
+        sample = file.read(1 << 16)
+    lines = max(sample.count(b"\n"), 1)
+    points = layout.promised or max(round((size - start) * lines / max(len(sample), 1)), 1)
+    points = min(points, (size - start) // LEAST_LINE + 1)
+    columns = layout.columns
+    if len(columns) == 4:
+        columns = columns[1:] if _counts(path, layout, size) else columns[:3]
+    return Source(path, "text", points, start, size, columns=columns, layout=layout)
+
+
+def _counts(path: Path, layout: Layout, size: int) -> bool:
+    """Whether the first of four columns is a running number at the start, in the middle and at the end of a text."""
+    from .chunks import text_rows
+
+    for begin in {0, size // 2, max(size - (1 << 14), 0)}:
+        with path.open("rb") as file:
+            file.seek(begin)
+            lines = file.read(1 << 14).split(b"\n")
+        lines = lines[layout.skip if begin == 0 else 1 : -1 if begin + (1 << 14) < size else None]
+        rows = text_rows(path, b"\n".join(lines), layout, layout.columns)
+        if len(rows) > 1 and not (np.diff(rows[:, 0]) == 1).all():
+            return False
+    return True

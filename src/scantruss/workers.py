@@ -1,0 +1,237 @@
+"""Work that is the same wherever it is done: in this process, in processes of our own, or on a Dask cluster.
+
+``workers.run(work, jobs, shared)`` yields ``(number, work(job, shared))`` in the order in which they are done; `shared` goes to each
+worker once. A worker that dies is made good: what it had is done again.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, ExitStack
+from importlib.util import find_spec
+from types import TracebackType
+from typing import Any, TypeVar
+
+from . import __version__
+from .errors import InputError, ScanTrussError
+from .machine import processors
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+Work = Callable[[Job, Any], Result]
+
+AHEAD = 2  # jobs that wait for each worker: results must not pile up faster than they are taken
+DEATHS = 3  # times that a worker may die before anything else is done
+PATIENCE = 10.0  # for a scheduler to answer [s]
+NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[cluster]"'
+
+
+class Workers(AbstractContextManager["Workers"]):
+    """Nobody but this process; the others build on it."""
+
+    count = 1
+    alone = True  #: nobody else works, so that a job may use all processors
+    words = "in this process"
+
+    def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
+        """Yield the number of each job and its result, in the order in which they are done."""
+        for number, job in enumerate(jobs):
+            yield number, work(job, shared)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the workers."""
+
+
+def open_workers(count: int | None = None, scheduler: str = "") -> Workers:
+    """Return workers, to be used in a ``with`` statement.
+
+    Parameters
+    ----------
+    count : int, optional
+        How many on this machine; the number of processors by default.
+    scheduler : str
+        Address of the scheduler of a Dask cluster, as ``tcp://10.0.0.5:8786``, to work there.
+
+    Raises
+    ------
+    InputError
+        No such number, no such cluster, or dask is not installed where a cluster is named.
+    """
+    if scheduler:
+        if not has_dask():
+            raise InputError(f"--scheduler {NEEDS_DASK}")
+        return Cluster(0, scheduler)
+    count = processors() if count is None else count
+    if count < 1:
+        raise InputError(f"workers must be 1 or more, got {count}")
+    if count == 1:
+        return Workers()
+    return Cluster(count) if has_dask() else Processes(count)
+
+
+def has_dask() -> bool:
+    """Whether a Dask cluster can be used."""
+    return find_spec("distributed") is not None
+
+
+class Processes(Workers):
+    """Processes of our own on this machine, for want of Dask."""
+
+    alone = False
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.words = f"on {count} processes of this machine"
+
+    def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
+        """Yield the number of each job and its result, in the order in which they are done."""
+        coming = enumerate(jobs)
+        waiting: dict[int, Job] = {}
+        deaths = 0
+        while True:
+            with ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _keep_shared, (shared,)) as pool:
+                try:
+                    for number, result in _in_pool(pool, work, coming, waiting, AHEAD * self.count):
+                        deaths = 0
+                        yield number, result
+                    return
+                except BrokenProcessPool:
+                    deaths += 1
+                    if deaths > DEATHS:
+                        raise _keeps_dying() from None
+                except BaseException:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    raise
+
+
+def _in_pool(
+    pool: ProcessPoolExecutor,
+    work: Work[Job, Result],
+    coming: Iterator[tuple[int, Job]],
+    waiting: dict[int, Job],
+    ahead: int,
+) -> Iterator[tuple[int, Result]]:
+    """Run jobs in a pool; `waiting` holds those that are begun and not done, also when the pool breaks."""
+    running: dict[Future[Result], int] = {}
+    for number, job in waiting.items():
+        running[pool.submit(_with_shared, work, job)] = number
+    while True:
+        while len(running) < ahead and (new := next(coming, None)) is not None:
+            waiting[new[0]] = new[1]
+            running[pool.submit(_with_shared, work, new[1])] = new[0]
+        if not running:
+            return
+        done, _ = wait(running, return_when=FIRST_COMPLETED)
+        for future in done:
+            result = future.result()
+            number = running.pop(future)
+            del waiting[number]
+            yield number, result
+
+
+_SHARED: list[Any] = [None]  # of this process
+
+
+def _keep_shared(shared: Any) -> None:
+    _SHARED[0] = shared
+
+
+def _with_shared(work: Callable[[Any, Any], Any], job: Any) -> Any:
+    return work(job, _SHARED[0])
+
+
+def _keeps_dying() -> ScanTrussError:
+    return ScanTrussError("the workers die again and again, perhaps for want of memory; use fewer of them")
+
+
+class Cluster(Workers):
+    """A Dask cluster: the user's, or one on this machine for as long as the work takes."""
+
+    alone = False
+
+    def __init__(self, count: int, scheduler: str = "") -> None:
+        from distributed import Client, LocalCluster
+
+        self._ends = ExitStack()
+        try:
+            if not scheduler:
+                cluster = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    dashboard_address=":0",
+                    silence_logs=logging.CRITICAL,
+                )
+                self._ends.enter_context(cluster)
+            self._client = self._ends.enter_context(Client(scheduler or cluster, timeout=PATIENCE))
+            versions = self._client.run(_version)
+        except (OSError, ValueError) as error:
+            self._ends.close()
+            raise InputError(f"no scheduler answers at {scheduler} ({str(error)[:80]}); check the address") from None
+        except ModuleNotFoundError:
+            versions = {scheduler: ""}
+        other = sorted({version or "none" for version in versions.values() if version != __version__})
+        if other or not versions:
+            self._ends.close()
+            raise InputError(
+                f"the workers at {scheduler} have scantruss {other[0]}, this is {__version__}; install the same there"
+                if other
+                else f"the cluster at {scheduler} has no workers; start some"
+            )
+        self.count = len(versions)
+        self.words = f"on {self.count} workers " + (f"at {scheduler}" if scheduler else "of this machine (dask)")
+
+    def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
+        """Yield the number of each job and its result, in the order in which they are done."""
+        from concurrent.futures import CancelledError
+
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        coming = enumerate(jobs)
+        done = as_completed()
+        running: dict[str, tuple[int, Job]] = {}
+        common = self._share(shared)
+        deaths = 0
+
+        def submit(number: int, job: Job) -> None:
+            future = self._client.submit(work, job, common, pure=False)
+            running[future.key] = number, job
+            done.add(future)
+
+        while True:
+            while len(running) < AHEAD * self.count and (new := next(coming, None)) is not None:
+                submit(*new)
+            if not running:
+                return
+            future = next(done)
+            number, job = running.pop(future.key)
+            try:
+                result = future.result()
+            except (CancelledError, KilledWorker):  # what was shared may have died with its workers
+                deaths += 1
+                if deaths > DEATHS:
+                    raise _keeps_dying() from None
+                common = self._share(shared)
+                submit(number, job)
+                continue
+            yield number, result
+
+    def _share(self, shared: Any) -> Any:
+        """Send to all workers what all jobs need."""
+        return None if shared is None else self._client.scatter(shared, broadcast=True, hash=False)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Let go of the cluster; end it where it is our own."""
+        self._ends.close()
+
+
+def _version() -> str:
+    return __version__

@@ -1,0 +1,41 @@
+"""Jobs for workers; what imports little, so that processes start soon."""
+
+import os
+import time
+from pathlib import Path
+
+from scantruss.errors import FormatError
+
+
+def add(job, shared):
+    return job + (shared or 0)
+
+
+def refuse(job, shared):
+    raise FormatError(f"job {job} is refused")
+
+
+def die_once(job, folder):
+    """Die in the first worker that is asked for job 2."""
+    marker = Path(folder) / "died"
+    if job == 2 and not marker.exists():
+        marker.touch()
+        os._exit(1)
+    return job, os.getpid()
+
+
+def leave_once(job, folder):
+    """End the first worker of a cluster within this process that is asked for job 2."""
+    from distributed import get_worker
+
+    marker = Path(folder) / "left"
+    if job == 2 and not marker.exists():
+        marker.touch()
+        worker = get_worker()
+        worker.loop.add_callback(worker.close, timeout=1, executor_wait=False)
+        time.sleep(0.5)
+    return job
+
+
+def die_always(job, shared):
+    os._exit(1)

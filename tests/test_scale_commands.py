@@ -1,0 +1,254 @@
+"""scantruss thin and sweep, and grids of scans that are larger than the memory they may take."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss import scale_commands
+from scantruss.cli import main
+from scantruss.machine import available_memory
+from scantruss.options import size_of_memory
+from scantruss.scan import fit
+from scantruss.scan.thin import thin_points
+
+HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
+
+
+def plate(count=60_000, seed=3, noise=0.02):
+    """Points on an arched plate of 40 x 30 with a round hole."""
+    chance = np.random.default_rng(seed)
+    x, y = chance.uniform(0, 40, count), chance.uniform(0, 30, count)
+    keep = np.hypot(x - HOLE[0], y - HOLE[1]) > HOLE[2]
+    x, y = x[keep], y[keep]
+    return np.stack([x, y, 0.01 * x * (40 - x) + chance.normal(0, noise, len(x))], axis=1)
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """An empty folder with a scan in it, which is where the command runs."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
+    np.save("scan.npy", plate())
+    return tmp_path
+
+
+def refused(capsys, *words):
+    """Run a command that must be refused; return the one line that it says."""
+    names = sorted(entry.name for entry in os.scandir("."))
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("scantruss: ") and said.err.count("\n") == 1
+    assert sorted(entry.name for entry in os.scandir(".")) == names, "something was written"
+    return said.err
+
+
+# ---- thin ----------------------------------------------------------------------------------------------------------
+
+
+def test_thin_writes_one_point_a_box(place, capsys):
+    np.save("more.npy", plate(seed=4) + (100, 0, 0))
+    both = np.concatenate([plate(), plate(seed=4) + (100, 0, 0)])
+    assert main(["thin", "scan.npy", "more.npy", "-o", "thin.npy", "--spacing", "0.5"]) == 0
+    wanted = thin_points(both, 0.5)
+    assert np.array_equal(np.load("thin.npy"), wanted)
+    said = capsys.readouterr().out
+    assert f"{len(both):,} points thinned to {len(wanted):,}; wrote thin.npy" in said
+    assert main(["thin", "*.npy", "-o", "near.ply", "--spacing", "2", "--keep", "nearest", "--rim"]) == 0
+    assert "of them along the rim" in capsys.readouterr().out
+    near = st.read_points("near.ply")
+    assert len(near.points) > len(thin_points(np.concatenate([both, wanted]), 2.0))
+    assert set(map(tuple, np.round(near.points + near.origin, 9).tolist())) <= set(
+        map(tuple, np.round(np.concatenate([both, wanted]), 9).tolist())
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("scan.npy", "-o", "thin.ply", "--spacing", "0"), "spacing must be a positive number"),
+        (("scan.npy", "-o", "thin.ply"), "missing --spacing"),
+        (("scan.npy", "-o", "thin.docx", "--spacing", "1"), "no format for a cloud"),
+        (("scan.npy", "-o", "scan.npy", "--spacing", "1"), "would overwrite the scan"),
+        (("scan.npy", "-o", "thin.ply", "--spacing", "1", "--keep", "middle"), "keep must be one of mean nearest"),
+        (("scan.npy", "-o", "thin.ply", "--spacing", "1", "--workers", "0"), "workers must be 1 or more"),
+        (("other.npy", "-o", "thin.ply", "--spacing", "1"), "does not exist"),
+        (("other-*.npy", "-o", "thin.ply", "--spacing", "1"), "no file fits the pattern"),
+        (("scan.npy", "-o", "thin.ply", "--spacing", "1e-16"), "too small for points so far from zero"),
+    ],
+)
+def test_thin_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
+    assert line in refused(capsys, "thin", *words)
+
+
+CODE = """
+import resource, sys
+import numpy as np
+from scantruss.scan.streaming import thin_scan
+peaks = []
+for name in sys.argv[1:]:
+    found = thin_scan([name], 1.0, rim=True)
+    peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(found.read, *peaks)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is told in other units elsewhere")
+def test_memory_follows_the_result_and_not_the_scan(tmp_path):
+    for name, millions in (("small.npy", 2), ("large.npy", 8)):
+        rows = np.tile(np.random.default_rng(1).uniform(0, 30, (500_000, 3)).astype("f4"), (2 * millions, 1))
+        np.save(tmp_path / name, rows)
+    names = [str(tmp_path / "small.npy"), str(tmp_path / "large.npy")]
+    done = subprocess.run([sys.executable, "-c", CODE, *names], capture_output=True, text=True, check=True)
+    read, small, large = map(int, done.stdout.split())
+    assert read == 8_000_000
+    assert (large - small) * 1024 < 6_000_000 * 24 / 6  # less than a sixth of what the points more would take
+
+
+# ---- larger than memory --------------------------------------------------------------------------------------------
+
+
+def rim_of(grid):
+    """Mean distance of the rim nodes outside (positive) of the true rim of the plate."""
+    nodes = (grid.nodes + grid.origin)[np.concatenate(grid.boundary_loops)]
+    x, y = nodes[:, 0], nodes[:, 1]
+    inside = np.minimum.reduce([np.hypot(x - HOLE[0], y - HOLE[1]) - HOLE[2], x, y, 40 - x, 30 - y])
+    return -float(inside.mean())
+
+
+def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path):
+    """The cloud is so dense that a box holds 14 points; means alone would lose 0.04 of rim."""
+    points = plate(600_000)
+    np.save(tmp_path / "scan.npy", points)
+    settings = st.Settings(length=4.0, effort="quick")
+    cloud, thinned = fit.read_to_fit([tmp_path / "scan.npy"], settings, memory=1e6)
+    assert thinned.thin_spacing == 0.2 and len(cloud.points) < len(points) / 10
+    whole, found = st.grid_from_points(points, settings), st.grid_from_points(cloud.points + cloud.origin, thinned)
+    assert found.topology == whole.topology
+    both = zip(found.boundary_loops, whole.boundary_loops, strict=True)
+    assert all(abs(len(one) - len(other)) <= max(1, len(other) // 10) for one, other in both)
+    assert abs(rim_of(found)) < min(0.01, abs(rim_of(whole)) + 0.005)  # of the true rim
+    nodes = found.nodes + found.origin
+    assert np.abs(nodes[:, 2] - 0.01 * nodes[:, 0] * (40 - nodes[:, 0])).mean() < 0.01
+    assert abs(found.quality.shape_mean - whole.quality.shape_mean) < 0.005
+
+
+def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, monkeypatch):
+    monkeypatch.setattr(fit, "FEWEST", 1000)
+    words = ["grid", "scan.npy", "grid.obj", "--length", "4", "--effort", "quick"]
+    assert main([*words, "--memory", "1MB"]) == 0
+    assert "thinned while it was read, from 5" in capsys.readouterr().out
+    first = (place / "grid.obj").read_bytes()
+    assert json.loads((place / "grid.settings.json").read_text())["thin_spacing"] == 0.2
+    assert main(["grid", "scan.npy", "again.obj", "--settings", "grid.settings.json"]) == 0  # on a larger machine
+    assert "thinned" in capsys.readouterr().out
+    assert (place / "again.obj").read_bytes() == first
+    assert main([*words, "--memory", "1MB", "--thin-spacing", "0"]) == 0
+    assert "thinned" not in capsys.readouterr().out
+
+
+def test_what_fits_into_memory_is_taken_as_it_is(place):
+    settings = st.Settings(length=4.0)
+    assert fit.spacing_to_fit(["scan.npy"], settings) == 0.0
+    assert fit.spacing_to_fit(["scan.npy"], settings, memory=1.0) == 0.0  # so few are never too many
+    cloud, same = fit.read_to_fit(["scan.npy"], settings)
+    assert same is settings and np.array_equal(cloud.points, st.read_points("scan.npy").points)
+
+
+def test_the_machine_tells_its_memory():
+    assert 1e7 < available_memory() < 1e15
+
+
+@pytest.mark.parametrize(
+    ("text", "size"), [("4GB", 4e9), ("500 MB", 5e8), ("1.5g", 1.5e9), ("123456", 123456.0), ("2KiB", 2000.0)]
+)
+def test_sizes_of_memory_are_understood(text, size):
+    assert size_of_memory(text) == size
+
+
+@pytest.mark.parametrize("text", ["much", "-4GB", "0", "4 parsecs", ""])
+def test_other_sizes_are_refused(text, place, capsys):
+    assert "such as 4GB" in refused(capsys, "grid", "scan.npy", "grid.obj", "--length", "4", f"--memory={text}")
+
+
+# ---- sweep ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_sweep_tells_of_every_combination(place, capsys):
+    words = ["sweep", "scan.npy", "--length", "5,7,0.1", "--effort", "quick", "--prefer", "balance,shapes"]
+    assert main([*words, "-o", "out", "--workers", "1"]) == 0
+    said = capsys.readouterr().out
+    with (place / "out" / "table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["length"], row["prefer"]) for row in rows] == [
+        (length, prefer) for length in ("5", "7", "0.1") for prefer in ("balance", "shapes")
+    ]
+    assert [row["certificate"] for row in rows[:4]] == ["passed"] * 4
+    assert all("too small for points" in row["certificate"] and not row["nodes"] for row in rows[4:])
+    names = {entry.name for entry in os.scandir("out")}
+    grids = {f"length-{length}_prefer-{prefer}" for length in (5, 7) for prefer in ("balance", "shapes")}
+    assert names == {f"{name}.{end}" for name in grids for end in ("json", "png")} | {
+        "table.csv", "table.md", "index.html", "overview.png",
+    }  # fmt: skip
+    grid = st.read_grid("out/length-7_prefer-shapes.json")
+    assert (grid.settings.length, grid.settings.prefer, grid.settings.effort) == (7.0, "shapes", "quick")
+    assert rows[3]["nodes"] == str(len(grid.nodes)) and rows[3]["length std/mean"] == f"{grid.quality.length_cv:.4f}"
+    page = (place / "out" / "index.html").read_text()
+    assert page.count("<img") == 4 and page.count("<tr>") == 7
+    assert (place / "out" / "table.md").read_text().count("\n") == 8
+    assert "wrote 4 grids" in said and "passed" in said
+
+
+def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
+    import warnings
+
+    distributed = pytest.importorskip("distributed")
+    words = ["sweep", "scan.npy", "--length", "6,8", "--effort", "quick"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cluster = distributed.LocalCluster(2, processes=False, threads_per_worker=1, dashboard_address=":0")
+    try:
+        assert main([*words, "-o", "there", "--scheduler", cluster.scheduler_address]) == 0
+    finally:
+        cluster.close()
+    assert main([*words, "-o", "here", "--workers", "1"]) == 0
+    names = sorted(entry.name for entry in os.scandir("here"))
+    assert names == sorted(entry.name for entry in os.scandir("there"))
+    for name in names:
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("--length", "5,x"), "needs a number"),
+        (("--length", ","), "several with commas"),
+        (("--length", "5,5"), "named twice"),
+        (("--length", "5", "--effort", "quick,hard"), "effort must be one of"),
+        (("--effort", "quick"), "--length is missing"),
+        (("--length", "0.1,0.2"), "no grid came out of 2 trials; the first: length 0.1 is too small"),
+    ],
+)
+def test_a_sweep_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
+    assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
+
+
+def test_a_sweep_into_a_file_is_refused(place, capsys):
+    assert "is a file" in refused(capsys, "sweep", "scan.npy", "--length", "5", "-o", "scan.npy")
+
+
+def test_several_workers_are_announced(capsys, monkeypatch):
+    from argparse import Namespace
+
+    from scantruss import workers as crew
+    from scantruss.report.terminal import Bars
+
+    monkeypatch.setattr(crew, "has_dask", lambda: False)
+    with Bars() as bars:
+        scale_commands._workers(Namespace(workers=3, scheduler=""), bars, None)
+    assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out

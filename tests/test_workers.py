@@ -1,0 +1,137 @@
+"""The same work here, in processes and on a cluster; a worker that dies is made good."""
+
+import builtins
+import os
+import warnings
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from jobs import add, die_always, die_once, leave_once, refuse
+
+from scantruss import workers as module
+from scantruss.errors import FormatError, InputError, ScanTrussError
+from scantruss.machine import processors
+from scantruss.scan import streaming
+from scantruss.workers import Cluster, Processes, Workers, open_workers
+
+
+@contextmanager
+def small_cluster():
+    """Give the address of a cluster within this process."""
+    distributed = pytest.importorskip("distributed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cluster = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
+        )
+    try:
+        yield cluster.scheduler_address
+    finally:
+        cluster.close()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A cluster for all tests that leave it whole."""
+    with small_cluster() as found:
+        yield found
+
+
+def test_work_is_done_here_in_turn():
+    assert list(Workers().run(add, iter([5, 6]), 10)) == [(0, 15), (1, 16)]
+
+
+def test_processes_do_all_jobs_and_make_good_one_that_died(tmp_path):
+    found = dict(Processes(2).run(die_once, range(6), str(tmp_path)))
+    assert (tmp_path / "died").exists()
+    assert [found[number][0] for number in range(6)] == list(range(6))
+    assert os.getpid() not in {process for _, process in found.values()}
+
+
+def test_processes_that_die_again_and_again_are_given_up(monkeypatch):
+    monkeypatch.setattr(module, "DEATHS", 0)
+    with pytest.raises(ScanTrussError, match="die again and again"):
+        list(Processes(1).run(die_always, range(2)))
+
+
+def test_what_a_job_refuses_comes_out():
+    with pytest.raises(FormatError, match="job 1 is refused"):
+        list(Processes(1).run(refuse, [1]))
+
+
+def test_a_cluster_does_all_jobs_and_says_what_is_refused(address):
+    with open_workers(scheduler=address) as crew:
+        assert crew.count == 2 and address in crew.words
+        assert dict(crew.run(add, range(9), 10)) == {number: number + 10 for number in range(9)}
+        assert dict(crew.run(add, range(2))) == {0: 0, 1: 1}
+        with pytest.raises(FormatError, match="job 3 is refused"):
+            list(crew.run(refuse, [3]))
+
+
+def test_a_cluster_of_another_version_is_refused(address, monkeypatch):
+    monkeypatch.setattr(module, "_version", lambda: "0.0.7")
+    with pytest.raises(InputError, match=r"have scantruss 0\.0\.7, this is"):
+        open_workers(scheduler=address)
+
+
+@pytest.mark.parametrize("scheduler", ["tcp://127.0.0.1:1", "nonsense://"])
+def test_a_scheduler_that_does_not_answer_is_refused(scheduler, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "PATIENCE", 0.3)
+    with pytest.raises(InputError, match="no scheduler answers"):
+        Cluster(0, scheduler)
+
+
+def test_without_dask_processes_of_our_own_serve(monkeypatch):
+    monkeypatch.setattr(module, "has_dask", lambda: False)
+    found = open_workers(3)
+    assert isinstance(found, Processes) and found.count == 3
+    assert open_workers().count == processors()
+    with pytest.raises(InputError, match=r"needs dask.*scantruss\[cluster\]"):
+        open_workers(scheduler="tcp://127.0.0.1:8786")
+
+
+def test_one_worker_is_this_process_and_none_is_refused():
+    assert open_workers(1).alone
+    with pytest.raises(InputError, match="workers must be 1 or more"):
+        open_workers(0)
+
+
+@pytest.mark.parametrize("keep", ["mean", "nearest"])
+def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(keep, address, tmp_path, monkeypatch):
+    monkeypatch.setattr(streaming, "SMALLEST", 70)
+    points = np.random.default_rng(4).uniform(0, 9, (1000, 3))
+    np.save(tmp_path / "one.npy", points[:600])
+    np.savetxt(tmp_path / "two.xyz", points[600:])
+    names = [tmp_path / "one.npy", tmp_path / "two.xyz"]
+    wanted = streaming.thin_scan(names, 1.0, keep=keep, rim=True)
+    shares = []
+    with open_workers(scheduler=address) as crew:
+        found = streaming.thin_scan(
+            names, 1.0, keep=keep, rim=True, workers=crew, progress=lambda stage, share: shares.append(share)
+        )
+        assert found.points.tobytes() == wanted.points.tobytes()
+        assert (found.read, found.dropped, found.rim) == (1000, 0, wanted.rim)
+        with pytest.raises(FormatError, match="does not exist"):
+            streaming.thin_scan([tmp_path / "three.xyz"], 1.0, workers=crew)
+    assert len(shares) > 8 and shares[-1] == 1.0
+
+
+def test_a_worker_of_a_cluster_that_dies_is_made_good(tmp_path):
+    with small_cluster() as address, open_workers(scheduler=address) as crew:
+        found = dict(crew.run(leave_once, range(5), str(tmp_path)))
+    assert (tmp_path / "left").exists()
+    assert found == {number: number for number in range(5)}
+
+
+def test_a_cluster_is_not_asked_for_without_its_packages(monkeypatch):
+    real = builtins.__import__
+
+    def no_dask(name, *rest):
+        if name.split(".")[0] in ("dask", "distributed"):
+            raise AssertionError("dask is imported for work in this process")
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", no_dask)
+    assert list(open_workers(1).run(add, [1], 1)) == [(0, 2)]
