@@ -12,7 +12,7 @@ import pytest
 from shapes import make
 
 from scantruss import ahead
-from scantruss.commands import note_compiling
+from scantruss.commands.gridding import note_compiling
 from scantruss.kernels import compile as compiling
 
 needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")

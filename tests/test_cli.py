@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import scantruss as st
-from scantruss import commands, pipeline
+from scantruss import pipeline
 from scantruss.cli import main
+from scantruss.commands import gridding
 from scantruss.errors import FrontError
 from scantruss.grid.grid import Grid
 from scantruss.options import option_of
@@ -56,8 +57,8 @@ def place(tmp_path, monkeypatch):
 @pytest.fixture
 def ready(place, monkeypatch):
     """The same, with a finished grid in place of the long work."""
-    monkeypatch.setattr(commands, "read_scan", lambda *_: PointCloud.from_array(plate()))
-    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: hexagon())
+    monkeypatch.setattr(gridding, "read_scan", lambda *_: PointCloud.from_array(plate()))
+    monkeypatch.setattr(gridding, "make_grid", lambda *_, **__: hexagon())
     return place
 
 
@@ -136,7 +137,7 @@ def test_a_length_that_is_no_positive_number_is_refused(place, capsys, command, 
 )
 def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(place, capsys, monkeypatch, out, line):
     (place / "folder.obj").mkdir()
-    monkeypatch.setattr(commands, "read_scan", lambda *_: pytest.fail("the scan was read"))
+    monkeypatch.setattr(gridding, "read_scan", lambda *_: pytest.fail("the scan was read"))
     assert line in refused(capsys, "grid", "scan.xyz", "good.obj", out, "--length", LENGTH)
 
 
@@ -436,7 +437,7 @@ def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
 
 def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(commands, "make_grid", lambda *_, **__: 1 // 0)
+    monkeypatch.setattr(gridding, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 

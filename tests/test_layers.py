@@ -25,7 +25,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("export",),
     ("sweep",),
     ("report", "demo"),
-    ("options", "studio", "commands", "commands_clean", "scale_commands", "splice_command"),
+    ("options", "studio", "commands"),
     ("cli", "__main__"),
 )
 MODULES = sorted(path.relative_to(SOURCE).with_suffix("").parts for path in SOURCE.rglob("*.py"))

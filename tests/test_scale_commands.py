@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import scantruss as st
-from scantruss import scale_commands
 from scantruss.cli import main
+from scantruss.commands import scaling
 from scantruss.machine import available_memory
 from scantruss.options import size_of_memory
 from scantruss.scan import fit
@@ -250,5 +250,5 @@ def test_several_workers_are_announced(capsys, monkeypatch):
 
     monkeypatch.setattr(crew, "has_dask", lambda: False)
     with Bars() as bars:
-        scale_commands._workers(Namespace(workers=3, scheduler=""), bars, None)
+        scaling._workers(Namespace(workers=3, scheduler=""), bars, None)
     assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out

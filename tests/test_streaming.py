@@ -16,8 +16,8 @@ from test_scan_units import FOOT, GEOGRAPHIC, HEIGHT, METRE, SURVEY, plane, wkt,
 from test_selection import CASES, CLASS, COUNT, FILES, HOLE, NUMBER, RING
 
 from scantruss.cli import main
+from scantruss.commands.scaling import sweep_parser, trials_of_words
 from scantruss.errors import FormatError, InputError, ScanTrussError
-from scantruss.scale_commands import sweep_parser, trials_of_words
 from scantruss.scan import chunks, fit, streaming
 from scantruss.scan.chunks import text_rows
 from scantruss.scan.fit import read_thinned

@@ -1,4 +1,4 @@
-"""The commands: what each one takes, does and says.
+"""``scantruss info``, ``grid``, ``print`` and ``demo``.
 
 Outputs and settings are checked before anything is read; everything heavy is imported inside the functions.
 """
@@ -6,21 +6,19 @@ Outputs and settings are checked before anything is read; everything heavy is im
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import CertificateError, FormatError, InputError
-from .scale_commands import sweep, sweep_parser, thin, thin_parser
-from .settings import CURVATURE
-from .splice_command import splice, splice_parser
+from ..errors import CertificateError, FormatError, InputError
+from ..settings import CURVATURE
 
 if TYPE_CHECKING:
-    from .grid.grid import Grid
-    from .options import Parser
-    from .report.terminal import Bars
-    from .scan.cloud import PointCloud
-    from .settings import Settings
+    from ..grid.grid import Grid
+    from ..options import Parser
+    from ..report.terminal import Bars
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
 
 
 SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
@@ -28,7 +26,7 @@ SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files t
 
 def info_parser() -> Parser:
     """Options of ``scantruss info``."""
-    from .options import READING, Parser, add_settings
+    from ..options import READING, Parser, add_settings
 
     parser = Parser(
         "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
@@ -40,10 +38,10 @@ def info_parser() -> Parser:
 
 def info(values: Namespace) -> None:
     """Print what a scan holds."""
-    from .options import settings_of
-    from .pipeline import check_length, suggest_length
-    from .report.figures import cloud_lines, loop_rows
-    from .report.terminal import Bars, print_lines, print_table
+    from ..options import settings_of
+    from ..pipeline import check_length, suggest_length
+    from ..report.figures import cloud_lines, loop_rows
+    from ..report.terminal import Bars, print_lines, print_table
 
     given = "length" in values
     settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
@@ -53,7 +51,7 @@ def info(values: Namespace) -> None:
         settings = settings if given else settings.replace(length=suggest_length(cloud))
         check_length(cloud, settings)
         note_compiling(bars, settings.method, "boundary")
-        from .boundary import find_boundary
+        from ..boundary import find_boundary
 
         boundary = find_boundary(cloud, settings, progress=bars)
         note_strays(bars, cloud, settings)
@@ -68,7 +66,7 @@ def info(values: Namespace) -> None:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_settings, size_of_memory
+    from ..options import Parser, add_settings, size_of_memory
 
     parser = Parser(
         "grid",
@@ -100,10 +98,10 @@ def grid_parser() -> Parser:
 
 def grid(values: Namespace) -> None:
     """Make a grid and save it with its settings."""
-    from .options import settings_of
-    from .report.figures import report_of
-    from .report.saving import SaveTogether
-    from .report.terminal import Bars
+    from ..options import settings_of
+    from ..report.figures import report_of
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars
 
     settings = settings_of(values)
     outs = [Path(out) for out in values.outs]
@@ -114,7 +112,7 @@ def grid(values: Namespace) -> None:
         settings = thin_to_fit(values.scan, settings, values.memory)
         cloud = read_scan(values.scan, settings, bars)
         result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
-    from .export.formats import write
+    from ..export.formats import write
 
     with SaveTogether() as save:
         for out in outs:
@@ -129,9 +127,9 @@ def grid(values: Namespace) -> None:
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
-    from .export.files import check_place
-    from .export.formats import check_output
-    from .scan.paths import files_of
+    from ..export.files import check_place
+    from ..export.formats import check_output
+    from ..scan.paths import files_of
 
     inputs = [(str(file), "scan") for file in files_of(values.scan)]
     inputs += [(values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
@@ -158,7 +156,7 @@ def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
 
 def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     """Read a scan, and say so where points were left out."""
-    from .scan.readers import read_points
+    from ..scan.readers import read_points
 
     bars("read", 0.0)
     if settings.thin_spacing:
@@ -175,7 +173,7 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
     """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
-    from .scan.fit import spacing_to_fit
+    from ..scan.fit import spacing_to_fit
 
     spacing = spacing_to_fit(path, settings, memory)
     return settings.replace(thin_spacing=spacing) if spacing else settings
@@ -183,7 +181,7 @@ def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings
 
 def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     """Read a scan that is thinned while it is read, and say so."""
-    from .scan.fit import read_thinned
+    from ..scan.fit import read_thinned
 
     cloud, read = read_thinned(path, settings, bars)
     unit = f" {cloud.unit}" if cloud.unit else ""
@@ -196,8 +194,8 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False) -> Grid:
     """Run the chain, and say so where kernels must be compiled."""
-    from .ahead import CompileAhead
-    from .pipeline import check_length, grid_from_cloud
+    from ..ahead import CompileAhead
+    from ..pipeline import check_length, grid_from_cloud
 
     check_length(cloud, settings)
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
@@ -213,7 +211,7 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed:
 
 def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """Say so where stray points were left out."""
-    from .scan.sites import prepare_sites
+    from ..scan.sites import prepare_sites
 
     sites = prepare_sites(cloud, settings)
     if sites.repeated:
@@ -224,30 +222,16 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
 
 def note_compiling(bars: Bars, method: str, *stages: str) -> None:
     """Say so where the kernels of some stages must be compiled, which takes long."""
-    from .ahead import are_compiled, can_be_stored
+    from ..ahead import are_compiled, can_be_stored
 
     if not are_compiled(method, *stages):
         bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
 
 
-def clean_parser() -> Parser:
-    """Options of ``scantruss clean``."""
-    from .commands_clean import clean_parser
-
-    return clean_parser()
-
-
-def clean(values: Namespace) -> None:
-    """Clean a scan and save it."""
-    from .commands_clean import clean
-
-    clean(values)
-
-
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
     """Print the figures of Table 2, the worst places and what was written."""
-    from .report.figures import certificate_rows, grid_lines, quality_rows
-    from .report.terminal import print_lines, print_table
+    from ..report.figures import certificate_rows, grid_lines, quality_rows
+    from ..report.terminal import print_lines, print_table
 
     print_table(("", "before", "after optimization"), quality_rows(result))
     if result.certificate is not None:
@@ -257,7 +241,7 @@ def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
 
 def print_parser() -> Parser:
     """Options of ``scantruss print``."""
-    from .options import Parser, number
+    from ..options import Parser, number
 
     usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
     parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
@@ -271,17 +255,17 @@ def print_parser() -> Parser:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
-    from .export.files import check_place
-    from .report.saving import SaveTogether
-    from .report.terminal import print_lines
+    from ..export.files import check_place
+    from ..report.saving import SaveTogether
+    from ..report.terminal import print_lines
 
     out = check_place(values.out, (".3mf", ".stl"))
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
     if out.exists() and out.samefile(values.grid):
         raise FormatError(f"the model {out} would overwrite the grid; name another file")
-    from .export.json_file import read_grid
-    from .export.solid import print_model
+    from ..export.json_file import read_grid
+    from ..export.solid import print_model
 
     result = read_grid(values.grid)
     with SaveTogether() as save:
@@ -299,7 +283,7 @@ def print_solid(values: Namespace) -> None:
 
 def demo_parser() -> Parser:
     """Options of ``scantruss demo``."""
-    from .options import Parser
+    from ..options import Parser
 
     parser = Parser(
         "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
@@ -312,8 +296,8 @@ def demo_parser() -> Parser:
 
 def demo(values: Namespace) -> None:
     """Do the main job on the bundled scan."""
-    from .demo import SCAN, demo_settings, save_demo
-    from .report.terminal import Bars
+    from ..demo import SCAN, demo_settings, save_demo
+    from ..report.terminal import Bars
 
     folder = Path(values.folder)
     if folder.exists() and not folder.is_dir():
@@ -324,15 +308,3 @@ def demo(values: Namespace) -> None:
         bars("picture, solid", 0.0)
         written = save_demo(folder, result, cloud)
     show_grid(result, len(cloud.points), written)
-
-
-COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
-    "info": (info_parser, info),
-    "clean": (clean_parser, clean),
-    "grid": (grid_parser, grid),
-    "thin": (thin_parser, thin),
-    "sweep": (sweep_parser, sweep),
-    "print": (print_parser, print_solid),
-    "splice": (splice_parser, splice),
-    "demo": (demo_parser, demo),
-}

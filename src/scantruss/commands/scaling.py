@@ -8,21 +8,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import FormatError, InputError
+from ..errors import FormatError, InputError
 
 if TYPE_CHECKING:
-    from .options import Parser
-    from .report.terminal import Bars
-    from .settings import Settings
-    from .sweep import Trial
-    from .workers import Workers
+    from ..options import Parser
+    from ..report.terminal import Bars
+    from ..settings import Settings
+    from ..sweep import Trial
+    from ..workers import Workers
 
 MANY = 20_000_000  # points of which several workers thin a scan by default
 
 
 def thin_parser() -> Parser:
     """Options of ``scantruss thin``."""
-    from .options import Parser, add_reading, number
+    from ..options import Parser, add_reading, number
 
     parser = Parser(
         "thin",
@@ -42,7 +42,7 @@ def thin_parser() -> Parser:
 
 
 def _add_workers(parser: Parser) -> None:
-    from .options import whole_number
+    from ..options import whole_number
 
     parser.add_argument(
         "--workers", metavar="N", type=whole_number, help="workers on this machine; 1: this process alone"
@@ -52,14 +52,14 @@ def _add_workers(parser: Parser) -> None:
 
 def thin(values: Namespace) -> None:
     """Thin a scan and write it."""
-    from .options import selection_of
-    from .report.saving import SaveTogether
-    from .report.terminal import Bars, print_lines
-    from .scan.opened import open_scan
-    from .scan.paths import files_of
-    from .scan.streaming import thin_open_scan
-    from .scan.thin import check_spacing
-    from .scan.writers import check_cloud_output, write_points
+    from ..options import selection_of
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars, print_lines
+    from ..scan.opened import open_scan
+    from ..scan.paths import files_of
+    from ..scan.streaming import thin_open_scan
+    from ..scan.thin import check_spacing
+    from ..scan.writers import check_cloud_output, write_points
 
     check_spacing(values.spacing)
     out = check_cloud_output(values.out)
@@ -89,7 +89,7 @@ def thin(values: Namespace) -> None:
 
 def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
     """Return the workers of the command line, and say who they are where they are several."""
-    from .workers import NEEDS_DASK, Processes, open_workers
+    from ..workers import NEEDS_DASK, Processes, open_workers
 
     workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
     if isinstance(workers, Processes):
@@ -101,7 +101,7 @@ def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
 
 def sweep_parser() -> Parser:
     """Options of ``scantruss sweep``."""
-    from .options import Parser, add_settings, size_of_memory
+    from ..options import Parser, add_settings, size_of_memory
 
     parser = Parser(
         "sweep",
@@ -149,10 +149,10 @@ def _several(kind: Any) -> Callable[[str], list[Any]]:
 
 def sweep(values: Namespace) -> None:
     """Make many grids and tell of them."""
-    from .commands import note_compiling, read_scan, thin_to_fit
-    from .report.choosing import head_of, rows_of
-    from .report.terminal import Bars, print_lines, print_table
-    from .sweep import sweep as make_grids
+    from ..report.choosing import head_of, rows_of
+    from ..report.terminal import Bars, print_lines, print_table
+    from ..sweep import sweep as make_grids
+    from .gridding import note_compiling, read_scan, thin_to_fit
 
     folder = Path(values.out)
     if folder.exists() and not folder.is_dir():
@@ -183,8 +183,8 @@ def _thinned(trial: Trial, spacing: float) -> Trial:
 
 def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:
     """Return a trial for every combination of the values on the command line, and the names of what is varied."""
-    from .options import option_of, settings_of
-    from .sweep import trials_of
+    from ..options import option_of, settings_of
+    from ..sweep import trials_of
 
     lists = {name: value for name, value in vars(values).items() if _is_list(value)}
     varied = {name: value for name, value in lists.items() if len(value) > 1}
@@ -206,9 +206,9 @@ def _save(
     folder: Path, title: str, trials: list[Trial], outcomes: list[Any], head: tuple[str, ...], rows: list[Any]
 ) -> None:
     """Save grids, pictures and tables together, or nothing."""
-    from .export.sheet import encode_sheet
-    from .report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
-    from .report.saving import SaveTogether
+    from ..export.sheet import encode_sheet
+    from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
+    from ..report.saving import SaveTogether
 
     with SaveTogether() as save:
         save.make_folder(folder)

@@ -6,11 +6,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import FormatError, InputError
+from ..errors import FormatError, InputError
 
 if TYPE_CHECKING:
-    from .clean.steps import CleanCloud
-    from .options import Parser
+    from ..clean.steps import CleanCloud
+    from ..options import Parser
 
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
@@ -28,7 +28,7 @@ KEEP = {
 
 def clean_parser() -> Parser:
     """Options of ``scantruss clean``."""
-    from .options import Parser, add_settings, number
+    from ..options import Parser, add_settings, number
 
     parser = Parser(
         "clean",
@@ -59,12 +59,12 @@ def clean_parser() -> Parser:
 
 def clean(values: Namespace) -> None:
     """Clean a scan and save it."""
-    from .ahead import can_be_stored
-    from .commands import read_scan
-    from .report.saving import SaveTogether
-    from .report.terminal import Bars, print_lines
-    from .scan.writers import write_points
-    from .settings import Settings
+    from ..ahead import can_be_stored
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars, print_lines
+    from ..scan.writers import write_points
+    from ..settings import Settings
+    from .gridding import read_scan
 
     out, report = _outputs(values)
     settings = Settings(length=1.0, unit=getattr(values, "unit", ""))
@@ -73,7 +73,7 @@ def clean(values: Namespace) -> None:
         cloud = read_scan(values.scan, settings, bars)
         if not _compiled():
             bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
-        from .clean import clean_points
+        from ..clean import clean_points
 
         result = clean_points(cloud, **steps, progress=bars)
     with SaveTogether() as save:
@@ -88,8 +88,8 @@ def clean(values: Namespace) -> None:
 
 def _outputs(values: Namespace) -> tuple[Path, Path | None]:
     """Return where the results go, checked before anything is read."""
-    from .export.files import check_place
-    from .scan.writers import check_cloud_output
+    from ..export.files import check_place
+    from ..scan.writers import check_cloud_output
 
     out = check_cloud_output(values.out)
     report = check_place(values.report, (".json",)) if values.report else None
@@ -119,8 +119,8 @@ def _steps(values: Namespace) -> dict[str, Any]:
 
 def _compiled() -> bool:
     """Whether the kernels are stored: those that take long are looked for."""
-    from .kernels import facing, noise, strays
-    from .kernels.compile import is_compiled
+    from ..kernels import facing, noise, strays
+    from ..kernels.compile import is_compiled
 
     return is_compiled(noise.fit_patches, strays.stand_off, facing.turn_like_beside)
 

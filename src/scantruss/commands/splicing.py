@@ -6,19 +6,19 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .errors import FormatError, InputError
-from .settings import UNITS
+from ..errors import FormatError, InputError
+from ..settings import UNITS
 
 if TYPE_CHECKING:
-    from .options import Parser
-    from .report.terminal import Bars
-    from .scan.cloud import PointCloud
-    from .splice import Splice
+    from ..options import Parser
+    from ..report.terminal import Bars
+    from ..scan.cloud import PointCloud
+    from ..splice import Splice
 
 
 def splice_parser() -> Parser:
     """Options of ``scantruss splice``."""
-    from .options import Parser
+    from ..options import Parser
 
     parser = Parser(
         "splice",
@@ -41,9 +41,9 @@ def splice_parser() -> Parser:
 
 def splice(values: Namespace) -> None:
     """Splice scans and save the whole with its poses."""
-    from .report.saving import SaveTogether
-    from .report.terminal import Bars
-    from .scan.writers import write_points
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars
+    from ..scan.writers import write_points
 
     files = scan_files(values.scans)
     out = Path(values.out)
@@ -53,7 +53,7 @@ def splice(values: Namespace) -> None:
     with Bars() as bars:
         result = splice_files(values, files, names, bars)
         bars("write", 0.0)
-        from .splice.saving import splice_values
+        from ..splice.saving import splice_values
 
         with SaveTogether() as save:
             cloud = result.cloud
@@ -95,8 +95,8 @@ def names_of(files: list[Path]) -> list[str]:
 
 def check_outputs(values: Namespace, files: list[Path], out: Path, poses_file: Path) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
-    from .export.files import check_place
-    from .scan.writers import check_cloud_output
+    from ..export.files import check_place
+    from ..scan.writers import check_cloud_output
 
     check_cloud_output(out)
     check_place(out, (out.suffix.lower(),))
@@ -111,9 +111,9 @@ def check_outputs(values: Namespace, files: list[Path], out: Path, poses_file: P
 
 def splice_files(values: Namespace, files: list[Path], names: list[str], bars: Bars) -> Splice:
     """Read the scans and splice them; say what is left out."""
-    from .scan.readers import read_points
-    from .splice import splice_scans
-    from .splice.pose_file import read_poses
+    from ..scan.readers import read_points
+    from ..splice import splice_scans
+    from ..splice.pose_file import read_poses
 
     poses = read_poses(values.poses) if values.poses else {}
     unknown = sorted(name for name in poses if name not in names and Path(name).name not in names)
@@ -140,7 +140,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
 
 def show_splice(result: Splice, written: list[Path]) -> None:
     """Print the pairs, the worst of them and what was written."""
-    from .report.terminal import print_lines, print_table
+    from ..report.terminal import print_lines, print_table
 
     unit = f" {result.unit}" if result.unit else ""
     rows = [

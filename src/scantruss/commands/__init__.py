@@ -1,0 +1,26 @@
+"""The commands: what each one takes, does and says; everything heavy is imported where it is used."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from .cleaning import clean, clean_parser
+from .gridding import demo, demo_parser, grid, grid_parser, info, info_parser, print_parser, print_solid
+from .scaling import sweep, sweep_parser, thin, thin_parser
+from .splicing import splice, splice_parser
+
+if TYPE_CHECKING:
+    from ..options import Parser
+
+COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
+    "info": (info_parser, info),
+    "clean": (clean_parser, clean),
+    "grid": (grid_parser, grid),
+    "thin": (thin_parser, thin),
+    "sweep": (sweep_parser, sweep),
+    "print": (print_parser, print_solid),
+    "splice": (splice_parser, splice),
+    "demo": (demo_parser, demo),
+}
