@@ -448,3 +448,16 @@ def test_the_command_itself_refuses_with_status_two(place):
     assert done.returncode == 2
     assert done.stderr.startswith("scantruss: length must be a positive number") and done.stderr.count("\n") == 1
     assert done.stdout == ""
+
+
+def test_the_second_file_of_a_table_overwrites_nothing(tmp_path, monkeypatch, capsys):
+    """grid.csv comes with grid_nodes.csv: that is neither the scan nor another output."""
+    monkeypatch.chdir(tmp_path)
+    scan = tmp_path / "shell_nodes.csv"
+    np.savetxt(scan, plate(), delimiter=",")
+    before = scan.read_bytes()
+    assert main(["grid", "shell_nodes.csv", "shell.csv", "--length", "1"]) == 2
+    assert "would overwrite the scan" in capsys.readouterr().err
+    assert scan.read_bytes() == before and sorted(p.name for p in tmp_path.iterdir()) == ["shell_nodes.csv"]
+    assert main(["grid", "shell_nodes.csv", "a.csv", "a_nodes.csv", "--length", "1"]) == 2
+    assert "would overwrite the table of nodes" in capsys.readouterr().err

@@ -28,7 +28,7 @@ KEEP = {
 
 def clean_parser() -> Parser:
     """Options of ``scantruss clean``."""
-    from ..options import Parser, add_settings, number
+    from ..options import Parser, add_reading, number
 
     parser = Parser(
         "clean",
@@ -53,21 +53,21 @@ def clean_parser() -> Parser:
         help="one point stays in each search box of this width, in scan units",
     )
     steps.add_argument("--no-normals", action="store_true", help="write no normals")
-    add_settings(parser, ("unit",))
+    add_reading(parser)
     return parser
 
 
 def clean(values: Namespace) -> None:
     """Clean a scan and save it."""
     from ..ahead import can_be_stored
+    from ..options import settings_of
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.writers import write_points
-    from ..settings import Settings
-    from .gridding import read_scan
+    from .gridding import lost_with, read_scan
 
     out, report = _outputs(values)
-    settings = Settings(length=1.0, unit=getattr(values, "unit", ""))
+    settings = settings_of(Namespace(**vars(values), length=1.0))
     steps = _steps(values)
     with Bars() as bars:
         cloud = read_scan(values.scan, settings, bars)
@@ -83,7 +83,7 @@ def clean(values: Namespace) -> None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [str(out), *([str(report)] if report else [])]
-    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points"])
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *lost_with(out)])
 
 
 def _outputs(values: Namespace) -> tuple[Path, Path | None]:

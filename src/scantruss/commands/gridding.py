@@ -8,6 +8,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError, InputError
@@ -109,24 +110,28 @@ def grid(values: Namespace) -> None:
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
+        started = perf_counter()
         settings = thin_to_fit(values.scan, settings, values.memory)
         cloud = read_scan(values.scan, settings, bars)
-        result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed)
+        spent = perf_counter() - started
+        result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
     from ..export.formats import write
 
+    written: list[Path] = []
     with SaveTogether() as save:
         for out in outs:
-            write(result, save.beside(out), cloud=cloud)
-        save.json(settings_file, settings.to_dict())
+            written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud)]
+        save.json(settings_file, (result.settings or settings).to_dict())
         if report is not None:
             save.json(report, report_of(result, len(cloud.points)))
-    show_grid(result, len(cloud.points), [*outs, settings_file, *([report] if report else [])])
+    show_grid(result, len(cloud.points), [*written, settings_file, *([report] if report else [])])
     if result.certificate is not None and not result.certificate.passed:
         raise CertificateError("the grid fails its certificate, and was written because of --keep-failed")
 
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
+    from ..export.csv_file import nodes_path
     from ..export.files import check_place
     from ..export.formats import check_output
     from ..scan.paths import files_of
@@ -140,6 +145,8 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     taken = {Path(name).resolve(): what for name, what in inputs if name}
     for out in outs:
         _take(check_output(out), "grid", taken)
+        if out.suffix.lower() == ".csv":
+            _take(nodes_path(out), "table of nodes", taken)
     if report is not None:
         _take(check_place(report, (".json",)), "report", taken)
     check_place(settings_file, (".json",))
@@ -171,6 +178,13 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
+def lost_with(out: Path) -> list[str]:
+    """What to say of a cloud that is written: a LAS file has places for more than is kept."""
+    if out.suffix.lower() not in (".las", ".laz"):
+        return []
+    return ["classes, returns and colours are not kept; --class and --returns choose before"]
+
+
 def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
     """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
     from ..scan.fit import spacing_to_fit
@@ -192,7 +206,9 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False) -> Grid:
+def make_grid(
+    cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
+) -> Grid:
     """Run the chain, and say so where kernels must be compiled."""
     from ..ahead import CompileAhead
     from ..pipeline import check_length, grid_from_cloud
@@ -200,7 +216,7 @@ def make_grid(cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed:
     check_length(cloud, settings)
     note_compiling(bars, settings.method, "boundary", "front", "optimize")
     with CompileAhead(settings.method, bars) as progress:
-        grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed)
+        grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=read_seconds)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.method != settings.method:

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
 
 
+NOTED = 0.03  # part of a scan out of reach of its grid from which on that is said
+
+
 def report_of(grid: Grid, points: int) -> dict[str, Any]:
     """Return everything that `--report` saves, as plain values.
 
@@ -103,14 +106,21 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
         lines.append(f"{len(grid.lines)} members along lines and ridges")
     if quality.node_deviation_mean is not None and quality.node_deviation_max is not None:
         lines.append(
-            f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the scan on average,"
-            f" {quality.node_deviation_max:.3g}{unit} at most"
+            f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the smooth surface fitted to the points around them"
+            f" on average, {quality.node_deviation_max:.3g}{unit} at most"
         )
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
     if bridging:
         lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
     if grid.certificate is not None:
         lines.append(f"certificate: {grid.certificate}")
+        left, far = 1.0 - grid.certificate.scan_within_reach, grid.certificate.farthest_scan
+        if left > NOTED and far is not None:
+            where = ", ".join(f"{c:.6g}" for c in far.where)
+            lines.append(
+                f"look there: {left:.1%} of the scan lies farther than {grid.certificate.reach:.3g}{unit} from the grid,"
+                f" up to {far.value:.3g}{unit}, near ({where})"
+            )
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
     return lines
