@@ -35,7 +35,7 @@ Result = TypeVar("Result")
 
 WAYS = {  # rows that are tried
     "quick": (Rows(),),
-    "normal": tuple(Rows(turn) for turn in (0.0, 20.0, 40.0)),
+    "normal": tuple(Rows(10.0 * turn) for turn in range(6)),
     "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
 SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desired length differs from place to place
