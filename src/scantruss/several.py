@@ -45,7 +45,8 @@ SCALES = {  # lengths of the fronts instead, where no rows can be laid: the desi
 }
 FINALISTS = {"quick": 1, "normal": 1, "best": 3}  # grids that are improved to the end
 SMALL = 600.0  # area, in squares of the desired length, up to which `normal` tries all its rows: the rim decides there
-BATCHES = 2  # of finalists, where none of the first passes
+BATCHES = 2  # of finalists, where none of the first passes, or all have a triangle worse than this:
+POOR = 0.4
 
 
 def several_grids(
@@ -116,12 +117,12 @@ def several_grids(
     grids: dict[int, Grid] = {}
     for begin in range(0, min(len(order), BATCHES * finalists), finalists):
         jobs = {number: (number, reliefs[number]) for number in order[begin : begin + finalists]}
-        grids = _side_by_side(finish, jobs, _part(progress, "optimize", 0.5, 1.0))
-        if grids:
+        grids |= _side_by_side(finish, jobs, _part(progress, "optimize", 0.5, 1.0))
+        if any(grid.quality.shape_min >= POOR for grid in grids.values()):
             break
     if not grids:
         raise faults[order[0] if order else 0]
-    best = min(grids, key=lambda number: energy_of_node(reliefs[number]))
+    best = min(grids, key=lambda number: (grids[number].quality.shape_min < POOR, energy_of_node(reliefs[number])))
     return fronts[best % len(ways)], grids[best], advanced
 
 
