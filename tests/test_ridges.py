@@ -9,6 +9,7 @@ from shapes import make
 
 from scantruss import PointCloud, Settings, find_boundary, grid_from_points, pipeline
 from scantruss.errors import FrontError
+from scantruss.kernels.quadric import COLUMNS, WEIGHT
 from scantruss.kernels.ridges import FOUND, TERMS, fit_fold, fold_error, turned_frame
 from scantruss.lines.ridges import Tracer, find_ridges, is_ridge, join_ends
 from scantruss.scan.sites import prepare_sites
@@ -170,7 +171,9 @@ def test_ends_that_face_each_other_or_one_corner_are_joined():
 @given(st.integers(0, 10_000), st.booleans())
 def test_the_error_of_a_fold_is_that_of_least_squares(seed, folded):
     rng = np.random.default_rng(seed)
-    buffer = np.column_stack([rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3], rng.uniform(0.1, 1, 60)])
+    buffer = np.zeros((60, COLUMNS))
+    buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
+    buffer[:, WEIGHT] = rng.uniform(0.1, 1, 60)
     shift = rng.uniform(-0.3, 0.3)
     frame = turned_frame((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(-0.3, 0.3))
     c, e, n = map(np.array, frame)
@@ -179,7 +182,7 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed, folded):
     u, t, h = buffer[:, :3] @ c - shift, buffer[:, :3] @ e, buffer[:, :3] @ n
     last = [np.abs(u), u * np.abs(u)] if folded else [u**3]
     terms = np.stack([np.ones(60), t, t * t, u, u * u, u * t, *last], axis=1)
-    root = np.sqrt(buffer[:, 3])
+    root = np.sqrt(buffer[:, WEIGHT])
     solution, squares, *_ = np.linalg.lstsq(root[:, None] * terms, root * h, rcond=None)
     assert error == pytest.approx(float(squares[0]), rel=1e-4)
     assert np.allclose(matrix[: terms.shape[1], TERMS], solution, rtol=1e-3, atol=1e-3)

@@ -43,6 +43,8 @@ from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .triangles import quality, turned
 from .vectors import Vector, along, norm, row, subtract
 
+ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
+
 
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
@@ -92,6 +94,7 @@ def choose_by_quality(
     place = ideal_point(front, s, alpha, beta, side)
     widest = 2.2 + 0.7 * (1.0 - strict)
     around = (0.75 + 0.9 * (1.0 - strict)) * length
+    room = (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1
     score = np.full(near + 1, -1.0)
     for i in range(near):
         q = found[i]
@@ -107,24 +110,20 @@ def choose_by_quality(
                 score[i] = 0.9 * value
             elif far_from_front(front, s, q, pq, found, near, 0.5 * numbers[NEARNESS] * length, length):
                 score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
-    if propose_on_surface(surface, front, s, place, patch):
-        pp = row(front.nodes, front.count[NODES])
-        if far_from_front(
-            front,
-            s,
-            front.count[NODES],
-            pp,
-            found,
-            near,
-            (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1,
-            length,
-        ):
-            score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
-    for _ in range(near + 1):
+    enough = ENOUGH * (numbers[SHAPE] + numbers[SIZE])
+    proposed = False
+    while True:
         best = -1
         for i in range(near + 1):
             if score[i] > 0.0 and (best < 0 or score[i] > score[best]):
                 best = i
+        if not proposed and (best < 0 or score[best] < enough):
+            proposed = True
+            if propose_on_surface(surface, front, s, place, patch):
+                pp = row(front.nodes, front.count[NODES])
+                if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
+                    score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
+            continue
         if best < 0 or score[best] < 0.5 * strict:
             return False
         p = found[best] if best < near else front.count[NODES]
@@ -135,7 +134,6 @@ def choose_by_quality(
             attach(front, s, p, passage)
             return True
         score[best] = -1.0
-    return False
 
 
 @kernel

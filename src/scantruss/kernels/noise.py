@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .patches import COLUMNS, PATCH, fit, foot, gather
+from .patches import PATCH, fit, foot, gather
+from .quadric import COLUMNS
 from .tree import DEEPEST, Tree
 from .vectors import along, dot, row, subtract, unit
 

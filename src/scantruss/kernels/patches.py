@@ -4,10 +4,6 @@ A patch is a row of numbers, relative to the place it was fitted at:
 
     0:3 unit normal   3:6 tangent u (v = normal x u)   6:12 height as coefficients of 1 a b aa ab bb   12 rms distance of the points
     13 variance of the height at the place itself, in units of that of a point   14 points   15 radius
-
-The points of a fit are rows of a buffer:
-
-    0:3 position   3 squared distance   4 weight   5 height over the patch   6 a   7 b   8 height over the plane; a, b in radii
 """
 
 from __future__ import annotations
@@ -17,12 +13,12 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .surface import solve
+from .quadric import fit_heights, normal_equations, project, second_moments, solve
 from .tree import Tree, within
 from .vectors import Vector, across, along, cross, dot, row, smallest_eigenvector, subtract, unit
 
 PATCH = 16  # columns of a patch
-COLUMNS = 9  # columns of a buffer
+HEIGHTS = 6  # first of its coefficients
 FULL, FLAT = 10, 5  # points that a quadric needs, and a plane
 
 
@@ -58,7 +54,7 @@ def fit(buffer: np.ndarray, taken: int, radius: float, rounds: int, patch: np.nd
     for turn in range(rounds):
         if turn < 2:
             _plane(buffer, taken, radius, patch)
-        size = _heights(buffer, taken, radius, size, patch, matrix)
+        size = fit_heights(buffer, taken, radius, size, patch, HEIGHTS, matrix)
         if turn < rounds - 1:
             _weigh_again(buffer, taken, radius)
     _spread(buffer, taken, size, patch)
@@ -83,73 +79,11 @@ def _weigh_again(buffer: np.ndarray, taken: int, radius: float) -> None:
 @kernel
 def _plane(buffer: np.ndarray, taken: int, radius: float, patch: np.ndarray) -> None:
     """Normal and tangent of the plane of least squares, and where the points lie over it."""
-    total = cx = cy = cz = 0.0
-    xx = xy = xz = yy = yz = zz = 0.0
-    for i in range(taken):
-        w = buffer[i, 4]
-        x, y, z = buffer[i, 0], buffer[i, 1], buffer[i, 2]
-        total, cx, cy, cz = total + w, cx + w * x, cy + w * y, cz + w * z
-        xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
-        yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
-    if total > 0.0:
-        cx, cy, cz = cx / total, cy / total, cz / total
-        xx, xy, xz = xx - total * cx * cx, xy - total * cx * cy, xz - total * cx * cz
-        yy, yz, zz = yy - total * cy * cy, yz - total * cy * cz, zz - total * cz * cz
-    normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+    normal = smallest_eigenvector(*second_moments(buffer, taken))
     u = across(normal)
-    v = cross(normal, u)
     patch[0], patch[1], patch[2] = normal
     patch[3], patch[4], patch[5] = u
-    for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-        buffer[i, 6], buffer[i, 7], buffer[i, 8] = dot(d, u) / radius, dot(d, v) / radius, dot(d, normal)
-
-
-@kernel
-def _system(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None:
-    """Normal equations of a quadric, matrix (6, 7), from the moments of the points."""
-    m00 = m10 = m01 = m20 = m11 = m02 = m30 = m21 = m12 = m03 = m40 = m31 = m22 = m13 = m04 = 0.0
-    z00 = z10 = z01 = z20 = z11 = z02 = 0.0
-    for i in range(taken):
-        w, a, b, z = buffer[i, 4], buffer[i, 6], buffer[i, 7], buffer[i, 8]
-        wa, wb = w * a, w * b
-        waa, wab, wbb = wa * a, wa * b, wb * b
-        m00, m10, m01, m20, m11, m02 = m00 + w, m10 + wa, m01 + wb, m20 + waa, m11 + wab, m02 + wbb
-        m30, m21, m12, m03 = m30 + waa * a, m21 + waa * b, m12 + wbb * a, m03 + wbb * b
-        m40, m31, m22 = m40 + waa * a * a, m31 + waa * a * b, m22 + waa * b * b
-        m13, m04 = m13 + wbb * a * b, m04 + wbb * b * b
-        z00, z10, z01 = z00 + w * z, z10 + wa * z, z01 + wb * z
-        z20, z11, z02 = z20 + waa * z, z11 + wab * z, z02 + wbb * z
-    rows = (
-        (m00, m10, m01, m20, m11, m02, z00),
-        (m10, m20, m11, m30, m21, m12, z10),
-        (m01, m11, m02, m21, m12, m03, z01),
-        (m20, m30, m21, m40, m31, m22, z20),
-        (m11, m21, m12, m31, m22, m13, z11),
-        (m02, m12, m03, m22, m13, m04, z02),
-    )
-    for r in range(6):
-        for c in range(7):
-            matrix[r, c] = rows[r][c]
-
-
-@kernel
-def _heights(buffer: np.ndarray, taken: int, radius: float, size: int, patch: np.ndarray, matrix: np.ndarray) -> int:
-    """Coefficients of the heights by least squares, of a plane where a quadric is not told; returns how many."""
-    while True:
-        _system(buffer, taken, matrix)
-        for r in range(size):
-            matrix[r, size] = matrix[r, 6]
-            matrix[r, r] += 1e-9 * matrix[0, 0]
-        if solve(matrix, size) or size == 1:
-            break
-        size = 3 if size == 6 else 1
-    for c in range(6):
-        power = 1.0 if c == 0 else (radius if c < 3 else radius * radius)
-        patch[6 + c] = matrix[c, size] / power if c < size else 0.0
-    for i in range(taken):
-        buffer[i, 5] = buffer[i, 8] - height(patch, radius * buffer[i, 6], radius * buffer[i, 7])
-    return size
+    project(buffer, taken, radius, normal, u)
 
 
 @kernel
@@ -169,7 +103,7 @@ def _spread(buffer: np.ndarray, taken: int, size: int, patch: np.ndarray) -> Non
 def doubt(buffer: np.ndarray, taken: int, size: int, patch: np.ndarray, matrix: np.ndarray) -> None:
     """Measure how well the points of the last fit tell the height at the place: patch[13], large where they lie to one side."""
     patch[13] = np.inf
-    _system(buffer, taken, matrix)
+    normal_equations(buffer, taken, matrix)
     for r in range(size):
         matrix[r, size] = 1.0 if r == 0 else 0.0
         matrix[r, r] += 1e-9 * matrix[0, 0]

@@ -14,7 +14,8 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .surface import Surface, flood, gather_points, solve, walk
+from .quadric import WEIGHT, solve
+from .surface import Surface, flood, gather_points, walk
 from .vectors import Vector, along, cross, dot, norm, row, subtract, unit
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
@@ -94,7 +95,7 @@ def fold_error(
         term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, t, t * t, u, u * u, u * t
         term[6], term[7] = (size, u * size) if folded else (u * u * u, 0.0)
         term[TERMS] = h
-        w = buffer[i, 3]
+        w = buffer[i, WEIGHT]
         squares += w * h * h
         for r in range(TERMS):
             wr = w * term[r]
@@ -202,7 +203,7 @@ def fit_fold(
     least = fold_error(buffer, taken, frame, shift, radius, True, matrix)
     total = 0.0
     for i in range(taken):
-        total += buffer[i, 3]
+        total += buffer[i, WEIGHT]
     across, ahead, _ = frame
     at = along(along(place, shift * radius, across), matrix[0, TERMS] * radius, n)
     found[0], found[1], found[2] = at

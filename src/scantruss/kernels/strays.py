@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .patches import COLUMNS, FLAT, FULL, PATCH, doubt, fit
+from .patches import FLAT, FULL, PATCH, doubt, fit
+from .quadric import COLUMNS
 from .tree import DEEPEST, Tree, nearest
 from .vectors import dot, row, smallest_eigenvector, subtract
 

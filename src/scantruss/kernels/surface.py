@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .compile import kernel
+from .quadric import AWAY, COLUMNS, WEIGHT, fit_heights, project, second_moments
 from .vectors import Vector, across, along, cross, dot, norm, row, smallest_eigenvector, subtract
 
 PATCH = 20  # columns of a patch row
+HEIGHTS = 9  # first of its coefficients
 
 
 class Surface(NamedTuple):
@@ -98,25 +100,6 @@ def _queued(surface: Surface, site: int, count: int) -> bool:
 
 
 @kernel
-def solve(matrix: np.ndarray, size: int) -> bool:
-    """Solve the symmetric system in matrix[:size, :size + 1] in place; the last column gets the solution."""
-    for i in range(size):
-        pivot = matrix[i, i]
-        if pivot <= 1e-10:
-            return False
-        for r in range(i + 1, size):
-            factor = matrix[r, i] / pivot
-            for c in range(i, size + 1):
-                matrix[r, c] -= factor * matrix[i, c]
-    for i in range(size - 1, -1, -1):
-        value = matrix[i, size]
-        for c in range(i + 1, size):
-            value -= matrix[i, c] * matrix[c, size]
-        matrix[i, size] = value / matrix[i, i]
-    return True
-
-
-@kernel
 def gather_points(
     surface: Surface,
     count: int,
@@ -127,7 +110,7 @@ def gather_points(
     least: float,
     buffer: np.ndarray,
 ) -> int:
-    """Points around a place, relative to it, with their weights, into buffer (B, >=4); returns their number.
+    """Points around a place, relative to it, with their weights, into the buffer of a fit; returns their number.
 
     Taken are the points of the first `count` sites in surface.queue whose normal has a cosine over `least` to `facing`, of each at most
     about `most`. They weigh (1 - d^2 / R^2)^2.
@@ -143,7 +126,7 @@ def gather_points(
                 w = 1.0 - dot(d, d) / (radius * radius)
                 if w > 0.0 and taken < len(buffer):
                     buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                    buffer[taken, 3] = w * w
+                    buffer[taken, WEIGHT] = w * w
                     taken += 1
     return taken
 
@@ -166,47 +149,46 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
         count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
         if count < 1:
             count = 1
-        buffer = np.empty((most * count, 5))
+        buffer = np.empty((_points_at_most(surface, count, most), COLUMNS))
         taken = gather_points(surface, count, place, radius, most, facing, 0.0, buffer)
         if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]) * local:
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)
-    normal, u = (patch[3], patch[4], patch[5]), (patch[6], patch[7], patch[8])
-    v = cross(normal, u)
-    _heights(buffer, taken, radius, normal, u, v, patch)
+    project(buffer, taken, radius, (patch[3], patch[4], patch[5]), (patch[6], patch[7], patch[8]))
+    matrix = np.empty((6, 7))
+    size = fit_heights(buffer, taken, radius, 6 if taken >= 10 else (3 if taken >= 4 else 1), patch, HEIGHTS, matrix)
     mean = 0.0
     for i in range(taken):
-        mean += buffer[i, 4]
+        mean += abs(buffer[i, AWAY])
     mean = mean / max(taken, 1)
     if mean > 0.002 * surface.scale[0] * local and taken > 12:
         for i in range(taken):
-            r = buffer[i, 4] / (2.0 * mean)
-            buffer[i, 3] /= (1.0 + r * r) * (1.0 + r * r)
-        _heights(buffer, taken, radius, normal, u, v, patch)
+            r = buffer[i, AWAY] / (2.0 * mean)
+            buffer[i, WEIGHT] /= (1.0 + r * r) * (1.0 + r * r)
+        fit_heights(buffer, taken, radius, size, patch, HEIGHTS, matrix)
     patch[0], patch[1], patch[2] = place
     patch[16], patch[17] = 1.0, mean
     return taken
 
 
 @kernel
+def _points_at_most(surface: Surface, count: int, most: int) -> int:
+    """Points of the first `count` sites in surface.queue, of each about `most` at most."""
+    points = 0
+    for i in range(count):
+        s = surface.queue[i]
+        points += min(surface.start[s + 1] - surface.start[s], most)
+    return points
+
+
+@kernel
 def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray) -> None:
     """Normal and tangent of the weighted least-squares plane, turned to face as the site does."""
-    total = cx = cy = cz = 0.0
-    for i in range(taken):
-        w = buffer[i, 3]
-        total += w
-        cx, cy, cz = cx + w * buffer[i, 0], cy + w * buffer[i, 1], cz + w * buffer[i, 2]
     normal = facing
     patch[18] = 0.0
-    if taken >= 4 and total > 0.0:
-        cx, cy, cz = cx / total, cy / total, cz / total
-        xx = xy = xz = yy = yz = zz = 0.0
-        for i in range(taken):
-            w = buffer[i, 3]
-            x, y, z = buffer[i, 0] - cx, buffer[i, 1] - cy, buffer[i, 2] - cz
-            xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
-            yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+    if taken >= 4:
+        xx, xy, xz, yy, yz, zz = second_moments(buffer, taken)
         normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
         trace = xx + yy + zz
         if trace > 0.0:
@@ -219,41 +201,6 @@ def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray)
             normal = facing
     patch[3], patch[4], patch[5] = normal
     patch[6], patch[7], patch[8] = across(normal)
-
-
-@kernel
-def _heights(
-    buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Vector, v: Vector, patch: np.ndarray
-) -> None:
-    """Least-squares heights over the plane: a quadric, a plane for few points; buffer[:, 4] gets the distances from it."""
-    size = 6 if taken >= 10 else (3 if taken >= 4 else 1)
-    solved = False
-    matrix = np.zeros((6, 7))
-    term = np.empty(7)
-    while not solved and size > 0:
-        matrix[:, :] = 0.0
-        for i in range(taken):
-            d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-            a, b = dot(d, u) / radius, dot(d, v) / radius
-            term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, a, b, a * a, a * b, b * b
-            term[size] = dot(d, normal)
-            for r in range(size):
-                wr = buffer[i, 3] * term[r]
-                for c in range(r, size + 1):
-                    matrix[r, c] += wr * term[c]
-        for r in range(size):
-            for c in range(r):
-                matrix[r, c] = matrix[c, r]
-            matrix[r, r] += 1e-9 * matrix[0, 0]
-        solved = solve(matrix, size)
-        if not solved:
-            size = 3 if size == 6 else (1 if size == 3 else 0)
-    for c in range(6):
-        power = 1.0 if c == 0 else (radius if c < 3 else radius * radius)
-        patch[9 + c] = matrix[c, size] / power if c < size else 0.0
-    for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-        buffer[i, 4] = abs(dot(d, normal) - height(patch, dot(d, u), dot(d, v)))
 
 
 @kernel

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..kernels.quadric import COLUMNS
 from ..kernels.ridges import FOUND, bends_of_sites, fit_fold, keep_folded
 from ..kernels.surface import walk
 from ..scan.sites import ALL
@@ -54,7 +55,7 @@ class Tracer:
         self.surface, self.length = sites.surface._replace(scale=scale), settings.length
         self.angle = float(np.radians(settings.ridge_angle))
         self.radius = max(RADIUS * settings.length, 2.6 * sites.spacing)
-        self.buffer = np.empty((6000, 4))
+        self.buffer = np.empty((6000, COLUMNS))
 
     def fold_at(self, site: int, place: np.ndarray, towards: np.ndarray) -> np.ndarray | None:
         """The fold around a place (see `kernels.ridges.fit_fold`), None where no fold fits."""
