@@ -19,7 +19,6 @@ from scantruss.grid.certificate import Certificate
 from scantruss.grid.faults import FOLDED
 from scantruss.grid.irregular import count_irregular
 from scantruss.grid.proof import certify, fold_angles
-from scantruss.grid.quality import corner_angles
 
 SETTINGS = st.Settings(length=1.0)
 SHIFT = np.array([500_000.0, 4_500_000.0, 100.0])
@@ -217,7 +216,7 @@ def plain_charges(grid):
 )
 def test_irregular_nodes_are_counted_as_stated(grid, expected):
     charges = plain_charges(grid)
-    present, forced = count_irregular(grid, corner_angles(grid.nodes, grid.triangles))
+    present, forced = count_irregular(grid)
     assert present == sum(map(abs, charges.values())) and forced == abs(sum(charges.values()))
     assert expected is None or (present, forced) == expected
 

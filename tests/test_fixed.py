@@ -6,7 +6,6 @@ from rough import compiled_only, rough_disc, rough_sphere, same_topology
 
 from scantruss import InputError, Settings, optimize_grid
 from scantruss.boundary import find_boundary
-from scantruss.grid.quality import corner_angles
 
 MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda: rough_disc(corners=True)}
 
@@ -19,7 +18,7 @@ def scene(request):
 
 def angle_around(grid):
     """Smallest angle of the triangles at fixed nodes [degree]."""
-    return corner_angles(grid.nodes, grid.triangles)[grid.fixed[grid.triangles].any(axis=1)].min()
+    return grid.angles[grid.fixed[grid.triangles].any(axis=1)].min()
 
 
 def spread_out(points, count, gap, seed):

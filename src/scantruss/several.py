@@ -147,8 +147,9 @@ def _side_by_side(
 ) -> dict[int, Result]:
     """Do the work for each job on all processors; return what came out, in the order of the jobs."""
     done: dict[int, Result] = {}
-    ready = is_compiled(advancing.advance, searching.search, landing.land_nodes)
-    workers = min(processors() if ready else 1, len(jobs))  # one thread compiles, others would only wait for it
+    workers = min(processors(), len(jobs))
+    if workers > 1 and not is_compiled(advancing.advance, searching.search, landing.land_nodes):
+        workers = 1  # one thread compiles, others would only wait for it
     with ExitStack() as stack:
         results: Iterable[Result | None]
         if workers < 2:

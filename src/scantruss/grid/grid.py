@@ -114,6 +114,13 @@ class Grid:
         """(E,) length of each member [scan unit]."""
         return np.linalg.norm(self.nodes[self.edges[:, 0]] - self.nodes[self.edges[:, 1]], axis=1)
 
+    @cached_property
+    def angles(self) -> np.ndarray:
+        """(T, 3) angle of each triangle at each of its nodes [degree]."""
+        from .quality import corner_angles
+
+        return corner_angles(self.nodes, self.triangles)
+
     def stretches(self, length: float) -> np.ndarray:
         """(E,) length of each member over the desired one: the mean of that at its nodes, or `length` where it is the same for all."""
         if self.desired is None:

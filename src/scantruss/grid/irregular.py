@@ -22,15 +22,12 @@ if TYPE_CHECKING:
     from .grid import Grid
 
 
-def count_irregular(grid: Grid, angles: np.ndarray) -> tuple[int, int]:
-    """Return the members too few or too many at all nodes, and how many of them the topology and the rim force.
-
-    angles : (T, 3) of each triangle at each of its nodes [degree]
-    """
+def count_irregular(grid: Grid) -> tuple[int, int]:
+    """Return the members too few or too many at all nodes, and how many of them the topology and the rim force."""
     count = len(grid.nodes)
     edges, uses = grid.edges, grid.edge_uses
     members = np.bincount(edges.ravel(), minlength=count)
-    angle = np.bincount(grid.triangles.ravel(), angles.ravel(), minlength=count)
+    angle = np.bincount(grid.triangles.ravel(), grid.angles.ravel(), minlength=count)
     room = np.maximum(np.floor(angle / 60.0 + 0.5), 1.0).astype(np.int64)
     rim = np.zeros(count, bool)
     rim[edges[uses != 2].ravel()] = True

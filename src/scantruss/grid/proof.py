@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kernels.figures import folds_of
 from .certificate import Certificate, Fault, Worst, place_of
 from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_field, scan_places
 from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
-from .quality import corner_angles
 from .sheets import faults_on_sheets
 
 if TYPE_CHECKING:
@@ -101,13 +101,12 @@ def _extremes(grid: Grid, settings: Settings) -> dict[str, Any]:
     """Return the worst members, angles, fold and fixed node, and how many irregular nodes there are."""
     halves = grid.nodes[grid.edges].mean(axis=1)
     corners = grid.nodes[grid.triangles].reshape(-1, 3)
-    angles = corner_angles(grid.nodes, grid.triangles)
-    irregular, forced = count_irregular(grid, angles)
+    irregular, forced = count_irregular(grid)
     return {
         "shortest_member": _worst(grid.lengths, halves, grid, -1.0),
         "longest_member": _worst(grid.lengths, halves, grid),
-        "smallest_angle": _worst(angles.ravel(), corners, grid, -1.0),
-        "largest_angle": _worst(angles.ravel(), corners, grid),
+        "smallest_angle": _worst(grid.angles.ravel(), corners, grid, -1.0),
+        "largest_angle": _worst(grid.angles.ravel(), corners, grid),
         "sharpest_fold": _worst(fold_angles(grid), halves, grid, -1.0),
         "fixed_error": _fixed_error(grid, settings),
         "irregular": irregular,
@@ -126,15 +125,9 @@ def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, weight: float | n
 
 def fold_angles(grid: Grid) -> np.ndarray:
     """Return the angle between the first two triangles at each member, (E,) [degree]: 180 level, 0 folded flat; NaN at the rim."""
-    two = grid.edge_triangles
-    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    first, second = normal[two[:, 0]], normal[two[:, 1]]
-    angle = 180.0 - np.degrees(
-        np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1))
-    )
-    return np.where(two[:, 1] >= 0, angle, np.nan)
+    angles = np.empty(len(grid.edges))
+    folds_of(grid.nodes, grid.triangles, grid.edge_triangles, angles)
+    return angles
 
 
 def _fixed_error(grid: Grid, settings: Settings) -> Worst | None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kernels import figures
+
 if TYPE_CHECKING:
     from .grid import Grid
 
@@ -86,11 +88,8 @@ def shape_qualities(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def corner_angles(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the angle of each triangle at each of its nodes, (T, 3) [degree]."""
     angles = np.empty((len(triangles), 3))
-    for k in range(3):
-        corner, first, second = (nodes[triangles[:, (k + step) % 3]] for step in range(3))
-        u, w = first - corner, second - corner
-        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, w), axis=1), (u * w).sum(axis=1))
-    return np.degrees(angles)
+    figures.angles_of(nodes, triangles, angles)
+    return angles
 
 
 def _mean(values: np.ndarray) -> float:
@@ -102,7 +101,7 @@ def measure_quality(grid: Grid) -> GridQuality:
     edges, lengths = grid.edges, grid.lengths
     some = len(grid.triangles) > 0
     shape = shape_qualities(grid.nodes, grid.triangles) if some else np.zeros(1)
-    angles = corner_angles(grid.nodes, grid.triangles) if some else np.zeros(1)
+    angles = grid.angles if some else np.zeros(1)
     lengths = lengths if some else np.zeros(1)
     valence = np.bincount(edges.ravel(), minlength=len(grid.nodes))
     interior = valence > 0
@@ -131,15 +130,8 @@ def measure_quality(grid: Grid) -> GridQuality:
 def labels(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return for each of `count` things the smallest thing that the links first-second join it with."""
     label = np.arange(count)
-    while True:
-        low = np.minimum(label[first], label[second])
-        lowest = label.copy()
-        np.minimum.at(lowest, label[first], low)
-        np.minimum.at(lowest, label[second], low)
-        lowest = lowest[lowest]
-        if np.array_equal(lowest, label):
-            return label
-        label = lowest
+    figures.join(label, np.ascontiguousarray(first), np.ascontiguousarray(second))
+    return label
 
 
 def _links(grid: Grid) -> tuple[np.ndarray, np.ndarray]:

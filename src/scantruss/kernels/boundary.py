@@ -36,6 +36,45 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 
 @kernel
+def _has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
+    """Whether the directions to the neighbours of a site leave a gap wider than `widest` [rad], less than a right angle; False without neighbours.
+
+    ahead (K, 3) is scratch: the directions in their order around the site, with numbers that grow as their angle does.
+    """
+    place, count = row(surface.mean, s), 0
+    for k in range(surface.neighbors.shape[1]):
+        n = surface.neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(surface.mean, n), place)
+            a, b = dot(d, u), dot(d, v)
+            if a == 0.0 and b == 0.0:
+                continue
+            turn = a / (abs(a) + abs(b))
+            turn = 1.0 - turn if b >= 0.0 else 3.0 + turn
+            at = count
+            while at > 0 and ahead[at - 1, 2] > turn:
+                for c in range(3):
+                    ahead[at, c] = ahead[at - 1, c]
+                at -= 1
+            ahead[at, 0], ahead[at, 1], ahead[at, 2] = a, b, turn
+            count += 1
+    if count == 0 or ahead[count - 1, 2] - ahead[0, 2] < 2.0:  # all to one side
+        return count > 0
+    limit = math.cos(widest)
+    for k in range(count):
+        a, b = ahead[k, 0], ahead[k, 1]
+        c, d = ahead[(k + 1) % count, 0], ahead[(k + 1) % count, 1]
+        along_it = a * c + b * d
+        if (
+            along_it <= 0.0
+            or a * d - b * c < 0.0
+            or along_it * along_it < limit * limit * (a * a + b * b) * (c * c + d * d)
+        ):
+            return True
+    return False
+
+
+@kernel
 def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
     """For each site from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
 
@@ -43,30 +82,14 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
     the middle of the widest free range, counted from `across(normal)`.
     """
     blocked = np.zeros(DIRECTIONS, np.bool_)
-    angles = np.empty(surface.neighbors.shape[1])
+    ahead = np.empty((surface.neighbors.shape[1], 3))
     noise = 0.2 * surface.scale[0]
     for s in range(begin, end):
         free[s] = 9.0
         normal, place = row(surface.normals, s), row(surface.mean, s)
         u = across(normal)
         v = cross(normal, u)
-        count = 0
-        for k in range(surface.neighbors.shape[1]):
-            n = surface.neighbors[s, k]
-            if n >= 0:
-                angle, _ = _polar(place, normal, u, v, row(surface.mean, n), 0.0)
-                at = count
-                while at > 0 and angles[at - 1] > angle:
-                    angles[at] = angles[at - 1]
-                    at -= 1
-                angles[at] = angle
-                count += 1
-        if count == 0:
-            continue
-        gap = angles[0] + 2.0 * math.pi - angles[count - 1]
-        for k in range(1, count):
-            gap = max(gap, angles[k] - angles[k - 1])
-        if gap <= widest:
+        if not _has_gap(surface, s, u, v, widest, ahead):
             continue
         blocked[:] = False
         radius = radii[s]

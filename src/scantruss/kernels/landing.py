@@ -11,6 +11,7 @@ from .vectors import Vector, along, dot, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
+ALIKE = 0.9  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
 
 
@@ -27,6 +28,8 @@ def _fit_widest(
     least = patch[17]
     kept = patch.copy()
     for turn in range(2):
+        if turn == 0 and middle.scale[2] > ALIKE * broad.scale[2]:
+            continue
         more = fit_patch(middle if turn == 0 else broad, patch, site, place)
         lined = kept[18] < LINED
         if more < 4 or (patch[17] > LIKE * least and not lined):

@@ -14,6 +14,7 @@ from ..settings import UNITS
 
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 SAMPLE = 600  # points at which the spacing is measured
+ROUGHLY = 60  # of them at which it is guessed first
 FEW = 200  # points at which the gap is measured
 BLOCK = 1 << 14  # points looked at in one go
 PART = 50_000  # fewest points for a thread of their own
@@ -194,11 +195,13 @@ def measure_spacing(points: np.ndarray) -> float:
     lower, upper = bounds_of(points)
     same = 8 * np.finfo(float).eps * float(max(np.abs(lower).max(), np.abs(upper).max()))
     sample, place = np.unique(sample, axis=0, return_inverse=True)
-    parts = np.array_split(sample, len(sample) // 500 + 1)
-    nearest = np.concatenate([_nearest_of(part, sample, same) for part in parts])
     if len(place) < len(points):
         reach = float(np.linalg.norm(upper - lower))
-        nearest = _refine(points, sample, nearest, np.bincount(place.ravel()), same, reach)
+        some = _nearest_of(sample[:: len(sample) // ROUGHLY + 1], sample, same)
+        nearest = _refine(points, sample, some, np.bincount(place.ravel()), same, reach)
+    else:
+        parts = np.array_split(sample, len(sample) // 500 + 1)
+        nearest = np.concatenate([_nearest_of(part, sample, same) for part in parts])
     spacing = float(np.median(nearest[place.ravel()]))
     return spacing if math.isfinite(spacing) else 0.0
 
@@ -238,7 +241,7 @@ def _nearest_of(rows: np.ndarray, others: np.ndarray, same: float) -> np.ndarray
 def _refine(
     points: np.ndarray,
     sample: np.ndarray,
-    coarse: np.ndarray,
+    some: np.ndarray,
     times: np.ndarray,
     same: float,
     reach: float,
@@ -246,10 +249,11 @@ def _refine(
     """Return the nearest distances of the sample, exact up to their median, in the whole cloud.
 
     Neighbours are looked for in search boxes around the points of the sample, whose size grows until more than half
-    of the sample have theirs, each counted as often as it was taken; the others are farther than the median.
+    of the sample have theirs, each counted as often as it was taken; the others are farther than the median. `some` distances to
+    the nearest of the sample (K,) tell where to begin.
     """
     found = np.full(len(sample), math.inf)
-    known = coarse[np.isfinite(coarse)]
+    known = some[np.isfinite(some)]
     if not len(known):  # the sample coincides, yet other points may not
         known = np.array([reach])
     size = 1.5 * float(np.median(known)) * math.sqrt(len(sample) / len(points))

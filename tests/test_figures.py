@@ -1,0 +1,32 @@
+"""Figures of a grid against slow twins."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from scantruss.grid.quality import corner_angles, labels
+
+
+@pytest.mark.kernels
+@given(arrays.arrays(np.float64, (6, 3), elements=st.floats(-5, 5, width=16)))
+def test_angles_are_those_of_textbooks(nodes):
+    triangles = np.array([(0, 1, 2), (3, 4, 5), (2, 5, 1)])
+    for t, angles in zip(triangles, corner_angles(nodes, triangles), strict=True):
+        for k in range(3):
+            u, w = nodes[t[(k + 1) % 3]] - nodes[t[k]], nodes[t[(k + 2) % 3]] - nodes[t[k]]
+            known = np.degrees(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w))
+            assert angles[k] == pytest.approx(known, abs=1e-9)
+
+
+@pytest.mark.kernels
+@given(st.integers(1, 30), st.lists(st.tuples(st.integers(0, 29), st.integers(0, 29)), max_size=40))
+def test_things_joined_by_links_have_the_lowest_of_them_as_label(count, links):
+    pairs = np.array([(a % count, b % count) for a, b in links], np.int64).reshape(-1, 2)
+    groups = {thing: {thing} for thing in range(count)}
+    for a, b in pairs.tolist():
+        both = groups[a] | groups[b]
+        for thing in both:
+            groups[thing] = both
+    assert labels(count, pairs[:, 0], pairs[:, 1]).tolist() == [min(groups[thing]) for thing in range(count)]
