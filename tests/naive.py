@@ -14,16 +14,12 @@ def within(positions, place, reach):
 
 
 def thin(points, radius):
-    """Points that become sites, each that has no earlier site nearer than `radius`; and the earliest site near enough to each point."""
-    chosen, owner = [], []
+    """Points that become sites: each that has no earlier site nearer than `radius`."""
+    chosen = []
     for p, place in enumerate(points):
-        square = ((points[chosen] - place) ** 2).sum(axis=1) if chosen else np.array([np.inf])
-        if square.min() >= radius * radius:
-            owner.append(len(chosen))
+        if not chosen or ((points[chosen] - place) ** 2).sum(axis=1).min() >= radius * radius:
             chosen.append(p)
-        else:
-            owner.append(int((square < radius * radius).argmax()))
-    return owner, chosen
+    return chosen
 
 
 def nearest(positions, site, count, far):

@@ -207,10 +207,9 @@ def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: flo
 
 def _onwards(touched: np.ndarray) -> list[int]:
     """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
-    _, number = np.unique(touched, axis=0, return_inverse=True)
-    number, ahead = number.ravel(), np.zeros(len(touched), np.int64)
+    ahead = np.zeros(len(touched), np.int64)
     for k in range(1, BACK + 1):
-        ahead[:-k][number[:-k] == number[k:]] = k
+        ahead[:-k][(touched[:-k] == touched[k:]).all(axis=1)] = k
     kept, at = [], 0
     while at < len(touched):
         kept.append(at)

@@ -175,7 +175,8 @@ def start_front(
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
         nodes, _ = boundary_nodes(loop, settings.length)
-        add_loop(front, surface, boundary.sites, nodes, lists.ACTIVE if active else lists.INACTIVE)
+        rim = np.array(add_nodes(front, surface, nodes), np.int64)
+        lists.add_chain(front, rim, lists.ACTIVE if active else lists.INACTIVE)
     add_lines(front, boundary, settings)
     for place in positions if positions is not None else ():
         length = settings.length * local_field(surface, place)
@@ -200,14 +201,6 @@ def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -
         front = grown(front)
     offer_nodes(front, surface, nodes, clear)
     return front
-
-
-def add_loop(front: lists.Front, surface: Surface, sites: Sites, nodes: np.ndarray, state: int) -> None:
-    """Add a closed loop of boundary nodes and segments."""
-    ids = add_nodes(front, surface, nodes)
-    segments = [lists.add_segment(front, ids[i], ids[(i + 1) % len(ids)], state) for i in range(len(ids))]
-    for i, s in enumerate(segments):
-        lists.link(front, s, segments[(i + 1) % len(ids)])
 
 
 def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> None:
@@ -247,9 +240,7 @@ def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[i
 def add_seed(front: lists.Front, ids: list[int]) -> None:
     """Add a seed triangle of three nodes, and the front around it."""
     lists.add_triangle(front, *ids)
-    segments = [lists.add_segment(front, ids[j], ids[i], lists.ACTIVE) for i, j in ((0, 1), (2, 0), (1, 2))]
-    for i, s in enumerate(segments):
-        lists.link(front, s, segments[(i + 1) % 3])
+    lists.add_chain(front, np.array([ids[1], ids[0], ids[2]]), lists.ACTIVE)
 
 
 def seed_of_rows(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:

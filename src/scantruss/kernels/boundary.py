@@ -36,10 +36,11 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 
 @kernel
-def _has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
-    """Whether the directions to the neighbours of a site leave a gap wider than `widest` [rad], less than a right angle; False without neighbours.
+def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
+    """Whether the directions to the neighbours of a site leave a gap wider than `widest` [rad]; False where there are none.
 
-    ahead (K, 3) is scratch: the directions in their order around the site, with numbers that grow as their angle does.
+    widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the site, each with a number that
+    grows as its angle does.
     """
     place, count = row(surface.mean, s), 0
     for k in range(surface.neighbors.shape[1]):
@@ -89,7 +90,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
         normal, place = row(surface.normals, s), row(surface.mean, s)
         u = across(normal)
         v = cross(normal, u)
-        if not _has_gap(surface, s, u, v, widest, ahead):
+        if not has_gap(surface, s, u, v, widest, ahead):
             continue
         blocked[:] = False
         radius = radii[s]

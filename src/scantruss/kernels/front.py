@@ -111,6 +111,16 @@ def link(front: Front, s: int, following: int) -> None:
 
 
 @kernel
+def add_chain(front: Front, nodes: np.ndarray, state: int) -> None:
+    """Add the segments of a closed chain of nodes (K,), linked."""
+    count, first = len(nodes), front.count[SEGMENTS]
+    for i in range(count):
+        add_segment(front, nodes[i], nodes[(i + 1) % count], state)
+    for i in range(count):
+        link(front, first + i, first + (i + 1) % count)
+
+
+@kernel
 def remove_segment(front: Front, s: int) -> None:
     """Take a segment out of the front."""
     front.state[s] = GONE

@@ -1,8 +1,8 @@
 """Sites: the scan at the scale of a member.
 
-A site stands for the points around it (greedy disc thinning in the order of the points, so that the result does not depend on
-how the boxes lie). Sites know their neighbours on the same sheet of the surface, which makes every later look-up safe against
-a second sheet nearby.
+A site stands for the points around it: greedy disc thinning in the order of the points, so that the result does not depend on how
+the boxes lie; then each point belongs to the site nearest to it. Sites know their neighbours on the same sheet of the surface, which
+makes every later look-up safe against a second sheet nearby.
 """
 
 from __future__ import annotations
@@ -15,47 +15,96 @@ from .vectors import dot, row, smallest_eigenvector, subtract
 
 
 @kernel
-def thin_points(
-    points: np.ndarray, radius: float, boxes: SearchBoxes, owner: np.ndarray, chosen: np.ndarray, begin: int, count: int
+def _site_within(
+    boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
+) -> int:
+    """A site of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
+    item = boxes.first[slot_of(boxes, i, j, k)]
+    while item >= 0:
+        dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
+        if dx * dx + dy * dy + dz * dz < square:
+            return item
+        item = boxes.next[item]
+    return -1
+
+
+@kernel
+def choose_sites(
+    points: np.ndarray,
+    radius: float,
+    boxes: SearchBoxes,
+    owner: np.ndarray,
+    chosen: np.ndarray,
+    places: np.ndarray,
+    begin: int,
+    count: int,
 ) -> tuple[int, int]:
     """Choose sites from points[begin:] so that every point has one within `radius`; sites keep that distance.
 
     Parameters
     ----------
     points : (N, 3) array
-    boxes : SearchBoxes of the sites, boxes not smaller than `radius`
-    owner : (N,) int64, filled with the site of each point
-    chosen : (capacity,) int64, filled with the point of each site
+    boxes : SearchBoxes of the sites, about as large as `radius`
+    owner : (N,) int64, filled with a site within the radius of each point
+    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each site and where it is
     begin, count : where to go on, and the sites so far
 
     Returns
     -------
     begin, count : begin < N where the table of boxes is half full or `chosen` is full
     """
-    used = 0
+    square = radius * radius
     for p in range(begin, len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        home = -1  # of several sites within reach the earliest, however the boxes lie
-        for i in range(box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius) + 1):
-            for j in range(box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius) + 1):
-                for k in range(box_index(boxes, 2, z - radius), box_index(boxes, 2, z + radius) + 1):
-                    item = boxes.first[slot_of(boxes, i, j, k)]
-                    while item >= 0:
-                        if home < 0 or item < home:
-                            q = chosen[item]
-                            dx, dy, dz = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
-                            if dx * dx + dy * dy + dz * dz < radius * radius:
-                                home = item
-                        item = boxes.next[item]
+        a, b, c = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
+        home = _site_within(boxes, places, a, b, c, x, y, z, square)  # most have one in their own box
+        if home < 0:
+            i0, i1 = box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius)
+            j0, j1 = box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius)
+            k0, k1 = box_index(boxes, 2, z - radius), box_index(boxes, 2, z + radius)
+            for i in range(i0, i1 + 1):
+                for j in range(j0, j1 + 1):
+                    for k in range(k0, k1 + 1):
+                        if home < 0 and (i != a or j != b or k != c):
+                            home = _site_within(boxes, places, i, j, k, x, y, z, square)
         if home < 0:
             if count == len(chosen) or 2 * (count + 1) > len(boxes.keys):
                 return p, count
             home = count
             chosen[count] = p
-            used += put(boxes, count, x, y, z)
+            places[count, 0], places[count, 1], places[count, 2] = x, y, z
+            put(boxes, count, x, y, z)
             count += 1
         owner[p] = home
     return len(points), count
+
+
+@kernel
+def settle_points(
+    points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, begin: int, end: int
+) -> None:
+    """Give each point from `begin` to `end` - 1 to the nearest site: from its own (N,) on over the links, as long as one is nearer.
+
+    Which site it had at first then makes no difference, and with it how the boxes lie.
+    """
+    for p in range(begin, end):
+        place, site = row(points, p), owner[p]
+        d = subtract(row(places, site), place)
+        least = dot(d, d)
+        while True:
+            to = site
+            for k in range(neighbors.shape[1]):
+                n = neighbors[site, k]
+                if n < 0:
+                    break
+                d = subtract(row(places, n), place)
+                dd = dot(d, d)
+                if dd < least or (dd == least and n < to):
+                    least, to = dd, n
+            if to == site:
+                break
+            site = to
+        owner[p] = site
 
 
 @kernel

@@ -23,6 +23,8 @@ from .field import Wish, length_field, wish_of
 from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
+CLOSE = 1.5  # size of the search boxes while sites are chosen, in their radii
+PART = 20_000  # fewest points for a thread of their own
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
@@ -199,11 +201,12 @@ def _prepare(
     if _is_rough(found, rough):
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
-        joined, chosen, boxes = _thin(settled, radius)
+        joined, chosen, mean, boxes = sites_of_points(settled, radius)
+        neighbors = _neighbors(mean, boxes, length, radius, spacing)
+        kernels.settle_points(settled, mean, neighbors, joined, 0, len(joined))
         grouped, start, _ = _group(points, joined[owner], len(chosen))
         measured = int((chosen < measured).sum())
-        mean = settled[chosen]
-        neighbors, normals, thickness = _link(mean, mean, boxes, length, radius, spacing)
+        normals, thickness = _normals(mean, neighbors)
     facing.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
     facing.cut_steep_links(mean, normals, neighbors, STEEP)
     weights = np.empty(neighbors.shape, np.uint16)  # few values are sorted faster
@@ -259,11 +262,13 @@ class _Linked(NamedTuple):
 
 def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
     """Return the sites of points for one thinning radius."""
-    owner, chosen, boxes = _thin(points, radius)
-    grouped, start, mean = _group(points, owner, len(chosen))
-    return _Linked(
-        owner, chosen, grouped, start, boxes, mean, *_link(points[chosen], mean, boxes, length, radius, spacing)
+    owner, chosen, places, boxes = sites_of_points(points, radius)
+    neighbors = _neighbors(places, boxes, length, radius, spacing)
+    in_parts(
+        len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)
     )
+    grouped, start, mean = _group(points, owner, len(chosen))
+    return _Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
 
 def _linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[_Linked, float] | None:
@@ -294,39 +299,49 @@ def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarra
     return grouped, start, mean
 
 
-def _link(
-    place: np.ndarray, mean: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the neighbours of each site, its normal (either sign) and the thickness of the points there."""
-    neighbors = np.full((len(mean), NEIGHBORS), -1, np.int64)
+def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:
+    """Return the neighbours of each site (S, 3) among the others."""
+    neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
     in_parts(
-        len(place), 3000, lambda _, begin, end: kernels.nearest_sites(place, boxes, near, far, neighbors, begin, end)
+        len(places), 3000, lambda _, begin, end: kernels.nearest_sites(places, boxes, near, far, neighbors, begin, end)
     )
-    kernels.link_back(place, neighbors)
+    kernels.link_back(places, neighbors)
+    return neighbors
+
+
+def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normal of each site (either sign) and the thickness of the points there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
         len(mean), 3000, lambda _, begin, end: facing.site_normals(mean, neighbors, normals, thickness, begin, end)
     )
-    return neighbors, normals, thickness
+    return normals, thickness
 
 
-def _thin(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, SearchBoxes]:
-    """Return the site of each point, the point of each site and the sites by box."""
+def sites_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
+    """Return a site within the radius of each point, the point of each site and where it is (S, 3), and the sites by box.
+
+    Sites are points that keep the radius: each that has no earlier site nearer.
+    """
     owner = np.full(len(points), -1, np.int64)
     lower, upper = bounds_of(points)
     capacity, begin, count = 1 << 14, 0, 0
-    chosen = np.full(capacity, -1, np.int64)
-    boxes = new_boxes(lower, upper, 4.0 * radius, capacity, capacity)
+    chosen, places = np.empty(capacity, np.int64), np.empty((capacity, 3))
     while True:
-        begin, count = kernels.thin_points(points, radius, boxes, owner, chosen, begin, count)
-        if begin == len(points):
-            return owner, chosen[:count].copy(), boxes
-        capacity *= 4
-        chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
-        boxes = new_boxes(lower, upper, 4.0 * radius, capacity, capacity)
+        boxes = new_boxes(lower, upper, CLOSE * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
+        begin, count = kernels.choose_sites(points, radius, boxes, owner, chosen, places, begin, count)
+        if begin == len(points):
+            break
+        chosen = np.concatenate([chosen[:count], np.empty(3 * capacity, np.int64)])
+        places = np.concatenate([places[:count], np.empty((3 * capacity, 3))])
+        capacity = len(chosen)
+    places, chosen = places[:count].copy(), chosen[:count].copy()
+    boxes = new_boxes(lower, upper, 4.0 * radius, count, count)
+    kernels.put_all(boxes, places, np.arange(count))
+    return owner, chosen, places, boxes
 
 
 def _number(piece: np.ndarray) -> np.ndarray:

@@ -10,7 +10,9 @@ from ..kernels import normals as facing
 from ..kernels import overlap as kernels_of_overlap
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
+from ..kernels.nearby import nearest_places
 from ..machine import in_parts
+from ..scan.sites import sites_of_points
 
 AROUND = 14  # neighbours of a place, for its normal
 FEWEST = 5  # neighbours below which a place is left out: it lies on no surface
@@ -70,19 +72,9 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
 
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return places (S, 3) that keep a spacing: means of the points nearest to the first of each neighbourhood."""
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    owner = np.full(len(points), -1, np.int64)
-    capacity, begin, count = 1 << 14, 0, 0
-    chosen = np.full(capacity, -1, np.int64)
-    boxes = new_boxes(lower, upper, 2.0 * spacing, capacity, capacity)
-    while True:
-        begin, count = kernels.thin_points(points, spacing, boxes, owner, chosen, begin, count)
-        if begin == len(points):
-            break
-        capacity *= 4
-        chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
-        boxes = new_boxes(lower, upper, 2.0 * spacing, capacity, capacity)
-        kernels.put_all(boxes, points, chosen[:count])
+    owner, chosen, sites, boxes = sites_of_points(points, spacing)
+    nearest_places(points, boxes, sites, spacing, owner)
+    count = len(chosen)
     mean = np.zeros((count, 3))
     start = np.zeros(count + 1, np.int64)
     kernels.group_points(points, owner, start, np.empty_like(points), np.empty(len(points), np.int64), mean)
