@@ -58,9 +58,15 @@ def pcd(fields: list[tuple[str, str, np.ndarray]], data: str, more: str = "") ->
     return head + struct.pack("<II", len(packed), len(raw)) + packed
 
 
-def las(points: np.ndarray, suffix: str = ".las", records: tuple[laspy.VLR, ...] = (), **fields: np.ndarray) -> bytes:
-    """Return a LAS 1.4 or LAZ file with attributes and variable length records."""
-    header = laspy.LasHeader(point_format=6, version="1.4")
+def las(
+    points: np.ndarray,
+    suffix: str = ".las",
+    records: tuple[laspy.VLR, ...] = (),
+    version: str = "1.4",
+    **fields: np.ndarray,
+) -> bytes:
+    """Return a LAS or LAZ file with attributes and variable length records."""
+    header = laspy.LasHeader(point_format=6 if version == "1.4" else 1, version=version)
     header.scales, header.offsets = [0.001] * 3, [0.0] * 3
     header.vlrs.extend(records)
     record = laspy.LasData(header)

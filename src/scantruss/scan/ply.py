@@ -32,11 +32,12 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     if "vertex" not in names:
         raise FormatError(f"{path} has no element vertex, so no points")
     vertex = header.elements[names.index("vertex")]
-    axes = [p.name for p in vertex.properties if not p.count_type]
-    if missing := [axis for axis in "xyz" if axis not in axes]:
+    own = [p.name for p in vertex.properties if not p.count_type]
+    lower = [name.lower() for name in own]
+    if missing := [axis for axis in "xyz" if axis not in lower]:
         raise FormatError(f"{path}: the element vertex has no property {missing[0]}")
-    found = find_attributes(axes, wanted)
-    columns = ("x", "y", "z", *(axes[place] for place in found.values()))
+    found = find_attributes(own, wanted)
+    columns = [own[place] for place in (*map(lower.index, "xyz"), *found.values())]
     if vertex.count == 0:
         table = np.empty((0, len(columns)))
     elif not header.order:

@@ -107,10 +107,12 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, left_out = choose(points, content.attributes, selection)
+    left_out = content.left_out | left_out
     held = "" if kept.any() else describe(points, content.attributes)
     if not kept.all():
         points = points[kept]
-    return Part(points, unit, content.system, len(kept), left_out, held, notes)
+    count = len(kept) + sum(content.left_out.values())
+    return Part(points, unit, content.system, count, left_out, held, notes)
 
 
 def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -156,8 +158,17 @@ def said_together(
 
 
 def said_of_left_out(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
-    """Return what should be said of the points that a selection has left out of the parts of a scan."""
-    return tuple(f"{sum(part[words] for part in parts):,} points {words} are left out" for words in parts[0])
+    """Return what should be said of the points that are left out of the parts of a scan."""
+    return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
+
+
+def add_counts(parts: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Return the sums of counts by their words."""
+    sums: dict[str, int] = {}
+    for part in parts:
+        for words, count in part.items():
+            sums[words] = sums.get(words, 0) + count
+    return sums
 
 
 def check_unit(unit: str) -> None:
@@ -185,8 +196,7 @@ def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
         return FormatError(
             f"{files[0]} holds no points" if len(files) == 1 else f"none of {len(files)} files holds points"
         )
-    left_out = {words: sum(part.left_out[words] for part in parts) for words in parts[0].left_out}
+    left_out = add_counts([part.left_out for part in parts])
     said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
-    return InputError(
-        f"no point of {name_of_files(files)} is left: of {count:,} points {said}; the scan has{parts[0].held}"
-    )
+    has = f"; the scan has{parts[0].held}" if parts[0].held else ""
+    return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {said}{has}")
