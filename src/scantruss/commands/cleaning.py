@@ -64,7 +64,7 @@ def clean(values: Namespace) -> None:
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.writers import write_points
-    from .gridding import lost_with, read_scan
+    from .gridding import read_scan, said_of_cloud_file
 
     out, report = _outputs(values)
     settings = settings_of(Namespace(**vars(values), length=1.0))
@@ -83,19 +83,23 @@ def clean(values: Namespace) -> None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [str(out), *([str(report)] if report else [])]
-    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *lost_with(out)])
+    said = said_of_cloud_file(out, result.unit)
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
 
 
 def _outputs(values: Namespace) -> tuple[Path, Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..export.files import check_place
+    from ..scan.paths import files_of
     from ..scan.writers import check_cloud_output
 
     out = check_cloud_output(values.out)
     report = check_place(values.report, (".json",)) if values.report else None
+    taken = {Path(name).resolve(): "polygon" for name in getattr(values, "crop", ())}
+    taken |= {file.resolve(): "scan" for file in files_of(values.scan)}
     for path, what in ((out, "clean cloud"), (report, "report")):
-        if path is not None and path.resolve() == Path(values.scan).resolve():
-            raise FormatError(f"the {what} {path} would overwrite the scan; name another file")
+        if path is not None and path.resolve() in taken:
+            raise FormatError(f"the {what} {path} would overwrite the {taken[path.resolve()]}; name another file")
     return out, report
 
 

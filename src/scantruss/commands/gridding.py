@@ -178,11 +178,16 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def lost_with(out: Path) -> list[str]:
-    """What to say of a cloud that is written: a LAS file has places for more than is kept."""
-    if out.suffix.lower() not in (".las", ".laz"):
-        return []
-    return ["classes, returns and colours are not kept; --class and --returns choose before"]
+def said_of_cloud_file(out: Path, unit: str) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes."""
+    suffix = out.suffix.lower()
+    if suffix in (".las", ".laz"):
+        return ["classes, returns, colours and reference system are not kept; --class and --returns choose before"]
+    if suffix == ".e57" and not unit:
+        return [
+            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
+        ]
+    return []
 
 
 def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
@@ -294,7 +299,18 @@ def print_solid(values: Namespace) -> None:
         )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
-    print_lines([*solid.notes, f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+    print_lines([*solid.notes, *said_of_model(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+
+
+def said_of_model(out: Path, unit: str) -> list[str]:
+    """What to say of the unit that a printer will take a model for."""
+    if out.suffix.lower() == ".stl" and unit != "mm":
+        return [
+            f"STL holds no unit and printers take it for mm; its numbers are {unit or 'of a unit that is not known'}"
+        ]
+    if not unit:
+        return ["the unit of the grid is not known, so the model says mm; scantruss grid --unit says it"]
+    return []
 
 
 def demo_parser() -> Parser:

@@ -60,7 +60,7 @@ def thin(values: Namespace) -> None:
     from ..scan.streaming import thin_open_scan
     from ..scan.thin import check_spacing
     from ..scan.writers import check_cloud_output, write_points
-    from .gridding import lost_with
+    from .gridding import said_of_cloud_file
 
     check_spacing(values.spacing)
     out = check_cloud_output(values.out)
@@ -85,7 +85,8 @@ def thin(values: Namespace) -> None:
         with SaveTogether() as save:
             write_points(save.beside(out), result.points, unit=result.unit)
     rim = f", {result.rim:,} of them along the rim" if values.rim else ""
-    print_lines([f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}", *lost_with(out)])
+    told = f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"
+    print_lines([told, *said_of_cloud_file(out, result.unit)])
 
 
 def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
