@@ -106,6 +106,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     from ..scan.readers import read_points
     from ..splice import splice_scans
     from ..splice.pose_file import read_poses
+    from .gridding import note_compiling
 
     poses = read_poses(values.poses) if values.poses else {}
     unknown = sorted(name for name in poses if name not in names and Path(name).name not in names)
@@ -120,7 +121,8 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
         if cloud.dropped:
             bars.note(f"{name}: {cloud.dropped} points with NaN or infinite coordinates are left out")
         clouds.append(cloud)
-    result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
+    with note_compiling(bars):
+        result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
     reasons = [
         f"{name} {'fits in more ways than one' if name in result.doubtful else 'fits nowhere'}"
         for name in result.left_out
