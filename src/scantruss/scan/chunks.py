@@ -12,13 +12,12 @@ import numpy as np
 
 from ..errors import FormatError
 from ..selection import Selection
-from .choose import check_attributes, choose, describe
 from .content import Content, find_attributes
 from .kinds import unreadable
 from .las import check_count, fields_of, take
 from .layout import Layout, is_number, number_of, split_line
 from .lines import LARGE, read_block
-from .units import to_common_unit
+from .readers import read_content, select
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -88,18 +87,10 @@ def read_chunks(
 
 
 def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
-    """Return what is selected of some points, in the unit of the scan; as `readers.read_part` does with all of them."""
-    selection = reading.selection
-    check_attributes(path, content.attributes, selection)
-    points, _, _ = to_common_unit(path, content, reading.unit, selection.z_unit, reading.common)
-    kept, left_out = choose(points, content.attributes, selection)
-    left_out = content.left_out | left_out
-    some = {name: values[:SAMPLE] for name, values in content.attributes.items()}
-    held = "" if kept.any() else describe(points[:SAMPLE], some)
-    if not kept.all():
-        points = points[kept]
-    read = len(kept) + sum(content.left_out.values())
-    return Chunk(np.ascontiguousarray(points, np.float64), read, left_out, content.notes, held)
+    """Return what is selected of some points, in the unit of the scan."""
+    part = select(path, content, reading.unit, reading.selection, reading.common, SAMPLE)
+    points = np.ascontiguousarray(part.points, np.float64)
+    return Chunk(points, part.count, part.left_out, content.notes, part.held)
 
 
 def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
@@ -158,8 +149,6 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
 
 
 def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
-    from .readers import read_content
-
     source = tile.source
     content = read_content(source.path, wanted)
     if content.metres != source.metres:

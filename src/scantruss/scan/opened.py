@@ -12,9 +12,9 @@ from .content import Content
 from .las import note_on_heights
 from .paths import Source as Names
 from .paths import files_of
-from .readers import check_systems, check_unit, said_together
+from .readers import check_systems, said_together
 from .tiles import Source, find_source
-from .units import to_common_unit
+from .units import check_unit, to_common_unit
 
 
 class OpenScan(NamedTuple):

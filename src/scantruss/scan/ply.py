@@ -5,7 +5,6 @@ An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 from ..errors import FormatError
 from .content import Content, find_attributes
 from .kinds import read_head, wrong_kind
-from .ply_header import Element, Header, ends_early, read_header
+from .ply_header import PLY, Element, Header, ends_early, read_header
 from .ply_text import read_ascii
 from .units import metres_of
 
@@ -25,7 +24,7 @@ MOST_RUNS = 20_000  # changes of list length walked through behind the points
 def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     """Return the points of a PLY file and the wanted attributes."""
     head = read_head(path)
-    if not re.match(rb"ply[ \t]*[\r\n]", head):
+    if not PLY.match(head):
         raise wrong_kind(path, head, "a PLY file")
     header = read_header(path)
     names = [element.name for element in header.elements]

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..errors import FormatError, InputError
 from ..selection import Selection
-from ..settings import UNITS
 from .arrays import read_npy, read_npz
 from .choose import check_attributes, choose, describe
 from .cloud import PointCloud
@@ -26,7 +25,7 @@ from .pcd import read_pcd
 from .ply import read_ply
 from .solids import read_obj, read_off, read_stl
 from .text import read_text
-from .units import to_common_unit
+from .units import check_unit, to_common_unit
 
 Reader = Callable[[Path, Sequence[str]], Content]
 
@@ -103,16 +102,22 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
-    content = read_content(path, selection.needs)
+    return select(path, read_content(path, selection.needs), unit, selection, common)
+
+
+def select(
+    path: Path, content: Content, unit: str, selection: Selection, common: str = "", described: int | None = None
+) -> Part:
+    """Return what is selected of some points of a file; where nothing is, so many of them are described, or all."""
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
-    kept, left_out = choose(points, content.attributes, selection)
-    left_out = content.left_out | left_out
-    held = "" if kept.any() else describe(points, content.attributes)
+    kept, chosen = choose(points, content.attributes, selection)
+    some = {name: values[:described] for name, values in content.attributes.items()}
+    held = "" if kept.any() else describe(points[:described], some)
     if not kept.all():
         points = points[kept]
     count = len(kept) + sum(content.left_out.values())
-    return Part(points, unit, content.system, count, left_out, held, notes)
+    return Part(points, unit, content.system, count, content.left_out | chosen, held, notes)
 
 
 def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -169,12 +174,6 @@ def add_counts(parts: Sequence[Mapping[str, int]]) -> dict[str, int]:
         for words, count in part.items():
             sums[words] = sums.get(words, 0) + count
     return sums
-
-
-def check_unit(unit: str) -> None:
-    """Refuse a unit that is not known."""
-    if unit not in UNITS:
-        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
 
 
 def check_systems(files: Sequence[Path], systems: Sequence[str]) -> None:

@@ -6,7 +6,6 @@ a COPC file is one tile too, but read a million points at a time.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +23,7 @@ from .packed import unpacked
 from .parquet import metres_of_parquet
 from .pcd import read_pcd_header
 from .ply import row_type
-from .ply_header import read_header
+from .ply_header import PLY, read_header
 from .readers import PACKED, READERS
 from .systems import system_of
 from .units import metres_of
@@ -32,7 +31,6 @@ from .units import metres_of
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
-PLY = re.compile(rb"ply[ \t]*[\r\n]")
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 

@@ -20,6 +20,12 @@ _IN_NAME = re.compile(rf"[(\[<]\s*({_NAMES}|in)\s*[)\]>]$|[\s_]({_NAMES})$", re.
 _WORDS = {"feet": "foot", "ft": "foot", "in": "inch", "inches": "inch"}
 
 
+def check_unit(unit: str) -> None:
+    """Refuse a unit that is not known."""
+    if unit not in UNITS:
+        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+
+
 def metres_of(word: str) -> float | None:
     """Return the metres of a word for a unit; None for "" and where it is not known."""
     word = word.lower()
