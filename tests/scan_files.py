@@ -11,6 +11,7 @@ from pathlib import Path
 import laspy
 import lzf
 import numpy as np
+from copc_file import copc
 from numpy.lib import recfunctions
 
 from scantruss.scan.e57_writer import Column, write_scans
@@ -58,9 +59,15 @@ def pcd(fields: list[tuple[str, str, np.ndarray]], data: str, more: str = "") ->
     return head + struct.pack("<II", len(packed), len(raw)) + packed
 
 
-def las(points: np.ndarray, suffix: str = ".las", records: tuple[laspy.VLR, ...] = (), **fields: np.ndarray) -> bytes:
-    """Return a LAS 1.4 or LAZ file with attributes and variable length records."""
-    header = laspy.LasHeader(point_format=6, version="1.4")
+def las(
+    points: np.ndarray,
+    suffix: str = ".las",
+    records: tuple[laspy.VLR, ...] = (),
+    version: str = "1.4",
+    **fields: np.ndarray,
+) -> bytes:
+    """Return a LAS or LAZ file with attributes and variable length records."""
+    header = laspy.LasHeader(point_format=6 if version == "1.4" else 1, version=version)
     header.scales, header.offsets = [0.001] * 3, [0.0] * 3
     header.vlrs.extend(records)
     record = laspy.LasData(header)
@@ -130,7 +137,7 @@ def whole_files() -> dict[str, bytes]:
     rows = recfunctions.unstructured_to_structured(p, np.dtype([(a, "f8") for a in "xyz"]))
     files = {f"own{suffix}": written(suffix, p) for suffix in (".ply", ".laz", ".npz", ".e57", ".pcd", ".csv")}
     files |= {
-        "a.ply": ply_ascii(p), "a.las": las(p), "a.laz": las(p, ".laz"),
+        "a.ply": ply_ascii(p), "a.las": las(p), "a.laz": las(p, ".laz"), "a.copc.laz": copc(p)[0],
         "a.xyz": text(p), "a.txt": text(p, "# x y z\n"), "a.asc": text(p, "", "\t"), "a.csv": text(p, "X;Y;Z\n", ";"),
         "a.pts": text(p, f"{len(p)}\n"), "a.xyz.gz": gzip.compress(text(p), mtime=0),
         "a.pcd": pcd(three, "ascii"), "b.pcd": pcd(three, "binary"),

@@ -177,10 +177,12 @@ def test_a_line_says_that_a_long_compile_is_about_to_come_and_only_then(tmp_path
             (tmp_path / name).write_bytes(b"")
         for stage in stages:
             bars = Notes()
-            note_compiling(bars, "default", stage)
+            with note_compiling(bars, "default", stage):
+                pass
             assert bool(bars.lines) == (stage in compiles)
         bars = Notes()
-        note_compiling(bars, "default", *stages)
+        with note_compiling(bars, "default", *stages):
+            pass
         assert bool(bars.lines) == bool(compiles)
     assert not ahead.are_compiled("paper", "front") and not ahead.are_compiled("paper", "optimize")
 
@@ -189,5 +191,32 @@ def test_a_line_says_that_a_long_compile_is_about_to_come_and_only_then(tmp_path
 def test_where_nothing_can_be_stored_every_run_compiles(monkeypatch):
     monkeypatch.setattr(compiling, "FOLDER", None)
     bars = Notes()
-    note_compiling(bars, "default", "boundary")
+    with note_compiling(bars, "default", "boundary"):
+        pass
     assert bars.lines == ["compiling kernels"] and not ahead.can_be_stored()
+
+
+@needs_jit
+def test_the_first_kernel_that_is_not_stored_is_told_of_once_and_a_stored_one_never(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiling, "FOLDER", tmp_path)
+
+    def fresh():
+        @compiling.kernel
+        def twice(x):
+            return 2.0 * x
+
+        @compiling.kernel
+        def thrice(x):
+            return 3.0 * x
+
+        return twice, thrice
+
+    for lines in (["compiling kernels, once on this machine"], []):
+        bars = Notes()
+        with note_compiling(bars):
+            assert [kernel(4.0) for kernel in fresh()] == [8.0, 12.0]
+        assert bars.lines == lines
+    with note_compiling(bars):
+        pass
+    fresh()[0](1)  # for another type, and when nobody listens any more
+    assert bars.lines == []

@@ -1,6 +1,7 @@
 """Each step of cleaning does what it says on twins of which the truth is known, and nothing where there is nothing to do."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -244,6 +245,28 @@ def test_the_command_refuses_before_it_reads(tmp_path, capsys):
         assert main(["clean", str(scan), *words]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [scan]
+
+
+def test_the_command_overwrites_no_file_of_the_scan_and_no_polygon(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    points = make("scallop", 500).points
+    for name in ("a.xyz", "b.xyz"):
+        np.savetxt(name, points)
+    Path("ring.csv").write_text("-99,-99\n99,-99\n99,99\n-99,99\n")
+    held = {path: path.read_bytes() for path in Path().iterdir()}
+    for words in (["b.xyz"], ["ring.csv", "--crop", "ring.csv"]):
+        assert main(["clean", "*.xyz", *words]) == 2
+        assert f"{words[0]} would overwrite the" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in Path().iterdir()} == held
+
+
+def test_an_e57_file_of_an_unknown_unit_is_said_to_be_in_metres(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("a.xyz", make("scallop", 2000).points)
+    for command in (["clean", "a.xyz", "o.e57"], ["thin", "a.xyz", "-o", "o.e57", "--spacing", "1"]):
+        for words, said in ((["--unit", "mm"], False), ([], True)):
+            assert main([*command, *words]) == 0
+            assert ("its numbers are written as metres" in capsys.readouterr().out) == said
 
 
 def test_repeats_are_left_out_of_a_grid_where_there_are_many():

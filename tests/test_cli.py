@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.cli import main
 from scantruss.commands import gridding
-from scantruss.errors import FrontError
+from scantruss.errors import FrontError, words_of_place
+from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
 from scantruss.options import option_of
 from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
@@ -417,6 +418,28 @@ def test_print_makes_a_watertight_solid_of_a_saved_grid(ready, capsys):
             capsys, "print", "a.json", "b.stl", "--member-diameter", word, "--node-diameter", "1"
         )
         assert "scale" in refused(capsys, "print", "a.json", "b.stl", *sizes, "--scale", word)
+
+
+@pytest.mark.parametrize(
+    ("unit", "name", "words"),
+    [
+        ("", "a.3mf", "the unit of the grid is not known, so the model says mm"),
+        ("", "a.stl", "STL holds no unit and printers take it for mm; its numbers are of a unit that is not known"),
+        ("m", "a.stl", "STL holds no unit and printers take it for mm; its numbers are m"),
+        ("m", "a.3mf", ""),
+        ("mm", "a.stl", ""),
+    ],
+)
+def test_print_says_which_unit_a_printer_will_assume(place, capsys, unit, name, words):
+    write(replace(hexagon(), unit=unit), "a.json")
+    assert main(["print", "a.json", name, "--member-diameter", "0.1", "--node-diameter", "0.2"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == (2 if words else 1) and said[0].startswith(words)
+
+
+def test_places_of_national_grids_are_told_to_a_thousandth():
+    assert words_of_place((500052.25, 5400012.3456, 299.0621)) == "500052.25, 5400012.346, 299.062"
+    assert words_of_place((0.00012345678, -12.5, -1000.0)) == "0.000123457, -12.5, -1000"
 
 
 def test_the_demo_makes_all_of_it(tmp_path, capsys):

@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scan_files import MOVED, TURN, TURNED, axes, e57, pcd, plate
 
-from scantruss.errors import FormatError
+from scantruss.errors import FormatError, InputError
 from scantruss.scan.e57 import e57_scans, read_e57
 from scantruss.scan.e57_writer import Column
 from scantruss.scan.pcd import read_pcd
 from scantruss.scan.readers import read_points
+from scantruss.selection import Selection
 
 P = plate()
 STATE = np.where(np.arange(len(P)) % 10 == 0, 2, 0).astype(float)
@@ -53,6 +54,11 @@ def test_pcd_points_without_a_place_are_dropped_and_counted(tmp_path: Path, data
     assert cloud.dropped == len(P[::7]) and len(cloud.points) == len(P) - cloud.dropped
 
 
+def test_pcd_with_comments_and_empty_lines_first(tmp_path: Path) -> None:
+    data = pcd(list(zip("xyz", ["f8"] * 3, P.T, strict=True)), "binary")
+    assert np.array_equal(content(tmp_path, "a.pcd", b"# made by hand\n\n# twice\n" + data.split(b"\n", 1)[1]), P)
+
+
 def test_pcd_with_old_header_and_unit(tmp_path: Path) -> None:
     rows = "\n".join(" ".join(map(repr, row)) for row in P.tolist())
     head = f"# unit: mm\nCOLUMNS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 10\nHEIGHT {len(P) // 10}\nDATA ascii\n"
@@ -89,6 +95,39 @@ def test_e57_leaves_invalid_points_out_and_says_so(tmp_path: Path) -> None:
     path.write_bytes(e57(([*axes(P), state], "")))
     assert np.array_equal(read_e57(path).points, P[STATE == 0])
     assert read_points(path).notes == ("12 points that the scanner marked as invalid are left out",)
+
+
+def test_e57_returns_and_classes_of_an_extension_select(tmp_path: Path) -> None:
+    """The format counts the returns of a pulse from 0."""
+    path = tmp_path / "a.e57"
+    index, kind = np.arange(len(P)) % 3, np.arange(len(P)) % 5
+    count = np.maximum(index + 1, 2)
+    fields = [
+        Column("returnIndex", index, "integer", low=0, high=7), Column("returnCount", count, "integer", low=0, high=7),
+        Column("maker:classification", kind, "integer", low=0, high=31),
+        Column("cartesianInvalidState", STATE, "integer", low=0, high=2),
+    ]  # fmt: skip
+    path.write_bytes(e57(([*axes(P), *fields], TURN), ([*fields, *axes(P)], "")))
+    for selection, chosen in (
+        (Selection(returns="first"), index == 0),
+        (Selection(returns="3"), index == 2),
+        (Selection(returns="last"), index + 1 == count),
+        (Selection(classes=(4,)), kind == 4),
+    ):
+        taken = P[chosen & (STATE == 0)]
+        cloud = read_points(path, selection=selection)
+        assert np.allclose(cloud.points + cloud.origin, [*(taken @ TURNED.T + MOVED), *taken], rtol=0, atol=1e-9)
+        assert cloud.notes[0] == "24 points that the scanner marked as invalid are left out"
+    path.write_bytes(e57(([*axes(P), *fields], ""), (axes(P), "")))
+    with pytest.raises(InputError, match="has no returns"):
+        read_points(path, selection=Selection(returns="last"))
+
+
+def test_e57_with_invalid_points_alone_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.e57"
+    path.write_bytes(e57(([*axes(P), Column("cartesianInvalidState", P[:, 0] * 0 + 1, "integer", low=0, high=2)], "")))
+    with pytest.raises(InputError, match="of 120 points 120 that the scanner marked as invalid"):
+        read_points(path)
 
 
 def test_e57_spherical_constant_and_unknown_fields(tmp_path: Path) -> None:

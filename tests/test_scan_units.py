@@ -15,6 +15,7 @@ from scantruss.errors import FormatError, InputError
 from scantruss.scan.heights import look_like_feet
 from scantruss.scan.paths import files_of
 from scantruss.scan.readers import read_points
+from scantruss.scan.streaming import thin_scan
 from scantruss.scan.systems import from_wkt
 from scantruss.selection import Selection
 
@@ -152,6 +153,41 @@ def test_ply_says_its_unit_in_a_comment(tmp_path: Path, comment: str) -> None:
     assert read_points(path).unit == "mm"
     path.write_bytes(written(".ply", P).replace(b"comment unit m", b"comment a unit mess"))
     assert read_points(path).unit == ""
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "ratio"),
+    [
+        ("X [mm],Y [mm],Z [mm]", "mm", 1), ("z_m,x_m,y_m", "m", 1), ("E (ft),N (ft),H (ft)", "foot", 1),
+        ('"x[inch]","y[inch]","z"', "inch", 1), ("x (m),y (m),z (ft)", "m", 0.3048), ("x [cm],y [cm],z [m]", "cm", 100),
+        ("# unit: mm\nx,y,z", "mm", 1), ("// Units: cm\nx,y,z", "cm", 1), ("# units of time: s\nx,y,z", "", 1),
+        ("x (m),y (ft),z (ft)", "", 1), ("x,y,z", "", 1), ("x_in,y_in,z_in", "", 1), ("x,y,z [mm]", "", 1),
+    ],
+)  # fmt: skip
+def test_text_says_its_unit_in_its_header(tmp_path: Path, header: str, unit: str, ratio: float) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(text(P, f"{header}\n", ","))
+    cloud = read_points(path)
+    order = [1, 2, 0] if header.startswith("z") else [0, 1, 2]
+    expected = P[:, order] * [1, 1, ratio]
+    assert cloud.unit == unit and np.allclose(cloud.points + cloud.origin, expected, rtol=0, atol=1e-9)
+    assert bool(cloud.notes) == (ratio != 1)
+    thinned = thin_scan(path, 1e-5)
+    assert (thinned.unit, thinned.notes, len(thinned.points)) == (unit, cloud.notes, len(P))
+    assert read_points(path, unit="foot").unit == "foot"
+    path.write_bytes(text(P, f"{header}\n", ",").decode().encode("utf-16"))
+    assert read_points(path).unit == thin_scan(path, 1e-5).unit == unit
+
+
+def test_parquet_says_its_unit_in_its_columns(tmp_path: Path) -> None:
+    arrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "a.parquet"
+    parquet.write_table(arrow.table({"z (ft)": P[:, 2], "x (m)": P[:, 0], "y (m)": P[:, 1]}), path)
+    cloud = read_points(path)
+    assert cloud.unit == thin_scan(path, 1e-5).unit == "m"
+    assert np.allclose(cloud.points + cloud.origin, P * [1, 1, 0.3048], rtol=0, atol=1e-9)
 
 
 def woods(foot: float) -> tuple[np.ndarray, np.ndarray]:

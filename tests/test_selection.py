@@ -16,6 +16,7 @@ from scantruss.errors import FormatError, InputError
 from scantruss.options import Parser, add_reading, selection_of
 from scantruss.scan.choose import in_polygon
 from scantruss.scan.readers import read_points
+from scantruss.scan.streaming import thin_scan
 from scantruss.selection import Selection, polygon_text, read_crop
 from scantruss.settings import Settings
 
@@ -101,6 +102,25 @@ def test_all_at_once_and_nothing_left(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=words):
             read_points(tmp_path / "a.xyz", selection=selection)
+
+
+@pytest.mark.parametrize("version", ["1.2", "1.4"])
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_what_a_las_file_calls_deleted_is_left_out(tmp_path: Path, version: str, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    withheld = CHANCE.random(len(P)) < 0.2
+    path.write_bytes(las(P, suffix, version=version, classification=CLASS, withheld=withheld.astype("u1")))
+    for classes in ((), (6,)):
+        expected = P[~withheld & np.isin(CLASS, classes or CLASS)]
+        cloud = read_points(path, selection=Selection(classes=classes))
+        assert np.allclose(cloud.points + cloud.origin, expected, rtol=0, atol=1e-9)
+        assert cloud.notes[0] == f"{withheld.sum()} points marked as withheld are left out"
+        thinned = thin_scan(path, 1e-5, selection=Selection(classes=classes))
+        assert len(thinned.points) == len(expected) and thinned.notes == cloud.notes
+    path.write_bytes(las(P, suffix, version=version, withheld=np.ones(len(P), "u1")))
+    for read in (read_points, lambda path: thin_scan(path, 1.0)):
+        with pytest.raises(InputError, match=r"no point of a.la. is left: of 600 points 600 marked as withheld$"):
+            read(path)
 
 
 def inside(x: float, y: float, ring: list[tuple[float, float]]) -> bool:

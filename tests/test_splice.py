@@ -261,7 +261,7 @@ def test_the_command_writes_the_whole_and_the_poses(place, capsys):
         (["a.xyz", "-o", "out.ply"], "at least 2 scans"),
         (["a.xyz", "a.xyz", "-o", "out.ply"], "given twice"),
         (["a.xyz", "none.xyz", "-o", "out.ply"], "none.xyz"),
-        (["none*.xyz", "a.xyz", "-o", "out.ply"], "no file matches"),
+        (["none*.xyz", "a.xyz", "-o", "out.ply"], "no file fits"),
         (["a.xyz", "b.xyz", "-o", "out.abc"], "abc"),
         (["a.xyz", "b.xyz", "-o", "nowhere/out.ply"], "nowhere"),
         (["a.xyz", "b.xyz", "-o", "a.xyz"], "overwrite"),

@@ -179,7 +179,7 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_
     assert found.tobytes() == wanted.tobytes() and np.array_equal(found[:, 3], CLASS)
 
 
-FEW = ("columns.csv", "long-line.xyz")  # have points, but too few for a grid
+FEW = ("long-line.xyz",)  # has points, but too few for a grid
 
 
 def test_count_lines_of_several_scans_in_a_text_are_kept():

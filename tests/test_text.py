@@ -46,6 +46,20 @@ def rows(separator: str, before: int = 0, after: int = 0, form: str = "%.3f") ->
     return lines
 
 
+@pytest.mark.parametrize(
+    "line", ["{0:,.3f};{1:,.3f};{2:,.3f}", '"{0:,.3f}","{1:,.3f}","{2:,.3f}"', "{0:,.3f}  {1:,.3f}  {2:,.3f}"]
+)
+@pytest.mark.parametrize("german", [False, True])
+def test_a_sign_between_thousands_does_not_make_other_points(line: str, german: bool) -> None:
+    lines = [
+        line.format(*point).translate(str.maketrans(".,", ",.")) if german else line.format(*point) for point in POINTS
+    ]
+    if german:
+        lines = [row.replace('"."', '","') for row in lines]
+    with pytest.raises(FormatError, match="a sign between thousands"):
+        read("\n".join(lines))
+
+
 @given(
     separator=st.sampled_from(sorted(SEPARATORS)),
     comma=st.booleans(),

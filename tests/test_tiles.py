@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from copc_file import copc
 
 import scantruss as st
 from scantruss.errors import FormatError
@@ -61,9 +62,14 @@ def write_text(path, points, head="", sign=" ", form="%.3f", numbered=False, end
     path.write_bytes((head + end.join(text) + end).encode())
 
 
+def write_copc(path, points):
+    path.write_bytes(copc(points)[0])
+
+
 WAYS = {
     "las": ("scan.las", write_las),
     "laz": ("scan.laz", write_las),
+    "copc": ("scan.copc.laz", write_copc),
     "laz 6": ("scan.laz", lambda path, points: write_las(path, points, 6)),
     "ply": ("scan.ply", write_ply),
     "ply big": ("scan.ply", lambda path, points: write_ply(path, points, ">", ">f4")),

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from types import FrameType
 
 from . import __version__
-from .errors import CertificateError, FrontError, InputError, ScanTrussError
+from .errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
 
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return refuse("interrupted; nothing was written", 130)
     except FrontError as error:
-        place = "" if error.where is None else f" (near {', '.join(f'{c:.6g}' for c in error.where)})"
+        place = "" if error.where is None else f" (near {words_of_place(error.where)})"
         return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)
     except ScanTrussError as error:
         return refuse(str(error))

@@ -11,6 +11,7 @@ A message says what was got, what is needed and what to do, in one line.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -37,6 +38,11 @@ class FrontError(ScanTrussError):
         super().__init__(message)
         self.grid = grid
         self.where = where
+
+
+def words_of_place(where: Iterable[float]) -> str:
+    """Return the coordinates of a place for a message: national-grid ones too to a thousandth."""
+    return ", ".join(f"{c:.6g}" if abs(c) < 1000.0 else f"{c:.3f}".rstrip("0").rstrip(".") for c in where)
 
 
 class CertificateError(FrontError):

@@ -59,23 +59,21 @@ def clean_parser() -> Parser:
 
 def clean(values: Namespace) -> None:
     """Clean a scan and save it."""
-    from ..ahead import can_be_stored
     from ..options import settings_of
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.writers import write_points
-    from .gridding import lost_with, read_scan
+    from .gridding import note_compiling, read_scan, said_of_cloud_file
 
     out, report = _outputs(values)
     settings = settings_of(Namespace(**vars(values), length=1.0))
     steps = _steps(values)
     with Bars() as bars:
         cloud = read_scan(values.scan, settings, bars)
-        if not _compiled():
-            bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
         from ..clean import clean_points
 
-        result = clean_points(cloud, **steps, progress=bars)
+        with note_compiling(bars):
+            result = clean_points(cloud, **steps, progress=bars)
     with SaveTogether() as save:
         points = result.points + result.origin
         write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
@@ -83,19 +81,23 @@ def clean(values: Namespace) -> None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [str(out), *([str(report)] if report else [])]
-    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *lost_with(out)])
+    said = said_of_cloud_file(out, result.unit)
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
 
 
 def _outputs(values: Namespace) -> tuple[Path, Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..export.files import check_place
+    from ..scan.paths import files_of
     from ..scan.writers import check_cloud_output
 
     out = check_cloud_output(values.out)
     report = check_place(values.report, (".json",)) if values.report else None
+    taken = {Path(name).resolve(): "polygon" for name in getattr(values, "crop", ())}
+    taken |= {file.resolve(): "scan" for file in files_of(values.scan)}
     for path, what in ((out, "clean cloud"), (report, "report")):
-        if path is not None and path.resolve() == Path(values.scan).resolve():
-            raise FormatError(f"the {what} {path} would overwrite the scan; name another file")
+        if path is not None and path.resolve() in taken:
+            raise FormatError(f"the {what} {path} would overwrite the {taken[path.resolve()]}; name another file")
     return out, report
 
 
@@ -115,14 +117,6 @@ def _steps(values: Namespace) -> dict[str, Any]:
     if values.spacing is not None and not 0 < values.spacing < float("inf"):
         raise InputError(f"--spacing must be a positive length in the scan's unit, got {values.spacing:g}")
     return steps
-
-
-def _compiled() -> bool:
-    """Whether the kernels are stored: those that take long are looked for."""
-    from ..kernels import facing, noise, strays
-    from ..kernels.compile import is_compiled
-
-    return is_compiled(noise.fit_patches, strays.stand_off, facing.turn_like_beside)
 
 
 def report_of(result: CleanCloud, points: int) -> dict[str, Any]:

@@ -6,7 +6,8 @@ Outputs and settings are checked before anything is read; everything heavy is im
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -51,10 +52,10 @@ def info(values: Namespace) -> None:
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))
         check_length(cloud, settings)
-        note_compiling(bars, settings.method, "boundary")
-        from ..boundary import find_boundary
+        with note_compiling(bars, settings.method, "boundary"):
+            from ..boundary import find_boundary
 
-        boundary = find_boundary(cloud, settings, progress=bars)
+            boundary = find_boundary(cloud, settings, progress=bars)
         note_strays(bars, cloud, settings)
     field = boundary.sites.surface.field
     longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
@@ -178,11 +179,16 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def lost_with(out: Path) -> list[str]:
-    """What to say of a cloud that is written: a LAS file has places for more than is kept."""
-    if out.suffix.lower() not in (".las", ".laz"):
-        return []
-    return ["classes, returns and colours are not kept; --class and --returns choose before"]
+def said_of_cloud_file(out: Path, unit: str) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes."""
+    suffix = out.suffix.lower()
+    if suffix in (".las", ".laz"):
+        return ["classes, returns, colours and reference system are not kept; --class and --returns choose before"]
+    if suffix == ".e57" and not unit:
+        return [
+            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
+        ]
+    return []
 
 
 def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
@@ -197,7 +203,8 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     """Read a scan that is thinned while it is read, and say so."""
     from ..scan.fit import read_thinned
 
-    cloud, read = read_thinned(path, settings, bars)
+    with note_compiling(bars):
+        cloud, read = read_thinned(path, settings, bars)
     unit = f" {cloud.unit}" if cloud.unit else ""
     bars.note(
         f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
@@ -214,8 +221,8 @@ def make_grid(
     from ..pipeline import check_length, grid_from_cloud
 
     check_length(cloud, settings)
-    note_compiling(bars, settings.method, "boundary", "front", "optimize")
-    with CompileAhead(settings.method, bars) as progress:
+    said = note_compiling(bars, settings.method, "boundary", "front", "optimize")
+    with said, CompileAhead(settings.method, bars) as progress:
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=read_seconds)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
@@ -236,12 +243,21 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
 
 
-def note_compiling(bars: Bars, method: str, *stages: str) -> None:
-    """Say so where the kernels of some stages must be compiled, which takes long."""
+@contextmanager
+def note_compiling(bars: Bars, method: str = "default", *stages: str) -> Iterator[None]:
+    """Say so, once, where kernels must be compiled, which takes long: at the start where the stages are known to need it."""
     from ..ahead import are_compiled, can_be_stored
+    from ..kernels.compile import tell_of_compiling
 
-    if not are_compiled(method, *stages):
+    def tell() -> None:
         bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
+
+    if are_compiled(method, *stages):
+        with tell_of_compiling(tell):
+            yield
+    else:
+        tell()
+        yield
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
@@ -294,7 +310,18 @@ def print_solid(values: Namespace) -> None:
         )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
-    print_lines([*solid.notes, f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+    print_lines([*solid.notes, *said_of_model(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+
+
+def said_of_model(out: Path, unit: str) -> list[str]:
+    """What to say of the unit that a printer will take a model for."""
+    if out.suffix.lower() == ".stl" and unit != "mm":
+        return [
+            f"STL holds no unit and printers take it for mm; its numbers are {unit or 'of a unit that is not known'}"
+        ]
+    if not unit:
+        return ["the unit of the grid is not known, so the model says mm; scantruss grid --unit says it"]
+    return []
 
 
 def demo_parser() -> Parser:

@@ -60,7 +60,7 @@ def thin(values: Namespace) -> None:
     from ..scan.streaming import thin_open_scan
     from ..scan.thin import check_spacing
     from ..scan.writers import check_cloud_output, write_points
-    from .gridding import lost_with
+    from .gridding import note_compiling, said_of_cloud_file
 
     check_spacing(values.spacing)
     out = check_cloud_output(values.out)
@@ -76,7 +76,10 @@ def thin(values: Namespace) -> None:
         for source in sources:
             if source.whole and source.points > MANY:
                 bars.note(f"{source.path} cannot be read in parts, so it is read whole")
-        result = thin_open_scan(scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars)
+        with note_compiling(bars):
+            result = thin_open_scan(
+                scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars
+            )
         for note in result.notes:
             bars.note(note)
         if result.dropped:
@@ -85,7 +88,8 @@ def thin(values: Namespace) -> None:
         with SaveTogether() as save:
             write_points(save.beside(out), result.points, unit=result.unit)
     rim = f", {result.rim:,} of them along the rim" if values.rim else ""
-    print_lines([f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}", *lost_with(out)])
+    told = f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"
+    print_lines([told, *said_of_cloud_file(out, result.unit)])
 
 
 def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
@@ -165,8 +169,8 @@ def sweep(values: Namespace) -> None:
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
-        note_compiling(bars, shortest.method, "boundary", "front", "optimize")
-        with _workers(values, bars, None if len(trials) > 1 else 1) as workers:
+        said = note_compiling(bars, shortest.method, "boundary", "front", "optimize")
+        with said, _workers(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):

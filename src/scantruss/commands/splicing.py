@@ -66,17 +66,9 @@ def splice(values: Namespace) -> None:
 
 def scan_files(words: list[str]) -> list[Path]:
     """Return the files that names and patterns stand for, in their order."""
-    import glob
+    from ..scan.paths import files_of
 
-    files: list[Path] = []
-    for word in words:
-        if not Path(word).exists() and glob.has_magic(word):
-            found = [Path(name) for name in sorted(glob.glob(word))]  # noqa: PTH207 - a pattern may be absolute
-            if not found:
-                raise InputError(f"no file matches {word}")
-            files += found
-        else:
-            files.append(Path(word))
+    files = [file for word in words for file in files_of(word)]
     if len(files) < 2:
         raise InputError(f"splicing needs at least 2 scans, got {len(files)}")
     seen: set[Path] = set()
@@ -114,6 +106,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     from ..scan.readers import read_points
     from ..splice import splice_scans
     from ..splice.pose_file import read_poses
+    from .gridding import note_compiling
 
     poses = read_poses(values.poses) if values.poses else {}
     unknown = sorted(name for name in poses if name not in names and Path(name).name not in names)
@@ -123,10 +116,13 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     for place, (file, name) in enumerate(zip(files, names, strict=True)):
         bars("read", place / len(files))
         cloud = read_points(file, unit=values.unit)
+        for note in cloud.notes:
+            bars.note(note)
         if cloud.dropped:
             bars.note(f"{name}: {cloud.dropped} points with NaN or infinite coordinates are left out")
         clouds.append(cloud)
-    result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
+    with note_compiling(bars):
+        result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
     reasons = [
         f"{name} {'fits in more ways than one' if name in result.doubtful else 'fits nowhere'}"
         for name in result.left_out
@@ -141,6 +137,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
 def show_splice(result: Splice, written: list[Path]) -> None:
     """Print the pairs, the worst of them and what was written."""
     from ..report.terminal import print_lines, print_table
+    from .gridding import said_of_cloud_file
 
     unit = f" {result.unit}" if result.unit else ""
     rows = [
@@ -160,5 +157,6 @@ def show_splice(result: Splice, written: list[Path]) -> None:
         [
             f"{told}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
+            *said_of_cloud_file(written[0], result.unit),
         ]
     )

@@ -11,11 +11,13 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 from .linking import compiled
 
@@ -67,6 +69,25 @@ def is_compiled(*kernels: Callable[..., object]) -> bool:
         return True
     names = (f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}-*.nbc" for kernel in kernels)
     return FOLDER is not None and all(any(FOLDER.rglob(name)) for name in names)
+
+
+@contextmanager
+def tell_of_compiling(tell: Callable[[], None]) -> Iterator[None]:
+    """Call `tell` once, before the first function that is compiled meanwhile; never where all are found on disk."""
+
+    class FirstOnly(event.Listener):  # type: ignore[misc]
+        heard = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.heard:
+                self.heard = True
+                tell()
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    with event.install_listener("numba:compile", FirstOnly()):
+        yield
 
 
 def kernel(function: F) -> F:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..errors import words_of_place
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
@@ -116,10 +117,9 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
         lines.append(f"certificate: {grid.certificate}")
         left, far = 1.0 - grid.certificate.scan_within_reach, grid.certificate.farthest_scan
         if left > NOTED and far is not None:
-            where = ", ".join(f"{c:.6g}" for c in far.where)
             lines.append(
                 f"look there: {left:.1%} of the scan lies farther than {grid.certificate.reach:.3g}{unit} from the grid,"
-                f" up to {far.value:.3g}{unit}, near ({where})"
+                f" up to {far.value:.3g}{unit}, near ({words_of_place(far.where)})"
             )
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
@@ -141,7 +141,7 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
         ("fixed node farthest from its position", certificate.fixed_error, unit),
     )
     return [
-        (name, f"{worst.value:.4g}{words}", ", ".join(f"{c:.6g}" for c in worst.where))
+        (name, f"{worst.value:.4g}{words}", words_of_place(worst.where))
         for name, worst, words in found
         if worst is not None
     ]

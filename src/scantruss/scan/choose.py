@@ -25,7 +25,7 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
 
 
 def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
-    """Return what could be selected of a file, in words."""
+    """Return what could be selected of a file, in words; "" where it has no points."""
     said = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
         if name in attributes:
@@ -36,7 +36,7 @@ def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     if len(points):
         corners = (np.nanmin(points, axis=0), np.nanmax(points, axis=0))
         said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
-    return ",".join(said) or " no points"
+    return ",".join(said)
 
 
 def choose(

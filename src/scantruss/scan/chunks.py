@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -14,13 +12,12 @@ import numpy as np
 
 from ..errors import FormatError
 from ..selection import Selection
-from .choose import check_attributes, choose, describe
 from .content import Content, find_attributes
 from .kinds import unreadable
-from .las import FIELDS
-from .layout import MISSING, NUMBER, NUMBER_COMMA, Layout, split_line
+from .las import check_count, fields_of, take
+from .layout import Layout, is_number, number_of, split_line
 from .lines import LARGE, read_block
-from .units import to_common_unit
+from .readers import read_content, select
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -90,16 +87,10 @@ def read_chunks(
 
 
 def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
-    """Return what is selected of some points, in the unit of the scan; as `readers.read_part` does with all of them."""
-    selection = reading.selection
-    check_attributes(path, content.attributes, selection)
-    points, _, _ = to_common_unit(path, content, reading.unit, selection.z_unit, reading.common)
-    kept, left_out = choose(points, content.attributes, selection)
-    some = {name: values[:SAMPLE] for name, values in content.attributes.items()}
-    held = "" if kept.any() else describe(points[:SAMPLE], some)
-    if not kept.all():
-        points = points[kept]
-    return Chunk(np.ascontiguousarray(points, np.float64), len(kept), left_out, content.notes, held)
+    """Return what is selected of some points, in the unit of the scan."""
+    part = select(path, content, reading.unit, reading.selection, reading.common, SAMPLE)
+    points = np.ascontiguousarray(part.points, np.float64)
+    return Chunk(points, part.count, part.left_out, content.notes, part.held)
 
 
 def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
@@ -115,11 +106,13 @@ def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[
     import laspy
 
     path = tile.source.path
-    names = [name for name in wanted if name in FIELDS]
+    names = fields_of(wanted)
     backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
     begin, short = tile.begin, False
     try:
-        fields = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z
+        fields = (
+            laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z | laspy.DecompressionSelection.FLAGS
+        )
         if "class" in names:
             fields |= laspy.DecompressionSelection.CLASSIFICATION
         with laspy.open(path, laz_backend=backend, decompression_selection=fields) as file:
@@ -130,17 +123,13 @@ def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[
                 record: Any = file.read_points(expected)
                 short = len(record) < expected
                 begin += len(record)
-                points = np.empty((len(record), 3))
-                for axis, name in enumerate("xyz"):
-                    points[:, axis] = record[name]
-                yield tile.source.content(points, {name: np.array(record[FIELDS[name]]) for name in names})
+                yield tile.source.said_of(take(record, names))
     except GeneratorExit:
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
     if short:
-        promised = tile.source.points
-        raise FormatError(f"{path} ends early: its header promises {promised:,} points, got {begin:,}; copy it again")
+        check_count(path, tile.source.points, begin)
 
 
 def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Content]:
@@ -156,12 +145,10 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
             if len(rows) < expected:
                 raise FormatError(f"{source.path} ends early: it has become shorter while it was read")
             points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
-            yield source.content(points, {attribute: rows[name] for attribute, name in found.items()})
+            yield source.said_of(Content(points, {attribute: rows[name] for attribute, name in found.items()}))
 
 
 def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
-    from .readers import read_content
-
     source = tile.source
     content = read_content(source.path, wanted)
     if content.metres != source.metres:
@@ -186,7 +173,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             if block.strip():
                 rows = text_rows(source.path, block, layout, columns, f", after byte {at:,}", counts)
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
-                yield source.content(rows[:, :3], more)
+                yield source.said_of(Content(rows[:, :3], more))
 
 
 def text_rows(
@@ -220,21 +207,12 @@ def _line_by_line(
             counts.append(int(fields[0]))
             continue
         try:
-            row = [_number(fields[column], layout) for column in columns]
+            row = [number_of(fields[column], layout.comma) for column in columns]
         except (ValueError, IndexError):
-            if not any(NUMBER.fullmatch(field) for field in fields):
+            if not any(is_number(field, layout.comma) for field in fields):
                 continue
             said = " ".join(fields)[:60]
             raise FormatError(f"{path}{at}: {said!r} has no numbers x, y, z; mend or delete the line") from None
         if any(fields[column] for column in columns[:3]):
             rows.append(row)
     return np.array(rows).reshape(-1, len(columns))
-
-
-def _number(field: str, layout: Layout) -> float:
-    """Return the value of a field, NaN where it is empty or says that it is missing."""
-    if (NUMBER_COMMA if layout.comma else NUMBER).fullmatch(field):
-        return float(re.sub("[dD]", "e", field.replace(",", ".")))
-    if not field or field.lower() in MISSING:
-        return math.nan
-    raise ValueError(field)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..machine import in_parts, processors
-from ..settings import UNITS
+from .units import check_unit
 
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 SAMPLE = 600  # points at which the spacing is measured
@@ -74,8 +74,7 @@ class PointCloud:
         InputError
             Wrong shape, no numbers, too few points, or all of them on a line.
         """
-        if unit not in UNITS:
-            raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+        check_unit(unit)
         said = f"{name}: " if name else ""
         array = _as_coordinates(points, said)
         clean, lower, upper = _drop_not_finite(array, said)

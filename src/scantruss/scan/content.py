@@ -21,6 +21,9 @@ class Content:
     system: str = ""  #: reference system, "EPSG:32642" or its name
     degrees: bool = False  #: x and y are longitude and latitude
     notes: tuple[str, ...] = ()  #: what a user should know
+    left_out: dict[str, int] = field(
+        default_factory=dict
+    )  #: points that the file itself says are none, by words for them
     feet: str = ""  #: ... unless heights are in feet, or their unit is said
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import FormatError
-from .content import Content
+from .content import Content, find_attributes
 from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
 from .e57_pages import logical
 from .kinds import read_head, wrong_kind
@@ -30,24 +30,32 @@ class ScanPoints(NamedTuple):
     rotation: np.ndarray  #: (3, 3); the place in the common frame is rotation @ place + translation
     translation: np.ndarray  #: (3,) [m]
     invalid: int  #: points that the scanner marked as invalid; they are left out
+    attributes: dict[str, np.ndarray]  #: wanted ones that the scan has, (N,) each
 
 
 def read_e57(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the points of all scans of an E57 file in their common frame [m]; its fields have no wanted attributes."""
-    parts, invalid = [], 0
-    for scan in e57_scans(path):
-        points = scan.points
-        if not np.array_equal(scan.rotation, np.eye(3)):
-            points = points @ scan.rotation.T
-        parts.append(points + scan.translation if scan.translation.any() else points)
+    """Return the points of all scans of an E57 file in their common frame [m] and the wanted attributes that all of them have."""
+    parts, found, invalid = [], [], 0
+    for scan in e57_scans(path, wanted):
+        parts.append(_in_common_frame(scan))
+        found.append(scan.attributes)
         invalid += scan.invalid
-    points = np.concatenate(parts) if len(parts) != 1 and parts else (parts or [np.empty((0, 3))])[0]
-    notes = (f"{invalid:,} points that the scanner marked as invalid are left out",) if invalid else ()
-    return Content(points, metres=1.0, z_metres=1.0, notes=notes)
+    points = parts[0] if len(parts) == 1 else np.concatenate([np.empty((0, 3)), *parts])
+    everywhere = [name for name in wanted if found and all(name in each for each in found)]
+    attributes = {name: np.concatenate([each[name] for each in found]) for name in everywhere}
+    left_out = {"that the scanner marked as invalid": invalid} if invalid else {}
+    return Content(points, attributes, metres=1.0, z_metres=1.0, left_out=left_out)
 
 
-def e57_scans(path: Path) -> Iterator[ScanPoints]:
-    """Yield the scans of an E57 file, each in its own frame.
+def _in_common_frame(scan: ScanPoints) -> np.ndarray:
+    points = scan.points
+    if not np.array_equal(scan.rotation, np.eye(3)):
+        points = points @ scan.rotation.T
+    return points + scan.translation if scan.translation.any() else points
+
+
+def e57_scans(path: Path, wanted: Sequence[str] = ()) -> Iterator[ScanPoints]:
+    """Yield the scans of an E57 file, each in its own frame, with the wanted attributes that it has.
 
     Raises
     ------
@@ -63,14 +71,25 @@ def e57_scans(path: Path) -> Iterator[ScanPoints]:
         if not axes:
             raise FormatError(f"{path}: {scan.name} has neither cartesian nor spherical coordinates")
         state = "sphericalInvalidState" if axes == SPHERICAL else "cartesianInvalidState"
-        columns = _read_columns(path, data, scan, (*axes, state))
-        points = np.column_stack(columns[:3]) if scan.count else np.empty((0, 3))
+        named = _attribute_fields(scan, wanted)
+        columns = _read_columns(path, data, scan, (*axes, state, *named.values()))
+        points = np.column_stack([columns[axis] for axis in axes])
         if axes == SPHERICAL:
             points = _to_cartesian(points)
-        invalid = columns[3] != 0 if len(columns) > 3 else np.zeros(len(points), dtype=bool)
-        if invalid.any():
-            points = points[~invalid]
-        yield ScanPoints(scan.name, points, scan.rotation, scan.translation, int(invalid.sum()))
+        attributes = {name: columns[field] for name, field in named.items()}
+        if named.get("return_number") == "returnIndex":
+            attributes["return_number"] += 1  # this format counts them from 0
+        kept = columns[state] == 0 if state in columns else np.ones(len(points), dtype=bool)
+        if not kept.all():
+            points, attributes = points[kept], {name: values[kept] for name, values in attributes.items()}
+        yield ScanPoints(scan.name, points, scan.rotation, scan.translation, len(kept) - int(kept.sum()), attributes)
+
+
+def _attribute_fields(scan: Scan, wanted: Sequence[str]) -> dict[str, str]:
+    """Return the fields that hold the wanted attributes, those of extensions too."""
+    names = [field.name for field in scan.fields]
+    known = ["return_number" if name == "returnIndex" else name.partition("_")[2] or name for name in names]
+    return {attribute: names[place] for attribute, place in find_attributes(known, wanted).items()}
 
 
 def _to_cartesian(places: np.ndarray) -> np.ndarray:
@@ -79,19 +98,19 @@ def _to_cartesian(places: np.ndarray) -> np.ndarray:
     return np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)])
 
 
-def _read_columns(path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]) -> list[np.ndarray]:
+def _read_columns(path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Return the named fields of all records, float64 each; those that a scan does not have are left out."""
     place = [field.name for field in scan.fields]
-    wanted = [place.index(name) for name in names if name in place]
+    wanted = [place.index(name) for name in dict.fromkeys(names) if name in place]
     width = sum(field.bits for field in scan.fields)
     if scan.count * max(width, 1) > 8 * len(data):
         raise FormatError(
             f"{path} ends early: its header promises {scan.count:,} points, but it has {len(data):,} bytes; copy it again"
         )
     if not scan.count:
-        return [np.empty(0) for _ in wanted]
+        return {place[i]: np.empty(0) for i in wanted}
     streams = _collect(path, data, scan, wanted)
-    return [_decode(stream, scan.fields[i], scan.count) for stream, i in zip(streams, wanted, strict=True)]
+    return {place[i]: _decode(stream, scan.fields[i], scan.count) for stream, i in zip(streams, wanted, strict=True)}
 
 
 def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> list[np.ndarray]:

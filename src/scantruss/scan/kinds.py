@@ -36,7 +36,7 @@ _SIGNATURES = (
 _TEXTS = (
     (rb"\s*<(!doctype\s+html|html|head|body)", "a web page"),
     (rb"\s*<(\?xml|svg)", "an XML file"),
-    (rb"(#[^\n]*\n)*\s*VERSION\s[^\n]*\n(\s*#[^\n]*\n)*\s*(FIELDS|COLUMNS)\s", "a PCD file"),
+    (rb"(\s*#[^\n]*\n)*\s*VERSION\s[^\n]*\n(\s*#[^\n]*\n)*\s*(FIELDS|COLUMNS)\s", "a PCD file"),
     (rb"# \.PCD", "a PCD file"),
     (rb"solid\b[^\n]*\n\s*(facet|endsolid)\b", "an STL file"),
     (rb"(\s*#[^\n]*\n)*\s*(ST)?C?N?4?n?OFF\b", "an OFF file"),

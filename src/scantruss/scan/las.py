@@ -17,6 +17,7 @@ from .systems import System, system_of
 
 CHUNK = 1_000_000  # points
 FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
+WITHHELD = "marked as withheld"  # the format's word for deleted
 
 
 def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -24,25 +25,55 @@ def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
-    names = [name for name in dict.fromkeys([*wanted, "return_count"]) if name in FIELDS]
-    points, columns = np.empty((0, 3)), [np.empty(0)] * len(names)
+    names = fields_of((*wanted, "return_count"))
     try:
         check_header(path)
         promised, system, chunks = _read(path, names)
-        if chunks:
-            points = np.concatenate([chunk[0] for chunk in chunks])
-            columns = [np.concatenate([chunk[1 + i] for chunk in chunks]) for i in range(len(names))]
     except FormatError:
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
-    if len(points) < promised:
-        raise FormatError(
-            f"{path} ends early: its header promises {promised:,} points, got {len(points):,}; copy it again"
-        )
-    attributes = dict(zip(names, columns, strict=True))
+    withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
+    points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
+    check_count(path, promised, len(points) + withheld)
+    none = np.empty(0, dtype=np.uint8)
+    attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in names}
     feet = look_like_feet(points, attributes["return_count"]) if system.z_metres is None else ""
-    return Content(points, attributes, system.metres, system.z_metres, system.name, system.degrees, feet=feet)
+    return Content(
+        points,
+        attributes,
+        system.metres,
+        system.z_metres,
+        system.name,
+        system.degrees,
+        left_out={WITHHELD: withheld} if withheld else {},
+        feet=feet,
+    )
+
+
+def fields_of(wanted: Sequence[str]) -> list[str]:
+    """Return the wanted attributes that the format has, each once."""
+    return [name for name in dict.fromkeys(wanted) if name in FIELDS]
+
+
+def take(record: Any, names: Sequence[str]) -> Content:
+    """Return the points of some records of laspy with attributes, but for those that are marked as withheld."""
+    points = np.empty((len(record), 3))
+    for axis, name in enumerate("XYZ"):
+        np.multiply(record[name], record.scales[axis], out=points[:, axis])
+        points[:, axis] += record.offsets[axis]
+    attributes = {name: np.array(record[FIELDS[name]]) for name in names}
+    kept = np.array(record["withheld"]) == 0
+    if kept.all():
+        return Content(points, attributes)
+    left_out = {WITHHELD: len(kept) - int(kept.sum())}
+    return Content(points[kept], {name: values[kept] for name, values in attributes.items()}, left_out=left_out)
+
+
+def check_count(path: Path, promised: int, got: int) -> None:
+    """Refuse a file with fewer points than its header promises."""
+    if got < promised:
+        raise FormatError(f"{path} ends early: its header promises {promised:,} points, got {got:,}; copy it again")
 
 
 def note_on_heights(path: Path) -> str:
@@ -51,25 +82,18 @@ def note_on_heights(path: Path) -> str:
 
     try:
         with laspy.open(path) as file:
-            record: Any = file.read_points(min(SAMPLE, int(file.header.point_count)))
-            points = np.column_stack([record[name] for name in "xyz"]).astype(float, copy=False)
-            return look_like_feet(points, np.array(record[FIELDS["return_count"]]))
+            content = take(file.read_points(min(SAMPLE, int(file.header.point_count))), ["return_count"])
+            return look_like_feet(content.points, content.attributes["return_count"])
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
 
 
-def _read(path: Path, names: Sequence[str]) -> tuple[int, System, list[list[np.ndarray]]]:
+def _read(path: Path, names: Sequence[str]) -> tuple[int, System, list[Content]]:
     """Return how many points the header promises, the reference system, and the points in chunks with their attributes."""
     import laspy
 
-    chunks: list[list[np.ndarray]] = []
     with laspy.open(path) as file:
         header: Any = file.header
         system = system_of([*header.vlrs, *(header.evlrs or [])])
-        for record in file.chunk_iterator(CHUNK):
-            points = np.empty((len(record), 3))
-            for axis, name in enumerate("XYZ"):
-                np.multiply(record[name], header.scales[axis], out=points[:, axis])
-                points[:, axis] += header.offsets[axis]
-            chunks.append([points, *(np.array(record[FIELDS[name]]) for name in names)])
+        chunks = [take(record, names) for record in file.chunk_iterator(CHUNK)]
     return header.point_count, system, chunks

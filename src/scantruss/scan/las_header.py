@@ -79,6 +79,7 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
             raise early
         file.seek(start)
         entries = lazrs.read_chunk_table(file, lazrs.LazVlr(described))
+        entries = [entry for entry in entries if entry != (0, 0)]  # what some writers put behind the last chunk
         if not all(0 < entry[0] <= max(count, MOST_IN_CHUNK) for entry in entries):
             raise FormatError(f"{path}: its packed points come in chunks of no sensible size; the file is damaged")
         layers = sum({10: 9, 11: 1, 12: 2, 13: 1, 14: long}.get(kind, 0) for kind, long in parts)

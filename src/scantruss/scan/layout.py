@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -15,6 +16,7 @@ from ..errors import FormatError
 from .columns import check_not_degrees, fit_columns
 from .content import find_attributes
 from .kinds import is_text, kind_of, read_head, wrong_kind
+from .units import metres_of_columns, metres_of_comments
 
 PART = 1 << 16  # bytes looked at, at the start and in the middle
 LINES = 1000  # lines looked at in each part
@@ -22,6 +24,7 @@ ANY = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)")
 MISSING = frozenset(
     [
         *(sign + word for sign in ("", "+", "-") for word in ("nan", "nan(ind)", "inf", "infinity")),
@@ -53,6 +56,8 @@ class Layout:
     width: int = 0  #: fields of most lines
     named: bool = False  #: the header names the columns
     attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
+    metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
+    z_metres: float | None = None  #: ... of z
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -89,6 +94,15 @@ def is_number(field: str, comma: bool) -> bool:
     return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or field.lower() in MISSING
 
 
+def number_of(field: str, comma: bool) -> float:
+    """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
+    if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
+        return float(re.sub("[dD]", "e", field.replace(",", ".")))
+    if not field or field.lower() in MISSING:
+        return math.nan
+    raise ValueError(field)
+
+
 def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     """Return the layout of a text file of points and wanted attributes; FormatError where it is no such file."""
     head = read_head(path)
@@ -100,6 +114,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     start, middle = start[:LINES], middle[:LINES]
     rows = [row for row in start + middle if split_line(row, ANY)]
     separator, comma = _find_grammar(rows)
+    if separator == ANY:
+        _check_not_grouped(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
     data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
@@ -115,7 +131,12 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
             check_not_degrees(path, names)
     fitting = [names for names in lines if len(names) == layout.width]
     found = [find_attributes(names, wanted) for names in fitting]
-    return replace(layout, attributes=tuple(max(found, key=len, default={}).items()))
+    metres, z_metres = metres_of_comments(start[: layout.skip]), None
+    for names in fitting if layout.named else ():
+        by_name = metres_of_columns([names[column] for column in layout.columns])
+        metres, z_metres = by_name if by_name[0] else (metres, z_metres)
+    attributes = tuple(max(found, key=len, default={}).items())
+    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres)
 
 
 def _encoding(head: bytes) -> str:
@@ -145,6 +166,16 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     if 2 * best < scores[-1]:
         return GRAMMARS[-1]
     return GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+
+
+def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
+    """Refuse numbers such as 5.118,216 and "5,118.216", which would fall into two."""
+    for separator in (";", "|", "\t", ",", None):
+        for row in rows[:: len(rows) // 20 + 1]:
+            fields = split_line(row, separator)
+            grouped = [field for field in fields if GROUPED.fullmatch(field)]
+            if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
+                raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
 
 
 def _count_numbers(row: Sequence[str], comma: bool) -> int:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from ..errors import FormatError
-from .layout import Layout, find_layout, is_number, split_fields, split_line
+from .layout import Layout, find_layout, number_of, split_fields, split_line
 
 NAMES = ("length", "member", "desired", "l", "size", "edge")  # of the column of lengths, where a header names columns
 
@@ -55,7 +56,8 @@ def _length_column(header: list[str], layout: Layout) -> int:
 
 
 def _number(field: str, layout: Layout) -> float:
-    """Value of a field; ValueError where it is none."""
-    if not is_number(field, layout.comma):
+    """Value of a field; ValueError where it is none or not finite."""
+    value = number_of(field, layout.comma)
+    if not math.isfinite(value):
         raise ValueError(field)
-    return float(field.replace(",", ".") if layout.comma else field)
+    return value

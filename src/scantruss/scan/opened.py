@@ -8,12 +8,13 @@ import numpy as np
 
 from ..selection import Selection
 from .chunks import Reading
+from .content import Content
 from .las import note_on_heights
 from .paths import Source as Names
 from .paths import files_of
-from .readers import check_systems, check_unit, said_together
+from .readers import check_systems, said_together
 from .tiles import Source, find_source
-from .units import to_common_unit
+from .units import check_unit, to_common_unit
 
 
 class OpenScan(NamedTuple):
@@ -43,10 +44,10 @@ def open_scan(names: Names, unit: str = "", selection: Selection | None = None) 
     check_systems(files, [source.system for source in sources])
     units: list[str] = []
     said = []
-    none = np.empty((0, 3))
+    none = Content(np.empty((0, 3)))
     for source in sources:
         common = next((own for own in units if own), "")
-        _, own, notes = to_common_unit(source.path, source.content(none, {}), unit, selection.z_unit, common)
+        _, own, notes = to_common_unit(source.path, source.said_of(none), unit, selection.z_unit, common)
         units.append(own)
         said.append(notes)
     common, notes = said_together(files, units, said)

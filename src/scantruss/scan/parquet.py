@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..errors import FormatError, ScanTrussError
 from .columns import check_not_degrees, find_columns
 from .content import Content, find_attributes
 from .kinds import read_head, unreadable, wrong_kind
+from .units import metres_of_columns
 
 BATCH = 1 << 18  # rows
 
@@ -36,6 +38,17 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
         raise unreadable(path, "Parquet", error) from None
 
 
+def metres_of_parquet(path: Path) -> float | None:
+    """Return the metres of the unit that the columns name, without reading them; None where they name none."""
+    with suppress(Exception):  # pyarrow is not there, or the file is damaged: reading its points says so
+        import pyarrow.parquet as parquet
+
+        names = parquet.read_schema(path).names
+        if columns := find_columns(names):
+            return metres_of_columns([names[c] for c in columns])[0]
+    return None
+
+
 def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:
     names = file.schema_arrow.names
     columns = find_columns(names)
@@ -50,7 +63,7 @@ def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:
         parts.append(np.column_stack([_numbers(path, batch, names[place]) for place in places]))
     table = np.concatenate(parts) if parts else np.empty((0, len(places)))
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
-    return Content(np.ascontiguousarray(table[:, :3]), attributes)
+    return Content(np.ascontiguousarray(table[:, :3]), attributes, *metres_of_columns([names[c] for c in columns]))
 
 
 def _numbers(path: Path, batch: Any, name: str) -> np.ndarray:

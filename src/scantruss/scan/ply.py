@@ -5,7 +5,6 @@ An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 from ..errors import FormatError
 from .content import Content, find_attributes
 from .kinds import read_head, wrong_kind
-from .ply_header import Element, Header, ends_early, read_header
+from .ply_header import PLY, Element, Header, ends_early, read_header
 from .ply_text import read_ascii
 from .units import metres_of
 
@@ -25,18 +24,19 @@ MOST_RUNS = 20_000  # changes of list length walked through behind the points
 def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     """Return the points of a PLY file and the wanted attributes."""
     head = read_head(path)
-    if not re.match(rb"ply[ \t]*[\r\n]", head):
+    if not PLY.match(head):
         raise wrong_kind(path, head, "a PLY file")
     header = read_header(path)
     names = [element.name for element in header.elements]
     if "vertex" not in names:
         raise FormatError(f"{path} has no element vertex, so no points")
     vertex = header.elements[names.index("vertex")]
-    axes = [p.name for p in vertex.properties if not p.count_type]
-    if missing := [axis for axis in "xyz" if axis not in axes]:
+    own = [p.name for p in vertex.properties if not p.count_type]
+    lower = [name.lower() for name in own]
+    if missing := [axis for axis in "xyz" if axis not in lower]:
         raise FormatError(f"{path}: the element vertex has no property {missing[0]}")
-    found = find_attributes(axes, wanted)
-    columns = ("x", "y", "z", *(axes[place] for place in found.values()))
+    found = find_attributes(own, wanted)
+    columns = [own[place] for place in (*map(lower.index, "xyz"), *found.values())]
     if vertex.count == 0:
         table = np.empty((0, len(columns)))
     elif not header.order:

@@ -15,6 +15,7 @@ TYPES = {
     "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 COUNT_TYPES = {word: code for word, code in TYPES.items() if code[0] != "f"}
+PLY = re.compile(rb"ply[ \t]*[\r\n]")  # how a file starts
 LONGEST_HEADER = 1 << 20  # bytes
 
 

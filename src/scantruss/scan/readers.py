@@ -11,7 +11,6 @@ import numpy as np
 
 from ..errors import FormatError, InputError
 from ..selection import Selection
-from ..settings import UNITS
 from .arrays import read_npy, read_npz
 from .choose import check_attributes, choose, describe
 from .cloud import PointCloud
@@ -26,7 +25,7 @@ from .pcd import read_pcd
 from .ply import read_ply
 from .solids import read_obj, read_off, read_stl
 from .text import read_text
-from .units import to_common_unit
+from .units import check_unit, to_common_unit
 
 Reader = Callable[[Path, Sequence[str]], Content]
 
@@ -103,14 +102,22 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
-    content = read_content(path, selection.needs)
+    return select(path, read_content(path, selection.needs), unit, selection, common)
+
+
+def select(
+    path: Path, content: Content, unit: str, selection: Selection, common: str = "", described: int | None = None
+) -> Part:
+    """Return what is selected of some points of a file; where nothing is, so many of them are described, or all."""
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
-    kept, left_out = choose(points, content.attributes, selection)
-    held = "" if kept.any() else describe(points, content.attributes)
+    kept, chosen = choose(points, content.attributes, selection)
+    some = {name: values[:described] for name, values in content.attributes.items()}
+    held = "" if kept.any() else describe(points[:described], some)
     if not kept.all():
         points = points[kept]
-    return Part(points, unit, content.system, len(kept), left_out, held, notes)
+    count = len(kept) + sum(content.left_out.values())
+    return Part(points, unit, content.system, count, content.left_out | chosen, held, notes)
 
 
 def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -156,14 +163,17 @@ def said_together(
 
 
 def said_of_left_out(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
-    """Return what should be said of the points that a selection has left out of the parts of a scan."""
-    return tuple(f"{sum(part[words] for part in parts):,} points {words} are left out" for words in parts[0])
+    """Return what should be said of the points that are left out of the parts of a scan."""
+    return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
 
 
-def check_unit(unit: str) -> None:
-    """Refuse a unit that is not known."""
-    if unit not in UNITS:
-        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+def add_counts(parts: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Return the sums of counts by their words."""
+    sums: dict[str, int] = {}
+    for part in parts:
+        for words, count in part.items():
+            sums[words] = sums.get(words, 0) + count
+    return sums
 
 
 def check_systems(files: Sequence[Path], systems: Sequence[str]) -> None:
@@ -185,8 +195,7 @@ def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
         return FormatError(
             f"{files[0]} holds no points" if len(files) == 1 else f"none of {len(files)} files holds points"
         )
-    left_out = {words: sum(part.left_out[words] for part in parts) for words in parts[0].left_out}
+    left_out = add_counts([part.left_out for part in parts])
     said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
-    return InputError(
-        f"no point of {name_of_files(files)} is left: of {count:,} points {said}; the scan has{parts[0].held}"
-    )
+    has = f"; the scan has{parts[0].held}" if parts[0].held else ""
+    return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {said}{has}")

@@ -15,7 +15,7 @@ from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
 from .paths import Source as Names
 from .paths import name_of_files
-from .readers import said_of_left_out
+from .readers import add_counts, said_of_left_out
 from .thin import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_rim
 from .tiles import TILE, Source, Tile, tiles_of
 
@@ -137,8 +137,7 @@ class Told:
     def add(self, other: Told | Chunk) -> None:
         """Add what another chunk or part tells."""
         self.read += other.read
-        for words, count in other.left_out.items():
-            self.left_out[words] = self.left_out.get(words, 0) + count
+        self.left_out = add_counts([self.left_out, other.left_out])
         self.notes = (*self.notes, *other.notes)
         self.promised += other.promised
         self.held = self.held or other.held
@@ -254,4 +253,5 @@ def _nothing(sources: Sequence[Source], rows: Rows, told: Told) -> Exception:
         return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
     said = ", ".join(f"{number:,} {words}" for words, number in told.left_out.items() if number)
     name = name_of_files([source.path for source in sources])
-    return InputError(f"no point of {name} is left: of {told.read:,} points {said}; some of them have{told.held}")
+    have = f"; some of them have{told.held}" if told.held else ""
+    return InputError(f"no point of {name} is left: of {told.read:,} points {said}{have}")

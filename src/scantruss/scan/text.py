@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import mmap
-import re
 from array import array
 from collections.abc import Iterator, Sequence
 from io import StringIO
@@ -14,7 +12,7 @@ import numpy as np
 
 from ..errors import FormatError
 from .content import Content
-from .layout import ANY, MISSING, NUMBER, NUMBER_COMMA, Layout, find_layout, is_number, split_line
+from .layout import ANY, Layout, find_layout, is_number, number_of, split_line
 from .lines import LARGE, read_regular
 
 
@@ -35,7 +33,8 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
     if width == 4:  # the first column may be a running number
         running = bool((np.diff(points[:, 0]) == 1).all())
         points = points[:, 1:] if running else points[:, :3]
-    return Content(points, {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)})
+    attributes = {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)}
+    return Content(points, attributes, layout.metres, layout.z_metres)
 
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
@@ -70,7 +69,7 @@ def _read_lines(path: Path, layout: Layout, columns: Sequence[int]) -> tuple[np.
     values, promised = array("d"), layout.promised
     for number, row in _rows(path, layout):
         try:
-            point = [_number(row[column], layout) for column in columns]
+            point = [number_of(row[column], layout.comma) for column in columns]
         except (ValueError, IndexError):
             if promised is not None and len(row) == 1 and row[0].isdecimal():  # a PTS file of several scans
                 promised += int(row[0])
@@ -88,15 +87,6 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
         for number, line in enumerate(file, start=1):
             if number > layout.skip and (row := split_line(line.rstrip("\n"), layout.separator)):
                 yield number, row
-
-
-def _number(field: str, layout: Layout) -> float:
-    """Return the value of a field, NaN where it is empty or says that it is missing."""
-    if (NUMBER_COMMA if layout.comma else NUMBER).fullmatch(field):
-        return float(re.sub("[dD]", "e", field.replace(",", ".")))
-    if not field or field.lower() in MISSING:
-        return math.nan
-    raise ValueError(field)
 
 
 def _no_point(path: Path, layout: Layout, number: int, row: list[str]) -> FormatError:

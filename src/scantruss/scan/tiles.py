@@ -1,27 +1,29 @@
 """Tiles: files, or ranges of files, that can be read by themselves and by anybody.
 
-A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole.
+A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole;
+a COPC file is one tile too, but read a million points at a time.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import FormatError
-from .arrays import metres_of_npz
+from .arrays import metres_of_npz, read_array_header
 from .content import NAMES, Content, find_attributes
 from .kinds import kind_of, read_head, unreadable, wrong_kind
-from .las_header import check_header
+from .las_header import LASZIP, check_header
 from .layout import ANY, Layout, find_layout
 from .packed import unpacked
+from .parquet import metres_of_parquet
 from .pcd import read_pcd_header
 from .ply import row_type
-from .ply_header import read_header
+from .ply_header import PLY, read_header
 from .readers import PACKED, READERS
 from .systems import system_of
 from .units import metres_of
@@ -29,7 +31,6 @@ from .units import metres_of
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
-PLY = re.compile(rb"ply[ \t]*[\r\n]")
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
@@ -50,15 +51,16 @@ class Source:
     z_metres: float | None = None  #: ... of z
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
+    in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
 
     @property
     def whole(self) -> bool:
         """Whether it can only be read whole, with memory for all of its points."""
         return self.kind == "whole"
 
-    def content(self, points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> Content:
-        """Return some of its points (K, 3) with attributes (K,) and what the header says of their units."""
-        return Content(points, dict(attributes), self.metres, self.z_metres, self.system, self.degrees)
+    def said_of(self, content: Content) -> Content:
+        """Return some of its points with what the header says of their units."""
+        return replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
 
 
 @dataclass(frozen=True)
@@ -115,13 +117,17 @@ def _metres(path: Path) -> float | None:
         return read_pcd_header(path).metres
     if suffix == ".npz" and head.startswith(b"PK"):
         return metres_of_npz(path)
+    if suffix == ".parquet":
+        return metres_of_parquet(path)
+    if suffix in TEXTS:
+        return find_layout(path).metres
     return 1.0 if suffix == ".e57" else None
 
 
 def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
     """Yield the tiles of some files, of about so many points each."""
     for source in sources:
-        if source.whole:
+        if source.whole or source.in_one:
             yield Tile(source, 0, source.points)
             continue
         first, last, step = 0, source.points, points
@@ -150,11 +156,20 @@ def _las(path: Path, head: bytes) -> Source:
                 z_metres=system.z_metres,
                 system=system.name,
                 degrees=system.degrees,
+                in_one=_has_uneven_chunks(header),
             )
     except FormatError:
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
+
+
+def _has_uneven_chunks(header: Any) -> bool:
+    """Whether points are packed in chunks of different sizes, as in COPC: lazrs then finds wrong points when it seeks."""
+    import lazrs
+
+    packed = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id == LASZIP]
+    return any(lazrs.LazVlr(described).uses_variable_size_chunks() for described in packed)
 
 
 def _ply(path: Path) -> Source | None:
@@ -175,9 +190,7 @@ def _npy(path: Path) -> Source | None:
     """Return an NPY file of rows; None for one by columns, of objects, or another shape."""
     try:
         with path.open("rb") as file:
-            version = np.lib.format.read_magic(file)
-            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-            shape, by_columns, kind = read(file)
+            shape, by_columns, kind = read_array_header(file)
             start = file.tell()
     except Exception:  # a damaged header ends in many ways; who reads it whole says in which
         return None
@@ -216,7 +229,17 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     columns = layout.columns
     if len(columns) == 4:
         columns = columns[1:] if _counts(path, layout, size) else columns[:3]
-    return Source(path, "text", points, start, size, columns=columns, layout=layout)
+    return Source(
+        path,
+        "text",
+        points,
+        start,
+        size,
+        columns=columns,
+        layout=layout,
+        metres=layout.metres,
+        z_metres=layout.z_metres,
+    )
 
 
 def _counts(path: Path, layout: Layout, size: int) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +14,16 @@ from ..settings import UNITS
 from .content import Content
 
 SAME = 1e-5  # US survey feet are feet, to two parts in a million
-PATTERN = (
-    r"(?:units?|einheit)\W{0,3}(mm|cm|m|inch|foot|feet|ft|in|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?)\b"
-)
-_WORDS = {"feet": "foot", "ft": "foot", "in": "inch"}
+_NAMES = "mm|cm|m|inch|inches|foot|feet|ft|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?"
+PATTERN = rf"(?:units?|einheit)\W{{0,3}}({_NAMES}|in)\b"  #: in a comment of a file
+_IN_NAME = re.compile(rf"[(\[<]\s*({_NAMES}|in)\s*[)\]>]$|[\s_]({_NAMES})$", re.IGNORECASE)  # x_in may be an input
+_WORDS = {"feet": "foot", "ft": "foot", "in": "inch", "inches": "inch"}
+
+
+def check_unit(unit: str) -> None:
+    """Refuse a unit that is not known."""
+    if unit not in UNITS:
+        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
 
 
 def metres_of(word: str) -> float | None:
@@ -24,6 +32,19 @@ def metres_of(word: str) -> float | None:
     for start, unit in (("mi", "mm"), ("ce", "cm"), ("me", "m")):
         word = unit if word.startswith(start) else word
     return UNITS.get(_WORDS.get(word, word))
+
+
+def metres_of_comments(lines: Iterable[str]) -> float | None:
+    """Return the metres of a unit that a comment of a text file names; None where there is none."""
+    found = (re.match(rf"\s*(?:#|//).*?\b{PATTERN}", line, re.IGNORECASE) for line in lines)
+    return next((metres_of(match[1]) for match in found if match), None)
+
+
+def metres_of_columns(names: Sequence[str]) -> tuple[float | None, float | None]:
+    """Return the metres a unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None where they do not."""
+    found = [_IN_NAME.search(name.strip().strip("\"'").strip()) for name in names]
+    x, y, z = (metres_of(match[1] or match[2]) if match else None for match in found)
+    return (x, z) if x and x == y else (None, None)
 
 
 def name_of(metres: float | None) -> str:

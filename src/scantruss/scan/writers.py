@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import FormatError, InputError
 from ..settings import UNITS
 from .las_writer import write_las
+from .units import check_unit
 
 
 class Cloud(NamedTuple):
@@ -67,8 +68,7 @@ def write_points(
     cloud = Cloud(_checked(points, "points"), None if normals is None else _checked(normals, "normals"), unit, origin)
     if cloud.normals is not None and len(cloud.normals) != len(cloud.points):
         raise InputError(f"{len(cloud.points):,} points need as many normals, got {len(cloud.normals):,}")
-    if unit not in UNITS:
-        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+    check_unit(unit)
     try:
         writer(path, cloud)
     except OSError as error:
