@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # last: its folder pytest is not the module pytest
 
+from benchmarks import __main__ as benchmarks_main  # noqa: E402
 from benchmarks import own, page  # noqa: E402
 from benchmarks.peers import figures, runs, tables, ways  # noqa: E402
 from benchmarks.peers.clouds import Cloud, clouds  # noqa: E402
@@ -153,6 +154,20 @@ def test_a_section_is_written_anew_and_the_others_stay():
         and "slow" not in again
     )
     assert again.index("## What is lost") < again.index("## Speed") < again.index("## Random")
+
+
+@pytest.mark.parametrize("given", [["scans", "--data", "{folder}"], ["scans", "--data={folder}"]])
+def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
+    def measured(options, command):
+        assert options.data == str(tmp_path)
+        return page.Section("All twins and real scans", command, "**1**", "rows", ())
+
+    monkeypatch.setitem(benchmarks_main.MAKERS, "scans", measured)
+    file = tmp_path / "page.md"
+    arguments = [word.format(folder=tmp_path) for word in given]
+    assert benchmarks_main.main([*arguments, "--page", str(file), "--seeds", "3"]) == 0
+    text = file.read_text()
+    assert "python -m benchmarks scans --data DATA --page PAGE --seeds 3`" in text and str(tmp_path) not in text
 
 
 def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys):
