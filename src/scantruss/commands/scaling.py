@@ -102,7 +102,8 @@ def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
 
 def sweep_parser() -> Parser:
     """Options of ``scantruss sweep``."""
-    from ..options import Parser, add_settings, size_of_memory
+    from ..options import Parser, add_settings
+    from .gridding import add_memory
 
     parser = Parser(
         "sweep",
@@ -114,7 +115,7 @@ def sweep_parser() -> Parser:
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
     parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
     parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
-    parser.add_argument("--memory", metavar="SIZE", type=size_of_memory, help="a larger scan is thinned, as 4GB")
+    add_memory(parser)
     _add_workers(parser)
     add_settings(parser)
     for action in parser._actions:
@@ -153,7 +154,7 @@ def sweep(values: Namespace) -> None:
     from ..report.choosing import head_of, rows_of
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
-    from .gridding import note_compiling, read_scan, thin_to_fit
+    from .gridding import read_scan, thin_to_fit
 
     folder = Path(values.out)
     if folder.exists() and not folder.is_dir():
@@ -165,7 +166,7 @@ def sweep(values: Namespace) -> None:
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
-        note_compiling(bars, shortest.method, "boundary", "front", "optimize")
+        _note_compiling(bars, trials)
         with _workers(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
@@ -174,6 +175,17 @@ def sweep(values: Namespace) -> None:
         _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
     print_table(head, rows)
     print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+
+
+def _note_compiling(bars: Bars, trials: list[Trial]) -> None:
+    """Say once where the kernels of any of the methods that are tried must be compiled."""
+    from ..ahead import are_compiled
+    from .gridding import note_compiling
+
+    stages = ("boundary", "front", "optimize")
+    missing = (trial.settings.method for trial in trials if not are_compiled(trial.settings.method, *stages))
+    if method := next(missing, ""):
+        note_compiling(bars, method, *stages)
 
 
 def _thinned(trial: Trial, spacing: float) -> Trial:
