@@ -8,6 +8,7 @@ four to eight hours on two cores, nearly all of it for the other ways; stopped a
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -92,7 +93,7 @@ def told(arguments: Sequence[str]) -> str:
             words += [option, option.lstrip("-").upper()]
         else:
             words.append(word)
-    return " ".join(words)
+    return shlex.join(words)
 
 
 def parser() -> argparse.ArgumentParser:
