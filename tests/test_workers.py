@@ -7,7 +7,7 @@ import socket
 import threading
 import time
 import warnings
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -92,10 +92,13 @@ def test_a_port_where_something_else_answers_is_refused(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def answer():
-            with server.accept()[0] as caller:
+            with suppress(OSError), server.accept()[0] as caller:
+                caller.settimeout(1.0)
                 caller.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
-                caller.recv(1000)
+                while caller.recv(1000):  # until the other side leaves, or says no more
+                    pass
 
+        server.settimeout(30.0)
         answering = threading.Thread(target=answer)
         answering.start()
         with pytest.raises(InputError, match=r"no scheduler answers at tcp.*something else answers there"):
