@@ -9,8 +9,9 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, suppress
 from importlib.util import find_spec
@@ -235,16 +236,32 @@ def _local_cluster(count: int) -> Any:
     """Return a cluster on this machine; interrupted while it starts it is ended first, as half of one cannot be."""
     from distributed import LocalCluster
 
-    with ThreadPoolExecutor(1, initializer=_hold_interrupts) as starter:
-        starting = starter.submit(
-            LocalCluster, n_workers=count, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
-        )
+    made: list[Any] = []
+    faults: list[Exception] = []
+    done = threading.Event()
+
+    def start() -> None:
+        _hold_interrupts()
+        options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
         try:
-            return starting.result()
-        except KeyboardInterrupt:
+            made.append(LocalCluster(n_workers=count, **options))
+        except Exception as error:
+            faults.append(error)
+        finally:
+            done.set()
+
+    try:
+        threading.Thread(target=start).start()
+        done.wait()  # `join` that was interrupted does not wait again
+    except KeyboardInterrupt:
+        done.wait()
+        for cluster in made:
             with suppress(Exception):
-                starting.result().close()
-            raise
+                cluster.close()
+        raise
+    if faults:
+        raise faults[0]
+    return made[0]
 
 
 def _hold_interrupts() -> None:
