@@ -8,6 +8,7 @@ four to eight hours on two cores, nearly all of it for the other ways; stopped a
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from .page import Section, write
 
 PARTS = ("speed", "examples", "surface", "random", "scans", "peers")
 QUICK_PARTS = ("speed", "examples", "peers")
+PATHS = ("--data", "--page")  # options whose values say more of a machine than of a measurement
 
 
 def _speed(options: argparse.Namespace, command: str) -> Section:
@@ -80,12 +82,29 @@ def _numbers(text: str) -> list[float]:
     return [float(word) for word in _words(text)]
 
 
+def told(arguments: Sequence[str]) -> str:
+    """Return the command line as the page tells it: a path is a plain word there."""
+    words: list[str] = []
+    for word in arguments:
+        option = word.partition("=")[0]
+        if words and words[-1] in PATHS:
+            words.append(words[-1].lstrip("-").upper())
+        elif option in PATHS and option != word:
+            words += [option, option.lstrip("-").upper()]
+        else:
+            words.append(word)
+    return shlex.join(words)
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the command line."""
     from .peers.clouds import NODES, NOISES, POINTS, SHAPES
 
     whole = argparse.ArgumentParser(
-        "python -m benchmarks", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "python -m benchmarks",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,  # `told` knows the options by their whole names
     )
     whole.add_argument("part", nargs="?", default="all", choices=["all", *PARTS, "own", "compare"],
                        help="all (the default), one section, own (our own figures as JSON) or compare (two of these)")  # fmt: skip
@@ -131,7 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if name == "own":
             continue
         print(f"{name} ...", flush=True)
-        section = MAKERS[name](options, " ".join(arguments))
+        section = MAKERS[name](options, told(arguments))
         if section is None:
             print(f"{name}: nothing measured, the page keeps what it has")
             continue

@@ -85,7 +85,7 @@ def slower(old: dict[str, float], new: dict[str, float], tolerance: float) -> bo
 
 
 def changes(old: dict[str, Any], new: dict[str, Any], tolerance: float = TOLERANCE) -> list[Change]:
-    """Return all figures that both have, and those that only the old one has as worse."""
+    """Return all figures that both have."""
     found = []
     for name, before in old["times"].items():
         after = new["times"].get(name)

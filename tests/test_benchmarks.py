@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT))  # last: its folder pytest is not the module pytest
 
+from benchmarks import __main__ as benchmarks_main  # noqa: E402
 from benchmarks import own, page  # noqa: E402
 from benchmarks.peers import figures, runs, tables, ways  # noqa: E402
 from benchmarks.peers.clouds import Cloud, clouds  # noqa: E402
@@ -106,7 +107,7 @@ def test_rows_are_kept_and_what_ran_out_of_time_is_not_tried_on_more(tmp_path, m
     way = ways.Way("slow", (), (), "", "", lambda scan: None)
     asked = []
 
-    def run(cloud, way, limit, repeats, kept):
+    def run(cloud, way, limit, repeats):
         asked.append(cloud)
         return runs.Row(cloud, way.name, "out of time" if cloud.points > 50 else "failed", "", {}, {})
 
@@ -117,6 +118,57 @@ def test_rows_are_kept_and_what_ran_out_of_time_is_not_tried_on_more(tmp_path, m
     with (tmp_path / "rows.jsonl").open("a") as file:
         file.write('{"key": "half a li')
     assert list(runs.all_rows(plan, [way], limit=1.0, kept=tmp_path)) == first and len(asked) == 2
+
+
+def test_rows_measured_otherwise_are_not_kept(monkeypatch):
+    way = ways.Way("slow", (), (), "", "", lambda scan: None)
+    before = runs.key_of(CLOUD, way, 1.0, 1)
+    assert runs.key_of(CLOUD, way, 1.0, 1) == before
+    runs.yardstick.cache_clear()
+    real = Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: real(path) + b"#" * (path.name == "figures.py"))
+    assert runs.key_of(CLOUD, way, 1.0, 1) != before
+    runs.yardstick.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("said", "kept"),
+    [
+        ("cannot import name x from y (/home/me/env/y/__init__.py)", "cannot import name x from y (__init__.py)"),
+        ("OSError: '/tmp/b' and \"/opt/lib/libusb-1.0.so.0\": none", "OSError: 'b' and \"libusb-1.0.so.0\": none"),
+        ("C:\\Users\\me\\scan.ply is cut off", "scan.ply is cut off"),
+        ("loops 2/1, and/or 3 m/s", "loops 2/1, and/or 3 m/s"),
+    ],
+)
+def test_the_words_of_a_way_name_no_folder(said, kept):
+    assert runs.without_folders(said) == kept
+
+
+def test_a_way_that_crashes_is_told_without_our_folders(tmp_path, monkeypatch):
+    def refuse(job, limit):
+        assert np.load(job["points"]).shape == (2_000, 3)  # the cloud as it is made today
+        return {"result": "crashed", "words": f"exit status 1 {tmp_path}/way.py"}
+
+    monkeypatch.setattr(runs, "run_child", refuse)
+    found = runs.run(CLOUD, ways.Way("w", (), (), "", "", lambda scan: None), 1.0)
+    assert (found.result, found.words) == ("crashed", "exit status 1 way.py")
+
+
+def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong():
+    other = replace(CLOUD, shape="sphere")
+    rows = [
+        row("ScanTruss normal"),
+        row("good"),
+        row("bad", right=False),
+        runs.Row(CLOUD, "gone", "missing", "", {}, {}),
+        row("ScanTruss normal", cloud=other),
+        runs.Row(other, "good", "does not apply", "a closed surface", {}, {}),
+        row("bad", cloud=other),
+        runs.Row(other, "gone", "missing", "", {}, {}),
+    ]
+    assert tables.findings(rows)[0] == (
+        "Right topology: ScanTruss normal on **2 of 2** clouds; of 2 other ways that are here 1 wherever it is, as far as they apply."
+    )
 
 
 def test_losses_name_the_way_that_is_better_and_only_where_it_is_right():
@@ -153,6 +205,20 @@ def test_a_section_is_written_anew_and_the_others_stay():
         and "slow" not in again
     )
     assert again.index("## What is lost") < again.index("## Speed") < again.index("## Random")
+
+
+@pytest.mark.parametrize("given", [["scans", "--data", "{folder}"], ["scans", "--data={folder}"]])
+def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
+    def measured(options, command):
+        assert options.data == str(tmp_path)
+        return page.Section("All twins and real scans", command, "**1**", "rows", ())
+
+    monkeypatch.setitem(benchmarks_main.MAKERS, "scans", measured)
+    file = tmp_path / "page.md"
+    arguments = [word.format(folder=tmp_path) for word in given]
+    assert benchmarks_main.main([*arguments, "--page", str(file), "--ways", "a b,c"]) == 0
+    text = file.read_text()
+    assert "python -m benchmarks scans --data DATA --page PAGE --ways 'a b,c'`" in text and str(tmp_path) not in text
 
 
 def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys):

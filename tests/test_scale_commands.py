@@ -5,17 +5,20 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import scantruss as st
+from scantruss import ahead
 from scantruss.cli import main
 from scantruss.commands import scaling
 from scantruss.machine import available_memory
 from scantruss.options import size_of_memory
 from scantruss.scan import fit
 from scantruss.scan.thin import thin_points
+from scantruss.sweep import Trial
 
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
@@ -152,6 +155,27 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
     assert "thinned" not in capsys.readouterr().out
 
 
+def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatch):
+    monkeypatch.setattr(fit, "FEWEST", 1000)
+    assert main(["info", "scan.npy"]) == 0
+    whole = capsys.readouterr().out
+    assert main(["info", "scan.npy", "--memory", "1MB"]) == 0
+    said = capsys.readouterr().out
+    assert "thinned while it was read, from 5" in said and "thinned" not in whole
+    wished, sizes = ([text.split(word)[1].split("\n")[0] for text in (whole, said)] for word in ("try ", "extent   "))
+    assert wished[0] == wished[1]
+    one, other = ([float(side) for side in size.split(",")[0].split(" x ")] for size in sizes)
+    assert np.allclose(one, other, rtol=0.01)
+    assert said.split("boundary  length")[1].count("external") == 1 and said.count("internal") == 1
+    assert main(["info", "scan.npy", "--memory", "1MB", "--length", "4"]) == 0
+    assert "in boxes of 0.2;" in capsys.readouterr().out
+    for words in (["--thin-spacing", "0"], ["--length", "4", "--thin-spacing", "0"]):
+        assert main(["info", "scan.npy", "--memory", "1MB", *words]) == 0
+        assert "thinned" not in capsys.readouterr().out
+    np.save("none.npy", np.full((2000, 3), np.nan))
+    assert "no points but NaN" in refused(capsys, "info", "none.npy", "--memory", "1kB")
+
+
 def test_what_fits_into_memory_is_taken_as_it_is(place):
     settings = st.Settings(length=4.0)
     assert fit.spacing_to_fit(["scan.npy"], settings) == 0.0
@@ -236,6 +260,17 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
 )
 def test_a_sweep_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
     assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
+
+
+def test_a_sweep_says_once_that_any_of_its_methods_must_be_compiled(monkeypatch):
+    notes = []
+    trials = [Trial(m, m, (m,), st.Settings(length=1.0, method=m)) for m in ("default", "paper", "default")]
+    bars = SimpleNamespace(note=notes.append)
+    for compiled, times in ((("default", "paper"), 0), (("default",), 1), ((), 1)):
+        notes.clear()
+        monkeypatch.setattr(ahead, "are_compiled", lambda method, *stages, known=compiled: method in known)
+        scaling._note_compiling(bars, trials)
+        assert [note.split()[0] for note in notes] == ["compiling"] * times
 
 
 def test_a_sweep_into_a_file_is_refused(place, capsys):

@@ -270,3 +270,18 @@ def test_a_sweep_selects_once_for_all_trials():
     for trial in trials:
         assert trial.settings.selection == Selection(classes=(2, 6), returns="last", confidence=0.5, z_unit="foot")
         assert trial.settings.unit == "m"
+
+
+def test_files_that_do_not_lie_together_are_named():
+    for number, aside in enumerate((0.0, 25.0, 50.0, 900.0)):  # 20 long: three in a row, and one elsewhere
+        np.save(f"{number}.npy", P / np.ptp(P[:, 0]) * 20.0 + (aside, 0, 0))
+    np.save("4.npy", P + np.nan)
+    row, all_files = ["0.npy", "1.npy", "2.npy"], [f"{number}.npy" for number in range(4)]
+    for workers in (None, Others()):
+        assert thin_scan(row, S, workers=workers).notes == read_points(row).notes == ()
+        (said,) = thin_scan(all_files, S, workers=workers).notes
+        assert said.startswith("3.npy lies about 8.3e+02 or more from the others") and "splice" in said
+        assert read_points(all_files).notes == (said,)
+        assert said in thin_scan([*all_files, "4.npy"], S, workers=workers).notes
+    (said,) = thin_scan(["3.npy", *row], S).notes
+    assert said.startswith("0.npy and 2 more files lie about 8.3e+02")

@@ -2,8 +2,12 @@
 
 import builtins
 import os
+import signal
+import socket
+import threading
+import time
 import warnings
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -81,6 +85,56 @@ def test_a_scheduler_that_does_not_answer_is_refused(scheduler, monkeypatch):
     monkeypatch.setattr(module, "PATIENCE", 0.3)
     with pytest.raises(InputError, match="no scheduler answers"):
         Cluster(0, scheduler)
+
+
+def test_a_port_where_something_else_answers_is_refused(monkeypatch):
+    pytest.importorskip("distributed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            with suppress(OSError), server.accept()[0] as caller:
+                caller.settimeout(1.0)
+                caller.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+                while caller.recv(1000):  # until the other side leaves, or says no more
+                    pass
+
+        server.settimeout(30.0)
+        answering = threading.Thread(target=answer)
+        answering.start()
+        with pytest.raises(InputError, match=r"no scheduler answers at tcp.*something else answers there"):
+            Cluster(0, f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        answering.join()
+
+
+def test_a_local_cluster_that_does_not_start_names_another_way(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+
+    def refuse_to_start(**options):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(distributed, "LocalCluster", refuse_to_start)
+    with pytest.raises(InputError, match=r"do not start \(Nanny failed to start\.\); use --workers 1"):
+        Cluster(2)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held here")
+def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    held, closed = [], []
+
+    class Slow:
+        def __init__(self, **options):
+            held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.5)
+
+        def close(self):
+            closed.append(True)
+
+    monkeypatch.setattr(distributed, "LocalCluster", Slow)
+    with pytest.raises(KeyboardInterrupt):
+        Cluster(2)
+    assert held == [True] and closed == [True]  # held, so that no worker dies of it with a traceback
 
 
 def test_without_dask_processes_of_our_own_serve(monkeypatch):

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from shapes import Shape, make
@@ -25,10 +24,6 @@ class Cloud:
     points: int
     nodes: int  #: about as many as the length gives
     noise: float  #: standard deviation of each coordinate, in spacings of the points
-
-    @property
-    def name(self) -> str:
-        return f"{self.shape}-{self.points}-{self.noise:g}"
 
     @property
     def title(self) -> str:
@@ -81,13 +76,3 @@ def _spacing(shape: str, points: int, noise: float) -> float:
 def spacing_of(cloud: Cloud) -> float:
     """Return the spacing of the points as they are, with their noise."""
     return _spacing(cloud.shape, cloud.points, cloud.noise)
-
-
-def save(cloud: Cloud, folder: Path) -> Path:
-    """Return the file of the points, made if it is not there."""
-    path = folder / f"{cloud.name}.npy"
-    if not path.exists():
-        beside = path.with_suffix(".part.npy")
-        np.save(beside, shape_of(cloud).points)
-        beside.replace(path)
-    return path

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from .clouds import Cloud, save, shape_of, spacing_of
+from .clouds import Cloud, shape_of, spacing_of
 from .figures import figures
 from .ways import WAYS, Way
 
 ROOT = Path(__file__).resolve().parents[2]
 REPEATS = 3  #: of a first call that was short
-KEPT = ROOT / "benchmarks" / ".runs"  #: rows of earlier runs, and the clouds
+KEPT = ROOT / "benchmarks" / ".runs"  #: rows of earlier runs
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,21 @@ def warmed(way: Way) -> None:
             way.warm()
 
 
+@cache
+def yardstick() -> str:
+    """Return a digest of what makes the clouds and measures the grids: rows measured otherwise are measured anew."""
+    own = [Path(__file__).parent / name for name in ("child.py", "clouds.py", "figures.py")]
+    own += [ROOT / "benchmarks" / "measure.py", *(ROOT / "tests" / name for name in ("shapes.py", "surfaces.py"))]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in own)).hexdigest()[:12]
+
+
+def without_folders(words: str) -> str:
+    """Return words in which a path has kept its last name: folders of one machine say nothing elsewhere."""
+    return re.sub(r"(?<![\w.])(?:[A-Za-z]:)?[/\\](?:[^\s/\\:'\"()]+[/\\])+(?=\w)", "", words)
+
+
 def key_of(cloud: Cloud, way: Way, limit: float, repeats: int) -> str:
-    return json.dumps([asdict(cloud), way.name, identity(way), limit, repeats])
+    return json.dumps([asdict(cloud), way.name, identity(way), yardstick(), limit, repeats])
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
@@ -135,18 +150,18 @@ def run_child(job: dict[str, Any], limit: float, module: str = "benchmarks.peers
     return {"result": "crashed", "words": f"{how} after {perf_counter() - started:.0f} s {said}".strip()}
 
 
-def run(cloud: Cloud, way: Way, limit: float, repeats: int = REPEATS, kept: Path = KEPT) -> Row:
+def run(cloud: Cloud, way: Way, limit: float, repeats: int = REPEATS) -> Row:
     """Return the row of one way on one cloud."""
     warmed(way)
     shape = shape_of(cloud)
-    kept.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         job = {
-            "way": way.name, "points": str(save(cloud, kept)), "length": shape.length, "nodes": cloud.nodes, "repeats": repeats,
+            "way": way.name, "points": str(folder / "points.npy"), "length": shape.length, "nodes": cloud.nodes, "repeats": repeats,
             "spacing": spacing_of(cloud),
             "grid": str(folder / "grid.npz"), "answer": str(folder / "answer.json"), "log": str(folder / "log.txt"),
         }  # fmt: skip
+        np.save(folder / "points.npy", shape.points)
         answer = run_child(job, limit)
         result, words = answer.pop("result"), answer.pop("words")
         found: dict[str, Any] = {}
@@ -156,7 +171,7 @@ def run(cloud: Cloud, way: Way, limit: float, repeats: int = REPEATS, kept: Path
                     found = figures(shape, grid["nodes"], grid["triangles"]).to_dict()
             except ValueError as error:
                 result, words, answer = "failed", str(error), {}
-    return Row(cloud, way.name, result, words, answer, found)
+    return Row(cloud, way.name, result, without_folders(words), answer, found)
 
 
 def hopeless(cloud: Cloud, way: Way, rows: Iterable[Row]) -> bool:
@@ -185,7 +200,7 @@ def all_rows(
             if row is None and hopeless(cloud, way, rows):
                 row = Row(cloud, way.name, "not run", f"more than {limit:g} s on an easier cloud", {}, {})
             elif row is None:
-                row = run(cloud, way, limit, repeats, kept)
+                row = run(cloud, way, limit, repeats)
                 store.add(key, row)
             rows.append(row)
             yield row

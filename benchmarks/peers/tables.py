@@ -147,17 +147,23 @@ def aims(rows: Sequence[Row]) -> list[tuple[str, bool]]:
     return found
 
 
+def _as_right(rows: Sequence[Row], name: str) -> bool:
+    """Whether a way is right on every cloud to which it applies and on which ours is right."""
+    ours = [row.cloud for row in rows if row.way == NORMAL and row.right]
+    asked = [row for row in rows if row.way == name and row.cloud in ours and row.result != "does not apply"]
+    return bool(asked) and all(row.right for row in asked)
+
+
 def findings(rows: Sequence[Row]) -> list[str]:
     """Return one sentence a matter, each with a bold number."""
     found, groups = [], by_cloud(rows)
-    rights = {
-        name: sum(row.right for row in rows if row.way == name) for name in dict.fromkeys(row.way for row in rows)
-    }
-    if NORMAL in rights:
-        others = [right for name, right in rights.items() if name not in OURS]
+    here = dict.fromkeys(row.way for row in rows if row.way not in OURS and row.result != "missing")
+    rights = [_as_right(rows, name) for name in here]
+    if any(row.way == NORMAL for row in rows):
+        right = sum(row.right for row in rows if row.way == NORMAL)
         found.append(
-            f"Right topology: {NORMAL} on **{rights[NORMAL]} of {len(groups)}** clouds; of {len(others)} other ways"
-            f" {sum(right >= rights[NORMAL] for right in others)} on as many."
+            f"Right topology: {NORMAL} on **{right} of {len(groups)}** clouds; of {len(rights)} other ways that are here"
+            f" {sum(rights)} wherever it is, as far as they apply."
         )
     for measure in MEASURES:
         pairs = []

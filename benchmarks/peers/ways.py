@@ -92,7 +92,7 @@ def _ours(effort: str) -> Way:
 
 
 MESHLAB = "targetlen the member, 10 iterations, checksurfdist off, featuredeg 120"
-MENDED = "MeshLab's ball pivoting as below"
+MENDED = "MeshLab's ball pivoting as above"
 WAYS = (
     *(_ours(effort) for effort in ("quick", "normal", "best")),
     Way(

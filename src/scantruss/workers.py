@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from importlib.util import find_spec
+from multiprocessing import resource_tracker
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -156,25 +159,21 @@ class Cluster(Workers):
     alone = False
 
     def __init__(self, count: int, scheduler: str = "") -> None:
-        from distributed import Client, LocalCluster
+        from distributed import Client
 
         self._ends = ExitStack()
         try:
-            if not scheduler:
-                cluster = LocalCluster(
-                    n_workers=count,
-                    threads_per_worker=1,
-                    dashboard_address=":0",
-                    silence_logs=logging.CRITICAL,
-                )
-                self._ends.enter_context(cluster)
-            self._client = self._ends.enter_context(Client(scheduler or cluster, timeout=PATIENCE))
+            cluster = scheduler or self._ends.enter_context(_local_cluster(count))
+            self._client = self._ends.enter_context(Client(cluster, timeout=PATIENCE))
             versions = self._client.run(_version)
-        except (OSError, ValueError) as error:
-            self._ends.close()
-            raise InputError(f"no scheduler answers at {scheduler} ({str(error)[:80]}); check the address") from None
         except ModuleNotFoundError:
             versions = {scheduler: ""}
+        except Exception as error:  # what answers may be anything, and its first bytes a length
+            self._ends.close()
+            raise _no_cluster(scheduler, error) from None
+        except BaseException:
+            self._ends.close()
+            raise
         other = sorted({version or "none" for version in versions.values() if version != __version__})
         if other or not versions:
             self._ends.close()
@@ -231,6 +230,54 @@ class Cluster(Workers):
     ) -> None:
         """Let go of the cluster; end it where it is our own."""
         self._ends.close()
+
+
+def _local_cluster(count: int) -> Any:
+    """Return a cluster on this machine; interrupted while it starts it is ended first, as half of one cannot be."""
+    from distributed import LocalCluster
+
+    made: list[Any] = []
+    faults: list[Exception] = []
+    done = threading.Event()
+
+    def start() -> None:
+        _hold_interrupts()
+        options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+        try:
+            made.append(LocalCluster(n_workers=count, **options))
+        except Exception as error:
+            faults.append(error)
+        finally:
+            done.set()
+
+    try:
+        threading.Thread(target=start).start()
+        done.wait()  # `join` that was interrupted does not wait again
+    except KeyboardInterrupt:
+        done.wait()
+        for cluster in made:
+            with suppress(Exception):
+                cluster.close()
+        raise
+    if faults:
+        raise faults[0]
+    return made[0]
+
+
+def _hold_interrupts() -> None:
+    """Keep ctrl-C from this thread, and from the threads and processes it starts: who started them ends them."""
+    if hasattr(signal, "pthread_sigmask"):
+        resource_tracker.ensure_running()  # would lift it again
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+def _no_cluster(scheduler: str, error: Exception) -> InputError:
+    """Return what to say where a cluster cannot be used."""
+    said = " ".join(str(error).split())[:80] or type(error).__name__
+    if scheduler:
+        said = said if isinstance(error, OSError | ValueError) else "something else answers there"
+        return InputError(f"no scheduler answers at {scheduler} ({said}); check the address")
+    return InputError(f"the workers of this machine do not start ({said}); use --workers 1")
 
 
 def _version() -> str:

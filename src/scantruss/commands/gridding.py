@@ -34,7 +34,8 @@ def info_parser() -> Parser:
         "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
-    add_settings(parser, ("length", "method", *READING))
+    add_memory(parser)
+    add_settings(parser, ("length", "method", "thin_spacing", *READING))
     return parser
 
 
@@ -48,6 +49,11 @@ def info(values: Namespace) -> None:
     given = "length" in values
     settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
     with Bars() as bars:
+        settings = thin_to_fit(values.scan, settings, values.memory)
+        if settings.thin_spacing and not given and "thin_spacing" not in values:
+            from ..scan.fit import spacing_to_look
+
+            settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings))
         cloud = read_scan(values.scan, settings, bars)
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))
@@ -68,7 +74,7 @@ def info(values: Namespace) -> None:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from ..options import Parser, add_settings, size_of_memory
+    from ..options import Parser, add_settings
 
     parser = Parser(
         "grid",
@@ -88,14 +94,21 @@ def grid_parser() -> Parser:
         action="store_true",
         help="write a grid that fails its certificate too; the exit status is 3 either way",
     )
+    add_memory(parser)
+    add_settings(parser)
+    return parser
+
+
+def add_memory(parser: Parser) -> None:
+    """Add the option that says how large a scan may be."""
+    from ..options import size_of_memory
+
     parser.add_argument(
         "--memory",
         metavar="SIZE",
         type=size_of_memory,
         help="a larger scan is thinned, as 4GB (default: half of what is free)",
     )
-    add_settings(parser)
-    return parser
 
 
 def grid(values: Namespace) -> None:

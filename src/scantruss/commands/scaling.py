@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..sweep import Trial
     from ..workers import Workers
 
+STAGES = ("boundary", "front", "optimize")  # of a grid
 MANY = 20_000_000  # points of which several workers thin a scan by default
 
 
@@ -106,7 +107,8 @@ def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
 
 def sweep_parser() -> Parser:
     """Options of ``scantruss sweep``."""
-    from ..options import Parser, add_settings, size_of_memory
+    from ..options import Parser, add_settings
+    from .gridding import add_memory
 
     parser = Parser(
         "sweep",
@@ -118,7 +120,7 @@ def sweep_parser() -> Parser:
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
     parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
     parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
-    parser.add_argument("--memory", metavar="SIZE", type=size_of_memory, help="a larger scan is thinned, as 4GB")
+    add_memory(parser)
     _add_workers(parser)
     add_settings(parser)
     for action in parser._actions:
@@ -169,7 +171,7 @@ def sweep(values: Namespace) -> None:
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
-        said = note_compiling(bars, shortest.method, "boundary", "front", "optimize")
+        said = note_compiling(bars, _method_to_compile(trials, shortest.method), *STAGES)
         with said, _workers(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
@@ -178,6 +180,14 @@ def sweep(values: Namespace) -> None:
         _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
     print_table(head, rows)
     print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+
+
+def _method_to_compile(trials: list[Trial], usual: str) -> str:
+    """Return the first method of the trials whose kernels must be compiled, else the usual one."""
+    from ..ahead import are_compiled
+
+    methods = (trial.settings.method for trial in trials)
+    return next((method for method in methods if not are_compiled(method, *STAGES)), usual)
 
 
 def _thinned(trial: Trial, spacing: float) -> Trial:

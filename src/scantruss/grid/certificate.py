@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..errors import words_of_place
+
 Place = tuple[float, float, float]
 
 
@@ -97,7 +99,7 @@ class Certificate:
 
 def near(where: Place | None) -> str:
     """Return a place in words, to be put behind others; nothing where there is none."""
-    return "" if where is None else f" (near {', '.join(f'{c:.6g}' for c in where)})"
+    return "" if where is None else f" (near {words_of_place(where)})"
 
 
 def place_of(place: Any) -> Place:

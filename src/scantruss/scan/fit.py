@@ -6,14 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..machine import available_memory
+from .apart import extent_of, joined
+from .chunks import read_chunks
 from .cloud import PointCloud
 from .kinds import read_head
+from .opened import open_scan
 from .paths import Source as Names
 from .paths import files_of, name_of_files
 from .readers import PACKED, read_points
 from .streaming import Progress, thin_scan
-from .tiles import find_source
+from .tiles import find_source, tiles_of
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -22,6 +27,7 @@ FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into mem
 BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
 PACKED_POINT = 8  # bytes; a point of a packed text has about as many
 FEWEST = 100_000  # points that are never too many
+LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
 SHARE = 0.5  # of the memory at hand that a scan may take
 
 
@@ -46,6 +52,17 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
         return 0.0
     memory = SHARE * available_memory() if memory is None else memory
     return settings.length / FINENESS if points * BYTES > memory else 0.0
+
+
+def spacing_to_look(names: Names, settings: Settings) -> float:
+    """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit]."""
+    sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+    extent = extent_of(np.empty((0, 3)))
+    for tile in tiles_of(sources):
+        for chunk in read_chunks(tile, reading):
+            extent = joined(extent, extent_of(chunk.points))
+    size = float(np.linalg.norm(extent[1] - extent[0])) if np.isfinite(extent).all() else 0.0
+    return size / LOOK or 1.0  # without extent who thins it says why
 
 
 def _guess(path: Path) -> int:

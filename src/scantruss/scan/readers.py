@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import FormatError, InputError
 from ..selection import Selection
+from .apart import extent_of, said_of_apart
 from .arrays import read_npy, read_npz
 from .choose import check_attributes, choose, describe
 from .cloud import PointCloud
@@ -146,7 +147,8 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
     check_systems(files, [part.system for part in parts])
     unit, notes = said_together(files, [part.unit for part in parts], [part.notes for part in parts])
     points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
-    return points, unit, (*notes, *said_of_left_out([part.left_out for part in parts]))
+    notes = (*notes, *said_of_left_out([part.left_out for part in parts]))
+    return points, unit, (*notes, *said_of_apart(files, [extent_of(part.points) for part in parts]))
 
 
 def said_together(

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import FormatError, InputError
 from ..selection import Selection
 from ..workers import Workers
+from .apart import extent_of, joined, said_of_apart
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
 from .paths import Source as Names
@@ -133,6 +134,7 @@ class Told:
         self.notes: tuple[str, ...] = ()
         self.held = ""  #: what could have been selected, of a part of which nothing was
         self.promised = 0  #: points that count lines promise
+        self.extent = extent_of(np.empty((0, 3)))  #: (2, 3) about where the points are
 
     def add(self, other: Told | Chunk) -> None:
         """Add what another chunk or part tells."""
@@ -140,6 +142,7 @@ class Told:
         self.left_out = add_counts([self.left_out, other.left_out])
         self.notes = (*self.notes, *other.notes)
         self.promised += other.promised
+        self.extent = joined(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
         self.held = self.held or other.held
 
 
@@ -166,6 +169,8 @@ def _all_rows(
         part = told[source.path.absolute()]
         _check_counts(source, part)
         whole.add(part)
+    extents = [told[source.path.absolute()].extent for source in sources]
+    whole.notes = (*whole.notes, *said_of_apart([source.path for source in sources], extents))
     return thinning.take_rows(), whole
 
 
