@@ -44,7 +44,7 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     place, own = few.tree.points, np.ascontiguousarray(normals[chosen])
     neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS])
     kernels.cut_steep_links(place, own, neighbors, STEEP)
-    weights = np.empty(neighbors.shape, np.uint16)
+    weights = np.empty(neighbors.shape, np.uint8)
     kernels.link_weights(place, own, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(place), np.int64)

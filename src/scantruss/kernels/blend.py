@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .boxes import SearchBoxes
+from .boxes import SearchBoxes, nearest
 from .compile import kernel
-from .overlap import moved, nearest, turned
+from .overlap import moved, turned
 from .vectors import dot, row, subtract
 
 

@@ -108,3 +108,20 @@ def search(
                         count += 1
                     item = boxes.next[item]
     return count
+
+
+@kernel
+def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float) -> int:
+    """The item nearest to x, y, z within `reach`, the first of equals; -1 where there is none."""
+    best, least = -1, reach * reach
+    for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                item = boxes.first[slot_of(boxes, i, j, k)]
+                while item >= 0:
+                    dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
+                    dd = dx * dx + dy * dy + dz * dz
+                    if dd < least or (dd == least and item < best):
+                        best, least = item, dd
+                    item = boxes.next[item]
+    return best

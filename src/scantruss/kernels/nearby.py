@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .boxes import SearchBoxes, box_index, search
+from .boxes import SearchBoxes, box_index, nearest, search
 from .compile import kernel
 
 
@@ -80,16 +80,14 @@ def list_marked(
 
 @kernel
 def nearest_places(
-    points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, nearest: np.ndarray
+    points: np.ndarray,
+    boxes: SearchBoxes,
+    places: np.ndarray,
+    reach: float,
+    number: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
-    """The place (S, 3) nearest to each point (N, 3) within reach, -1 where there is none; boxes : of the places."""
-    found = np.empty(4096, np.int64)
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        nearest[p], least = -1, 1e300
-        for f in range(search(boxes, places, x, y, z, reach, found)):
-            s = found[f]
-            dx, dy, dz = places[s, 0] - x, places[s, 1] - y, places[s, 2] - z
-            dd = dx * dx + dy * dy + dz * dz
-            if dd < least or (dd == least and s < nearest[p]):
-                nearest[p], least = s, dd
+    """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 where there is none; boxes : of the places."""
+    for p in range(begin, end):
+        number[p] = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .boxes import SearchBoxes, box_index, slot_of
+from .boxes import SearchBoxes, nearest
 from .compile import kernel
 from .vectors import Vector, cross, dot, row, subtract
 
@@ -47,23 +47,6 @@ def face_like(
         if n >= 0 and dot(row(normals, p), row(place_normals, n)) < 0.0:
             for c in range(3):
                 normals[p, c] = -normals[p, c]
-
-
-@kernel
-def nearest(boxes: SearchBoxes, places: np.ndarray, x: float, y: float, z: float, reach: float) -> int:
-    """The place nearest to x, y, z within `reach`, the first of equals; -1 where there is none."""
-    best, least = -1, reach * reach
-    for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
-        for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
-            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                item = boxes.first[slot_of(boxes, i, j, k)]
-                while item >= 0:
-                    dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
-                    dd = dx * dx + dy * dy + dz * dz
-                    if dd < least or (dd == least and item < best):
-                        best, least = item, dd
-                    item = boxes.next[item]
-    return best
 
 
 @kernel

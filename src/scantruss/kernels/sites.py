@@ -15,6 +15,25 @@ from .vectors import dot, row, smallest_eigenvector, subtract
 
 
 @kernel
+def number_boxes(points: np.ndarray, boxes: SearchBoxes, number: np.ndarray) -> int:
+    """The search box of each point (N,), numbered as they come; returns how many there are. The boxes must be empty."""
+    count = 0
+    for p in range(len(points)):
+        i, j, k = (
+            box_index(boxes, 0, points[p, 0]),
+            box_index(boxes, 1, points[p, 1]),
+            box_index(boxes, 2, points[p, 2]),
+        )
+        slot = slot_of(boxes, i, j, k)
+        if boxes.keys[slot] == -1:
+            boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
+            boxes.first[slot] = count
+            count += 1
+        number[p] = boxes.first[slot]
+    return count
+
+
+@kernel
 def _site_within(
     boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
 ) -> int:

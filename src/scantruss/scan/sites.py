@@ -24,6 +24,8 @@ from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
 CLOSE = 1.5  # size of the search boxes while sites are chosen, in their radii
+LARGE = 8.0  # size of the boxes that points are sorted by, in radii of a site
+ACROSS = 25  # most of these boxes along a scan
 PART = 20_000  # fewest points for a thread of their own
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
@@ -124,7 +126,8 @@ def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
         return surface
     near = sites.whole[points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1])]
     owner = np.empty(len(near), np.int64)
-    nearest_places(near, sites.boxes, surface.mean, 2.0 * surface.scale[1], owner)
+    means, reach = surface.mean, 2.0 * surface.scale[1]
+    in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, reach, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
     grouped, start, _ = _group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
@@ -182,6 +185,8 @@ def _prepare(
         points = np.ascontiguousarray(points[kept])
     whole, size = points, FINE * radius if measured is None else 0.0
     points = _fewer(whole, size, spacing)
+    if measured is None:  # made-up points come last
+        points = _by_box(points, radius)
     found = _linked(points, radius, length, spacing)
     strays = 0
     if stray_distance and has_strays(found.neighbors):
@@ -189,7 +194,7 @@ def _prepare(
         strays = int(stray.sum())
         if strays:
             whole = np.ascontiguousarray(whole[~stray])
-            points = _fewer(whole, size, spacing)
+            points = _by_box(_fewer(whole, size, spacing), radius)
             found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
     if _is_rough(found, SHEETS * length):
@@ -209,7 +214,7 @@ def _prepare(
         normals, thickness = _normals(mean, neighbors)
     facing.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
     facing.cut_steep_links(mean, normals, neighbors, STEEP)
-    weights = np.empty(neighbors.shape, np.uint16)  # few values are sorted faster
+    weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
     facing.link_weights(mean, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
@@ -244,6 +249,15 @@ def _prepare(
 def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
     """Return one point of each box of a size where they lie much denser, else all."""
     return points[streamlined(points, size)] if is_dense(spacing, size) else points
+
+
+def _by_box(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return the points sorted by large search boxes: what lies together in space then does so in memory, in all that follows."""
+    lower, upper = bounds_of(points)
+    size = max(LARGE * radius, float((upper - lower).max()) / ACROSS)
+    boxes, number = new_boxes(lower, upper, size, 0, (ACROSS + 2) ** 3), np.empty(len(points), np.int64)
+    grouped, _, _ = _group(points, number, kernels.number_boxes(points, boxes, number))
+    return grouped
 
 
 class _Linked(NamedTuple):

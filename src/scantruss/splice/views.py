@@ -73,7 +73,7 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return places (S, 3) that keep a spacing: means of the points nearest to the first of each neighbourhood."""
     owner, chosen, sites, boxes = sites_of_points(points, spacing)
-    nearest_places(points, boxes, sites, spacing, owner)
+    nearest_places(points, boxes, sites, spacing, owner, 0, len(points))
     count = len(chosen)
     mean = np.zeros((count, 3))
     start = np.zeros(count + 1, np.int64)
@@ -107,7 +107,7 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
 
 def _face_one_side(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Turn all normals to one side: along the links of each piece, the pieces as one sensor sees them, outwards as a whole."""
-    weights = np.empty(neighbors.shape, np.uint16)
+    weights = np.empty(neighbors.shape, np.uint8)
     facing.link_weights(places, normals, neighbors, weights)
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(places), np.int64)
