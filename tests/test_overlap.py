@@ -40,6 +40,15 @@ def test_the_nearest_place_is_the_nearest(seed):
         assert kernels.nearest(boxes, places, *x, reach) == (at if away <= reach else -1)
 
 
+def test_the_first_place_within_reach_is_the_first():
+    chance = np.random.default_rng(1)
+    points, places = chance.random((200, 3)), chance.random((40, 3))
+    owner = np.empty(200, np.int64)
+    kernels.first_places(points, boxes_of(places, 0.2), places, 0.25, owner)
+    near = np.linalg.norm(points[:, None] - places, axis=2) <= 0.25
+    assert np.array_equal(owner, np.where(near.any(axis=1), near.argmax(axis=1), -1))
+
+
 def test_places_keep_their_spacing_and_normals_face_outside(views):
     for view in views[:2]:
         assert len(view.points) > 80 and np.allclose(np.linalg.norm(view.normals, axis=1), 1.0)

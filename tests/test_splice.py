@@ -110,6 +110,30 @@ def test_a_sphere_fits_in_many_ways_and_is_refused():
         splice_scans(clouds_of(scans))
 
 
+@pytest.fixture(scope="module")
+def saddles():
+    """Two scans of a saddle, which looks the same when turned by half a turn, and their poses."""
+    chance = np.random.default_rng(7)
+    scans, poses = [], []
+    for seed, side in enumerate((-1.0, 1.0)):
+        x, y = np.random.default_rng(seed).uniform(-1, 1, (2, 30_000))
+        whole = np.stack([x, y, 0.45 * (x * x - y * y)], axis=1)
+        seen = whole[np.hypot(x - 0.35 * side, y) < 0.75]
+        pose = random_pose(chance)
+        poses.append(pose)
+        scans.append((seen - pose[:3, 3]) @ pose[:3, :3])
+    return scans, poses
+
+
+def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_given(saddles):
+    scans, poses = saddles
+    with pytest.raises(InputError, match=r"in more ways than one.*--poses"):
+        splice_scans(clouds_of(scans), NAMES[:2])
+    given = splice_scans(clouds_of(scans), NAMES[:2], poses=dict(zip(NAMES, poses, strict=False)))
+    turned, moved = errors_of(given.poses, poses, scans, NAMES[:2])
+    assert turned < 0.5 and moved < given.spacing and not given.left_out
+
+
 def test_units_do_not_matter(scanned):
     """The same scans a thousand times as large, far from the origin."""
     scans, _, _result = scanned
@@ -167,6 +191,15 @@ def test_poses_to_start_from_and_poses_as_they_are(scanned):
     assert {(p.first, p.second) for p in kept.pairs} >= {(p.first, p.second) for p in result.pairs if p.overlap > 0.1}
     with pytest.raises(InputError, match="no pose is given for d"):
         splice_scans(clouds_of(scans), NAMES, poses=dict(zip(NAMES[:3], poses, strict=False)), use_poses=True)
+
+
+def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(scanned):
+    scans, _, result = scanned
+    again = splice_scans(clouds_of(scans), NAMES, poses=result.poses, use_poses=True)
+    assert {(p.first, p.second) for p in again.pairs} == {(p.first, p.second) for p in result.pairs}
+    for found, given in zip(result.pairs, again.pairs, strict=True):
+        for figure in ("overlap", "agreement", "residual"):
+            assert getattr(given, figure) == pytest.approx(getattr(found, figure), rel=1e-6)
 
 
 @pytest.mark.parametrize(

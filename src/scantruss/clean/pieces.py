@@ -11,6 +11,7 @@ from .strays import THICK
 
 LINK = 3.0  # reaches over which points belong to one piece
 BLOB = 4.0  # a cloud of points may have so many times more of them than a small surface
+NARROW = 0.3  # extent of such a cloud, in that of the largest piece, up to which it is small however many points it has
 APART = (
     6.0  # reaches over which a small piece belongs to what is beside it: a line of the scanner, a part behind a shadow
 )
@@ -32,7 +33,8 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     kernels.measure_planes(near.tree, np.arange(count), near.neighbors, thick, aside, 0, count)
     blob = np.bincount(piece, thick > THICK, minlength=count) > 0.5 * sizes
     least = np.minimum(np.maximum(share * count, AROUND) * np.where(blob, BLOB, 1.0), float(sizes.max()))
-    loose = sizes[piece] < least[piece]
+    clouds = np.flatnonzero(blob & (sizes >= least))
+    loose = (sizes[piece] < least[piece]) | _small_clouds(near.tree.points, piece, clouds, int(sizes.argmax()))
     typical = float(np.median(near.reach))
     while loose.any():
         kept = np.flatnonzero(~loose)
@@ -44,6 +46,13 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
             break
         loose &= ~np.isin(piece, joined)
     return loose
+
+
+def _small_clouds(points: np.ndarray, piece: np.ndarray, clouds: np.ndarray, largest: int) -> np.ndarray:
+    """Return which points are of those of some clouds that are small beside the largest piece in extent (N,) bool."""
+    limit = NARROW * float(np.linalg.norm(np.ptp(points[piece == largest], axis=0)))
+    small = [cloud for cloud in clouds if np.linalg.norm(np.ptp(points[piece == cloud], axis=0)) < limit]
+    return np.isin(piece, small)
 
 
 def _distances(tree: trees.Tree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,9 @@ FAR = 4.5  # reach, in those of which a quarter of the points have more, at whic
 CLOUD = 2.5  # ... where the points around form no surface
 THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
 MUCH = 0.1  # part of the points that form none from which on it is no cloud of strays but the scan
+ROUND = 0.18  # share of the spread across the plane from which on points are no crease but a cloud
+SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
+BESIDE = 4  # neighbours in a cloud from which on a point is looked at with it
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
 TOO_FAR = 1.1  # the same in member lengths
 LONELY = (
@@ -65,8 +68,11 @@ def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> 
         which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
         kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
         reach[which] = np.sqrt(near.squares[which, AROUND - 1])
+    cloud = np.zeros(len(points), np.bool_)
     for _ in range(ROUNDS):
-        found = _in_clouds(near, alive)
+        cloud |= _clouds(near, alive)
+        beside = np.where(near.neighbors >= 0, cloud[near.neighbors], False).sum(axis=1) >= BESIDE
+        found = _in_clouds(near, alive, np.flatnonzero(alive & (cloud | beside)))
         if not len(found):
             break
         for _ in range(2):  # the surface below is told better now
@@ -78,15 +84,25 @@ def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> 
     return near.in_order(~alive)
 
 
-def _in_clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
-    """One round of `find_strays`: points of dense clouds, which hold each other, that stand off the surface around the cloud."""
+def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
+    """Return which points belong to dense clouds (N,) bool: inside, they and those around spread to all sides, unlike in a crease."""
     which = np.flatnonzero(alive)
-    thick = np.zeros(len(alive), np.bool_)
-    thick[which] = _planes(near, which)[0] > THICK
-    if not 0 < thick.sum() < MUCH * len(which):
-        return which[:0]
-    around = np.where(near.neighbors >= 0, thick[near.neighbors], False)
-    doubted = np.flatnonzero(alive & (thick | (around.sum(axis=1) >= NEAREST // 4)))
+    cloud, bulk = np.zeros(len(alive), np.bool_), np.zeros(len(alive))
+    thick = which[_planes(near, which)[0] > THICK]
+    if not 0 < len(thick) < MUCH * len(which):
+        return cloud
+    found = np.empty(len(thick))
+    in_parts(len(thick), PART, lambda _, begin, end: kernels.measure_bulk(near.tree, alive, thick, found, begin, end))
+    bulk[thick] = found
+    around = near.neighbors[thick]
+    cloud[thick] = np.where(around >= 0, bulk[around], 0.0).mean(axis=1) > ROUND
+    for _ in range(SKIN):
+        cloud[thick] |= np.where(around >= 0, cloud[around], False).any(axis=1)
+    return cloud
+
+
+def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarray:
+    """Return which of the points of clouds, which hold each other, stand off the surface around."""
     sure = alive.copy()
     sure[doubted] = False
     off = np.empty(len(doubted))

@@ -6,9 +6,20 @@ import math
 
 import numpy as np
 
-from .boxes import SearchBoxes, nearest
+from .boxes import SearchBoxes, nearest, search
 from .compile import kernel
 from .vectors import Vector, cross, dot, row, subtract
+
+
+@kernel
+def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
+    """The first of the places (S, 3) within reach of each point (N, 3), -1 where there is none; boxes : of the places."""
+    found = np.empty(256, np.int64)
+    for p in range(len(points)):
+        owner[p] = -1
+        for f in range(search(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach, found)):
+            if owner[p] < 0 or found[f] < owner[p]:
+                owner[p] = found[f]
 
 
 @kernel

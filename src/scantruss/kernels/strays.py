@@ -13,6 +13,7 @@ from .tree import DEEPEST, Tree, nearest
 from .vectors import dot, row, smallest_eigenvector, subtract
 
 ROUNDS = 3  # fits of a patch, each with the points that lie off the one before weighed down
+BULK = 40  # points around a place that tell a cloud from a crease
 THICK = 0.2  # thickness, in radii, from which on the points around a place are no surface to stand off from
 
 
@@ -124,6 +125,37 @@ def measure_planes(
         off = abs(dot((cx, cy, cz), v))
         thick[i] = rms / radius
         aside[i] = off / max(rms, 1e-9 * radius)
+
+
+@kernel
+def measure_bulk(tree: Tree, alive: np.ndarray, which: np.ndarray, bulk: np.ndarray, begin: int, end: int) -> None:
+    """Share of the spread of the living points around each of `which` that is across their plane; bulk (P,), filled.
+
+    0 on a surface, 1/3 where points lie to all sides alike, and little more than half of that in a sharp crease.
+    """
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
+    for i in range(begin, end):
+        p = which[i]
+        place = row(tree.points, p)
+        count = 0
+        cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
+        for k in range(nearest(tree, place[0], place[1], place[2], 2 * BULK, stack, found, away)):
+            if alive[found[k]] and count < BULK:
+                x, y, z = subtract(row(tree.points, found[k]), place)
+                count, cx, cy, cz = count + 1, cx + x, cy + y, cz + z
+                xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+                yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+        bulk[i] = 0.0
+        if count < FLAT:
+            continue
+        cx, cy, cz = cx / count, cy / count, cz / count
+        xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
+        yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
+        v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+        across = (
+            v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+        )
+        bulk[i] = across / max(xx + yy + zz, 1e-300)
 
 
 @kernel

@@ -107,17 +107,17 @@ def _rivals(fit: Fit, best: Fit) -> bool:
 def _says_the_same(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
     """Whether two scans lie in the whole as a pair says."""
     lies = invert(whole.poses[pair.second]) @ whole.poses[pair.first]
-    return _apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing
+    return apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing
 
 
 def _is_same(whole: Group, before: Group, one: Group, other: Group, scans: list[Scan]) -> bool:
     """Whether two groups lie to each other alike in two wholes."""
     i, j = one.members[0], other.members[0]
     lies, lay = (invert(group.poses[j]) @ group.poses[i] for group in (whole, before))
-    return _apart(lies, lay, scans[i].coarse) < 1.5 * scans[i].coarse.spacing
+    return apart(lies, lay, scans[i].coarse) < 1.5 * scans[i].coarse.spacing
 
 
-def _apart(one: np.ndarray, other: np.ndarray, view: View) -> float:
+def apart(one: np.ndarray, other: np.ndarray, view: View) -> float:
     """Return how far apart two poses put the places of a view [scan unit], root of the mean square."""
     points = view.points[:: max(len(view.points) // 100, 1)]
     return float(np.sqrt(((move(one, points) - move(other, points)) ** 2).sum(axis=1).mean()))
@@ -178,12 +178,18 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
 
 def links_of(scans: list[Scan], group: Group) -> dict[tuple[int, int], Fit]:
     """Return how the scans of a group agree that overlap, two by two."""
-    found = {}
-    for place, i in enumerate(group.members):
-        for j in group.members[:place]:
-            fit = fit_of(scans, group, j, i)
-            if fit.share >= LINKED:
-                found[j, i] = fit
+    pairs = pairs_as_they_lie(scans, group)
+    return {(pair.first, pair.second): pair.fit for pair in pairs if pair.fit.share >= LINKED}
+
+
+def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:
+    """Return every two scans of a group as a pair."""
+    found = []
+    for place, j in enumerate(group.members):
+        for i in group.members[:place]:
+            turn = group.turns[i] * group.turns[j]
+            pose = invert(group.poses[j]) @ group.poses[i]
+            found.append(Pair(i, j, pose, turn, fit_of(scans, group, i, j)))
     return found
 
 

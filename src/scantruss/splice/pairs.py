@@ -66,7 +66,7 @@ def find_pairs(
     found: list[Pair] = []
     pool = ThreadPoolExecutor(processors())
     try:
-        tasks = [pool.submit(_find_pair, scans, features, first, second) for first, second in todo]
+        tasks = [pool.submit(find_pair, scans, features, first, second) for first, second in todo]
         for place, task in enumerate(tasks):
             progress("match", place / len(tasks))
             found += task.result()
@@ -75,22 +75,37 @@ def find_pairs(
     return found
 
 
-def _find_pair(scans: list[Scan], features: list[np.ndarray], first: int, second: int) -> list[Pair]:
-    """Return the poses in which two scans may belong together, the best first."""
+def find_pair(
+    scans: list[Scan], features: list[np.ndarray], first: int, second: int, *, thorough: bool = False
+) -> list[Pair]:
+    """Return the poses in which two scans may belong together, the best first.
+
+    thorough : try more poses, and both sides of the normals even where one is told or does well
+    """
     one, other = scans[first], scans[second]
     found: list[Pair] = []
-    sure = min(one.coarse.bulge, other.coarse.bulge) > BULGE  # then the normals of both face outside
+    sure = not thorough and min(one.coarse.bulge, other.coarse.bulge) > BULGE  # then the normals of both face outside
     for turn in (1.0,) if sure else (1.0, -1.0):
         candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, CANDIDATES)
         poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:ALIGNED]
-        reach = one.coarse.spacing
-        poses = [align(one.coarse, other.coarse, pose, turn, (2.0 * reach, reach), FEW, 6) for pose in poses]
-        for pose in _best(one, other, poses, turn, 0.35)[:TRIED]:
+        poses = [_roughly(one, other, pose, turn) for pose in poses]
+        for pose in _best(one, other, poses, turn, 0.35)[: None if thorough else TRIED]:
             found += closer(one, other, first, second, pose, turn)
-        if any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * SHARE for pair in found):
+        if not thorough and any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * SHARE for pair in found):
             break
     found.sort(key=lambda pair: -pair.fit.score)
-    return _different(found, one.coarse)[:KEPT]
+    return _different(found, one.coarse)[: None if thorough else KEPT]
+
+
+def _roughly(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> np.ndarray:
+    """Return the pose after alignment of the coarse views."""
+    reach = one.coarse.spacing
+    return align(one.coarse, other.coarse, pose, turn, (2.0 * reach, reach), FEW, 6)
+
+
+def settled_from(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> list[Pair]:
+    """Return the pair of two scans that alignment makes of a pose; nothing where they do not agree then."""
+    return closer(one, other, 0, 1, _roughly(one, other, pose, turn), turn)
 
 
 def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: float) -> list[np.ndarray]:
@@ -101,21 +116,19 @@ def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: fl
     return [poses[k] for k in order if scores[k] > WORSE * scores[order[0]]]
 
 
-def measure_strictness(pairs: list[Pair], scans: list[Scan]) -> float:
-    """Return by what to lessen the distance within which scans agree: those that lie right may agree far better.
+def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
+    """Return the scans, to be judged as strictly as the best of the pairs allow: those that lie right may agree far better.
 
     Of the best pairs of each scan those with the smaller residuals are taken for right.
     """
     best: dict[int, tuple[float, float]] = {}
     for pair in pairs:
         if pair.fit.share > 3.0 * SHARE:
-            near = nearness(scans[pair.first].middle, scans[pair.second].middle)
             for k in (pair.first, pair.second):
-                best[k] = max(best.get(k, (0.0, 0.0)), (pair.fit.score, pair.fit.residual / near))
+                best[k] = max(best.get(k, (0.0, 0.0)), (pair.fit.score, pair.fit.residual / pair.fit.near))
     ratios = sorted(ratio for _, ratio in best.values())
-    if not ratios:
-        return 1.0
-    return min(max(WITHIN * ratios[(len(ratios) - 1) // 3], STRICTEST), 1.0)
+    strict = min(max(WITHIN * ratios[(len(ratios) - 1) // 3], STRICTEST), 1.0) if ratios else 1.0
+    return [replace(scan, middle=replace(scan.middle, strict=strict)) for scan in scans]
 
 
 def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..scan.cloud import PointCloud
+from .doubt import leave_out_doubtful
 from .features import find_features
 from .fine import Fit, align
-from .graph import Group, assemble, fine_fit_of, fit_of, links_of, settle
+from .graph import Group, assemble, fine_fit_of, fit_of, links_of, pairs_as_they_lie, settle
 from .merge import merge_scans
-from .pairs import Pair, closer, find_pairs, measure_strictness, rejudge
+from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
 from .pose_file import poses_for
 from .poses import invert, make_pose
 from .scans import Scan, prepare_scans
@@ -138,10 +139,12 @@ def _put_together(
     if wanted:
         progress("features", 0.0)
         pairs += find_pairs(scans, find_features([scan.coarse for scan in scans]), wanted, progress)
-    strict = measure_strictness(pairs, scans)
-    scans = [replace(scan, middle=replace(scan.middle, strict=strict)) for scan in scans]
+    scans = with_strictness(scans, pairs)
     groups, doubtful = assemble(scans, rejudge(pairs, scans), progress)
     group = groups[0]
+    sure = {i for i in group.members if given[i] is not None}
+    group, elsewhere = leave_out_doubtful(scans, group, sure if len(sure) > 1 else set(), progress)
+    doubtful |= elsewhere
     if 2 * len(group.members) <= len(scans):
         raise InputError(_why_not(scans, names, groups, doubtful))
     settle(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
@@ -217,6 +220,7 @@ def _result(
         poses[scans[i].name] = make_pose(np.eye(3), origin) @ group.poses[i] @ local
     if not as_given:
         poses[scans[first].name] = np.eye(4)
+    scans = _judged_as_they_lie(scans, group)
     links = {pair: fine_fit_of(scans, group, *pair) for pair in links_of(scans, group)}
     points, kept = merge_scans(scans, group, progress)
     whole = PointCloud.from_array(points, unit=scans[first].cloud.unit)
@@ -232,6 +236,12 @@ def _result(
         spacing=float(np.median([scan.cloud.spacing for scan in scans])),
         unit=scans[first].cloud.unit,
     )
+
+
+def _judged_as_they_lie(scans: list[Scan], group: Group) -> list[Scan]:
+    """Return the scans, to be judged as strictly as those of a group agree: alike for poses that were found and that were given."""
+    scans = with_strictness(scans, [])
+    return with_strictness(scans, pairs_as_they_lie(scans, group))
 
 
 def _pair_fit(scans: list[Scan], names: list[str], pair: tuple[int, int], fit: Fit) -> PairFit:

@@ -10,7 +10,6 @@ from ..kernels import normals as facing
 from ..kernels import overlap as kernels_of_overlap
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
-from ..kernels.nearby import nearest_places
 from ..machine import in_parts
 from ..scan.sites import sites_of_points
 
@@ -71,9 +70,9 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
 
 
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Return places (S, 3) that keep a spacing: means of the points nearest to the first of each neighbourhood."""
+    """Return places (S, 3) that nearly keep a spacing: means of the points around the first of each neighbourhood."""
     owner, chosen, sites, boxes = sites_of_points(points, spacing)
-    nearest_places(points, boxes, sites, spacing, owner, 0, len(points))
+    kernels_of_overlap.first_places(points, boxes, sites, spacing, owner)
     count = len(chosen)
     mean = np.zeros((count, 3))
     start = np.zeros(count + 1, np.int64)
