@@ -17,9 +17,19 @@ from .kernels.seat import nearest_site
 from .kernels.surface import Surface, walk
 from .lines.find import find_lines
 from .lines.network import NO_LINES, Lines
+from .machine import in_parts
 from .rolls import boundary_loops
 from .scan.cloud import PointCloud
-from .scan.sites import Sites, broad_normals, check_two_sided, is_graded, prepare_sites, sites_with, with_whole_rim
+from .scan.sites import (
+    Sites,
+    broad_normals,
+    check_two_sided,
+    is_graded,
+    prepare_sites,
+    sites_with,
+    with_own_scratch,
+    with_whole_rim,
+)
 from .settings import Settings
 
 Progress = Callable[[str, float], None]
@@ -28,6 +38,7 @@ SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member length
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
+PART = 500  # fewest places of a loop for a thread of their own
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 
 
@@ -198,11 +209,21 @@ def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: flo
     touched = np.empty_like(places)
     for reach in (8, 4):
         ahead = np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
-        kernels.touch_points(surface, places, ahead, near, radius, touched)
+        _touch_points(surface, places, ahead, near, radius, touched)
         places = smooth_turns(touched)
     touched = touched[_onwards(touched)]
     forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
     return touched[forward]
+
+
+def _touch_points(
+    surface: Surface, places: np.ndarray, ahead: np.ndarray, near: np.ndarray, radius: float, touched: np.ndarray
+) -> None:
+    def touch(part: int, begin: int, end: int) -> None:
+        own = surface if part == 0 else with_own_scratch(surface)
+        kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
+
+    in_parts(len(places), PART, touch)
 
 
 def _onwards(touched: np.ndarray) -> list[int]:

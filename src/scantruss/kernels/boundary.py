@@ -223,9 +223,16 @@ def roll_disc(
 
 @kernel
 def touch_points(
-    surface: Surface, places: np.ndarray, ahead: np.ndarray, sites: np.ndarray, radius: float, touched: np.ndarray
+    surface: Surface,
+    places: np.ndarray,
+    ahead: np.ndarray,
+    sites: np.ndarray,
+    radius: float,
+    touched: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
-    """Slide a disc from outside against the points at each place of a loop.
+    """Slide a disc from outside against the points at each place of a loop from `begin` to `end` - 1.
 
     Parameters
     ----------
@@ -234,7 +241,7 @@ def touch_points(
     touched : (M, 3) filled with the point that the disc touches first
     """
     noise = 0.35 * surface.scale[0]
-    for m in range(len(places)):
+    for m in range(begin, end):
         site, place = sites[m], row(places, m)
         normal = row(surface.normals, site)
         out = unit(cross(row(ahead, m), normal))

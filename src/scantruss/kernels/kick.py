@@ -23,6 +23,8 @@ ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
 
+HOPELESS = 2.2  # energy that moves at random and a first settling may cost: what costs more never pays in the end
+
 
 class Area(NamedTuple):
     """The nodes that a kick may change, as they were before it."""
@@ -237,8 +239,11 @@ def kick(
     before = area_energy(net, scratch, area, length, weight)
     if move_at_random(net, patches, rim, scratch, area) == 0:
         return False
-    for _ in range(ROUNDS):
+    for turn in range(ROUNDS):
         settle_area(net, patches, rim, area, length, weight)
+        if turn == 0 and area_energy(net, scratch, area, length, weight) - before > HOPELESS:
+            put_area_back(net, patches, area)
+            return False
         if search_area(net, patches, rim, scratch, area, length, weight, worth) == 0:
             break
     settle_area(net, patches, rim, area, length, weight)
