@@ -189,3 +189,22 @@ def test_a_cluster_is_not_asked_for_without_its_packages(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", no_dask)
     assert list(open_workers(1).run(add, [1], 1)) == [(0, 2)]
+
+
+def test_a_client_that_came_up_by_half_is_gone_before_the_next_one_starts(monkeypatch):
+    """Closed by chance while another one starts, it would wait for a lock that the other one holds."""
+    distributed = pytest.importorskip("distributed")
+    gone = []
+
+    class Half:
+        def __init__(self, *words, **options):
+            self.itself = self
+            raise OSError("refused")
+
+        def __del__(self):
+            gone.append(True)
+
+    monkeypatch.setattr(distributed, "Client", Half)
+    with pytest.raises(InputError, match="no scheduler answers") as caught:
+        Cluster(0, "tcp://127.0.0.1:1")
+    assert gone and caught.value.__context__ is None

@@ -6,6 +6,7 @@ worker once. A worker that dies is made good: what it had is done again.
 
 from __future__ import annotations
 
+import gc
 import logging
 import multiprocessing
 import signal
@@ -162,6 +163,7 @@ class Cluster(Workers):
         from distributed import Client
 
         self._ends = ExitStack()
+        failure: ScanTrussError | None = None
         try:
             cluster = scheduler or self._ends.enter_context(_local_cluster(count))
             self._client = self._ends.enter_context(Client(cluster, timeout=PATIENCE))
@@ -169,11 +171,14 @@ class Cluster(Workers):
         except ModuleNotFoundError:
             versions = {scheduler: ""}
         except Exception as error:  # what answers may be anything, and its first bytes a length
-            self._ends.close()
-            raise _no_cluster(scheduler, error) from None
+            failure = _no_cluster(scheduler, error)
         except BaseException:
             self._ends.close()
             raise
+        if failure is not None:  # out of reach of the error, which holds a client that came up by half
+            self._ends.close()
+            gc.collect()  # or that one is closed while the next one starts, and each waits for the other
+            raise failure
         other = sorted({version or "none" for version in versions.values() if version != __version__})
         if other or not versions:
             self._ends.close()
