@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -262,15 +261,13 @@ def test_a_sweep_refuses_in_one_line_and_writes_nothing(words, line, place, caps
     assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
 
 
-def test_a_sweep_says_once_that_any_of_its_methods_must_be_compiled(monkeypatch):
-    notes = []
+@pytest.mark.parametrize(
+    ("compiled", "method"), [(("default", "paper"), "default"), (("default",), "paper"), ((), "default")]
+)
+def test_a_sweep_compiles_the_first_of_its_methods_that_needs_it(monkeypatch, compiled, method):
     trials = [Trial(m, m, (m,), st.Settings(length=1.0, method=m)) for m in ("default", "paper", "default")]
-    bars = SimpleNamespace(note=notes.append)
-    for compiled, times in ((("default", "paper"), 0), (("default",), 1), ((), 1)):
-        notes.clear()
-        monkeypatch.setattr(ahead, "are_compiled", lambda method, *stages, known=compiled: method in known)
-        scaling._note_compiling(bars, trials)
-        assert [note.split()[0] for note in notes] == ["compiling"] * times
+    monkeypatch.setattr(ahead, "are_compiled", lambda method, *stages: method in compiled)
+    assert scaling._method_to_compile(trials, "default") == method
 
 
 def test_a_sweep_into_a_file_is_refused(place, capsys):

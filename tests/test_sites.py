@@ -72,12 +72,13 @@ def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points, radi
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
 def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points, radius):
-    """With links to all the others that is the nearest of all, the first of several."""
+    """With links to all the others that is the nearest of all, the first of several that are as near but for rounding."""
     owner, chosen = thinned(points, radius)
     places, all_others = points[chosen], np.arange(len(chosen))
     links = np.stack([np.append(np.delete(all_others, s), -1) for s in all_others])
     settle_points(points, places, links, owner, 0, len(points))
-    assert owner.tolist() == [((places - place) ** 2).sum(axis=1).argmin() for place in points]
+    squares = ((points[:, None] - places) ** 2).sum(axis=2)
+    assert owner.tolist() == (squares <= squares.min(axis=1, keepdims=True) * (1 + 1e-6)).argmax(axis=1).tolist()
 
 
 @pytest.mark.kernels

@@ -13,24 +13,7 @@ from .boxes import SearchBoxes, box_index, put, search, slot_of
 from .compile import kernel
 from .vectors import dot, row, smallest_eigenvector, subtract
 
-
-@kernel
-def number_boxes(points: np.ndarray, boxes: SearchBoxes, number: np.ndarray) -> int:
-    """The search box of each point (N,), numbered as they come; returns how many there are. The boxes must be empty."""
-    count = 0
-    for p in range(len(points)):
-        i, j, k = (
-            box_index(boxes, 0, points[p, 0]),
-            box_index(boxes, 1, points[p, 1]),
-            box_index(boxes, 2, points[p, 2]),
-        )
-        slot = slot_of(boxes, i, j, k)
-        if boxes.keys[slot] == -1:
-            boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
-            boxes.first[slot] = count
-            count += 1
-        number[p] = boxes.first[slot]
-    return count
+ALIKE = 1e-6  # squared distances that differ by less are the same, as a share
 
 
 @kernel
@@ -104,26 +87,29 @@ def settle_points(
 ) -> None:
     """Give each point from `begin` to `end` - 1 to the nearest site: from its own (N,) on over the links, as long as one is nearer.
 
-    Which site it had at first then makes no difference, and with it how the boxes lie.
+    Of sites as near but for rounding, as regular points have many, the first. Then neither the site that a point had at first makes a
+    difference, nor where the scan lies.
     """
     for p in range(begin, end):
         place, site = row(points, p), owner[p]
         d = subtract(row(places, site), place)
         least = dot(d, d)
         while True:
-            to = site
+            to, first, nearly = site, site, least * (1.0 + ALIKE)
             for k in range(neighbors.shape[1]):
                 n = neighbors[site, k]
                 if n < 0:
                     break
                 d = subtract(row(places, n), place)
                 dd = dot(d, d)
-                if dd < least or (dd == least and n < to):
+                if dd <= nearly:
+                    first = min(first, n)
+                if dd < least:
                     least, to = dd, n
             if to == site:
+                owner[p] = first
                 break
             site = to
-        owner[p] = site
 
 
 @kernel

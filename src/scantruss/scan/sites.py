@@ -24,8 +24,8 @@ from .streamline import is_dense, points_near, streamlined
 
 NEIGHBORS = 12  # links of a site
 CLOSE = 1.5  # size of the search boxes while sites are chosen, in their radii
-LARGE = 8.0  # size of the boxes that points are sorted by, in radii of a site
-ACROSS = 25  # most of these boxes along a scan
+MANY = 250_000  # points from which on they no longer fit into the cache, and are sorted
+LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
 PART = 20_000  # fewest points for a thread of their own
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
@@ -125,8 +125,7 @@ def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
     if sites.whole is None or len(rim) == 0:
         return surface
     near = sites.whole[points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1])]
-    owner = np.empty(len(near), np.int64)
-    means, reach = surface.mean, 2.0 * surface.scale[1]
+    owner, means, reach = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
     in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, reach, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
@@ -186,7 +185,7 @@ def _prepare(
     whole, size = points, FINE * radius if measured is None else 0.0
     points = _fewer(whole, size, spacing)
     if measured is None:  # made-up points come last
-        points = _by_box(points, radius)
+        points = _sorted(points, radius)
     found = _linked(points, radius, length, spacing)
     strays = 0
     if stray_distance and has_strays(found.neighbors):
@@ -194,7 +193,7 @@ def _prepare(
         strays = int(stray.sum())
         if strays:
             whole = np.ascontiguousarray(whole[~stray])
-            points = _by_box(_fewer(whole, size, spacing), radius)
+            points = _sorted(_fewer(whole, size, spacing), radius)
             found = _linked(points, radius, length, spacing)
     rough = ROUGH * length
     if _is_rough(found, SHEETS * length):
@@ -206,9 +205,7 @@ def _prepare(
     if _is_rough(found, rough):
         settled = np.empty_like(mean)
         kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
-        joined, chosen, mean, boxes = sites_of_points(settled, radius)
-        neighbors = _neighbors(mean, boxes, length, radius, spacing)
-        kernels.settle_points(settled, mean, neighbors, joined, 0, len(joined))
+        joined, chosen, mean, boxes, neighbors = _settled(settled, radius, length, spacing)
         grouped, start, _ = _group(points, joined[owner], len(chosen))
         measured = int((chosen < measured).sum())
         normals, thickness = _normals(mean, neighbors)
@@ -251,13 +248,27 @@ def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
     return points[streamlined(points, size)] if is_dense(spacing, size) else points
 
 
-def _by_box(points: np.ndarray, radius: float) -> np.ndarray:
-    """Return the points sorted by large search boxes: what lies together in space then does so in memory, in all that follows."""
-    lower, upper = bounds_of(points)
-    size = max(LARGE * radius, float((upper - lower).max()) / ACROSS)
-    boxes, number = new_boxes(lower, upper, size, 0, (ACROSS + 2) ** 3), np.empty(len(points), np.int64)
-    grouped, _, _ = _group(points, number, kernels.number_boxes(points, boxes, number))
-    return grouped
+def _sorted(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return many points sorted by much larger sites: what lies together in space then does so in memory, in all that follows.
+
+    By sites, not by boxes: a scan that is turned or moved stays sorted as it was.
+    """
+    if len(points) < MANY:
+        return points
+    owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)
+    return _group(points, owner, len(places))[0]
+
+
+def _settled(
+    points: np.ndarray, radius: float, length: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
+    """Return the nearest site of each point, the point of each site and where it is, the sites by box and their neighbours."""
+    owner, chosen, places, boxes = sites_of_points(points, radius)
+    neighbors = _neighbors(places, boxes, length, radius, spacing)
+    in_parts(
+        len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)
+    )
+    return owner, chosen, places, boxes, neighbors
 
 
 class _Linked(NamedTuple):
@@ -276,11 +287,7 @@ class _Linked(NamedTuple):
 
 def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
     """Return the sites of points for one thinning radius."""
-    owner, chosen, places, boxes = sites_of_points(points, radius)
-    neighbors = _neighbors(places, boxes, length, radius, spacing)
-    in_parts(
-        len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)
-    )
+    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
     grouped, start, mean = _group(points, owner, len(chosen))
     return _Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
