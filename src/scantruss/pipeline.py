@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .errors import CertificateError, FrontError, InputError
+from .errors import CertificateError, FrontError, InputError, ScanTrussError
 from .settings import Settings, shortest_and_longest
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ GAPS = 2.2  #: ... and where points lie at random, this many distances to the si
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
 LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+COARSER = (1.1, 1.2, 1.3)  #: sizes of the sites where none passes, in those of the settings
+COARSEST = 0.5  #: of all, in lengths
 ATTEMPTS = (1.0, 0.97, 1.04)  #: desired lengths of the front, one after the other until a grid passes all checks
 
 
@@ -77,6 +79,7 @@ def grid_from_cloud(
     progress: Progress | None = None,
     keep_failed: bool = False,
     read_seconds: float = 0.0,
+    again: bool = True,
 ) -> Grid:
     """Return the grid of a point cloud; see `grid_from_points`.
 
@@ -92,12 +95,14 @@ def grid_from_cloud(
         Return a grid that fails its certificate too.
     read_seconds : float
         What reading took [s], for the table of times.
+    again : bool
+        Try other settings where no grid passes the checks.
 
     Returns
     -------
     Grid
-        Where no grid passes the checks, one without the ridges of the scan or by the paper's method, if that passes; its
-        settings say so: `ridge_angle` 0, `method` "paper".
+        Where no grid passes the checks, one without the ridges of the scan, with coarser sites or by the paper's method, if that
+        passes; its settings say so: `ridge_angle` 0, a larger `box_size`, `method` "paper".
     """
     started = perf_counter()
     check_length(cloud, settings)
@@ -114,10 +119,9 @@ def grid_from_cloud(
         front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
         before = grid.before or front.quality
     except FrontError as error:
-        other = _simpler(boundary, settings)
-        if other is not None:
-            with suppress(FrontError):
-                grid = grid_from_cloud(cloud, other, progress=progress)
+        for other in _others(boundary, settings) if again else ():
+            with suppress(ScanTrussError):
+                grid = grid_from_cloud(cloud, other, progress=progress, again=False)
                 return grid.replace(seconds=grid.seconds | {"total": read_seconds + perf_counter() - started})
         if not isinstance(error, CertificateError) or not keep_failed or len(error.grid.triangles) == 0:
             raise
@@ -133,11 +137,19 @@ def grid_from_cloud(
     return grid.replace(settings=settings, before=before, seconds=seconds)
 
 
-def _simpler(boundary: Boundary, settings: Settings) -> Settings | None:
-    """Settings that may lead to a grid where these do not: rather one without ridges, or a less even one, than none."""
+def _others(boundary: Boundary, settings: Settings) -> Iterator[Settings]:
+    """Settings that may lead to a grid where these do not: rather one without ridges, or a less even one, than none.
+
+    A scan so rough that hardly a grid passes is another one to sites that are a little coarser.
+    """
     if boundary.lines.sharp.any():
-        return settings.replace(ridge_angle=0.0)
-    return settings.replace(method="paper") if settings.method == "default" else None
+        settings = settings.replace(ridge_angle=0.0)
+        yield settings
+    if settings.method == "default":
+        for size in (share * settings.box_size for share in COARSER):
+            if size <= COARSEST:
+                yield settings.replace(box_size=size)
+        yield settings.replace(method="paper")
 
 
 def _checked_grid(

@@ -13,7 +13,7 @@ from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
 
-APART = 0.45  # distance of the posts, in member lengths: farther apart some nodes of a lattice are nearest to none
+APART = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
 FEWEST = 12  # posts of the coarsest level
 LINKS = 12  # links of a post

@@ -239,6 +239,10 @@ def make_grid(
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=read_seconds)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
+    if grid.settings is not None and grid.settings.box_size != settings.box_size:
+        bars.note(
+            f"no finer look at this scan gives a grid that passes, so it is made as with --box-size {grid.settings.box_size:g}"
+        )
     if grid.settings is not None and grid.settings.method != settings.method:
         bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
     note_strays(bars, cloud, settings)
