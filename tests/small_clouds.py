@@ -5,6 +5,7 @@ import numpy as np
 from scantruss import PointCloud, Settings
 from scantruss.front import new_front
 from scantruss.kernels import front as lists
+from scantruss.kernels.fits import near_nodes
 from scantruss.kernels.surface import PATCH
 from scantruss.scan.sites import prepare_sites
 
@@ -107,7 +108,7 @@ class HandFront:
 
     def near(self, s, reach=2.4):
         """Number of nodes near a segment, in `found`."""
-        return lists.near_nodes(self.surface, self.front, s, reach, self.settings.length, self.found)
+        return near_nodes(self.surface, self.front, s, reach, self.settings.length, self.found)
 
     @property
     def triangles(self):

@@ -16,6 +16,7 @@ from scantruss.kernels import front as lists
 from scantruss.kernels import gaps
 from scantruss.kernels.boxes import new_boxes
 from scantruss.kernels.cases import choose_by_case
+from scantruss.kernels.fits import near_nodes
 from scantruss.kernels.triangles import shape_quality
 
 METHODS = ("default", "paper")
@@ -191,7 +192,7 @@ def test_a_grown_front_keeps_what_it_holds():
     for s in range(1, 9):
         if hand.front.state[s] != lists.GONE:
             before = sorted(hand.found[: hand.near(s)].tolist())
-            count = lists.near_nodes(hand.surface, larger, s, 2.4, 1.0, hand.found)
+            count = near_nodes(hand.surface, larger, s, 2.4, 1.0, hand.found)
             assert sorted(hand.found[:count].tolist()) == before
 
 

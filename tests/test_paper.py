@@ -16,7 +16,7 @@ import scantruss as st
 from scantruss.boundary import boundary_nodes
 from scantruss.front import new_front, start_front
 from scantruss.grid.flips import flip_edges
-from scantruss.kernels import cases
+from scantruss.kernels import cases, fits
 from scantruss.kernels import front as lists
 from scantruss.kernels.advance import advance_by_cases
 from scantruss.kernels.boxes import box_index, new_boxes
@@ -211,7 +211,7 @@ def test_section_3_4_step_2_half_a_length_is_the_limit(height, far):
     hand = HandFront(square(5))
     near = hand.near(AB)
     place = three(1.5, height)
-    assert lists.far_from_front(hand.front, AB, -1, place, hand.found, near, 0.5 * 1.0, 1.0) == far
+    assert fits.far_from_front(hand.front, AB, -1, place, hand.found, near, 0.5 * 1.0, 1.0) == far
 
 
 @pytest.mark.kernels
@@ -247,7 +247,7 @@ def advance_once(hand, s=0):
 
 def case(hand, s=0):
     """Number of the case in which a segment is."""
-    angles = lists.left_angle(hand.front, s), lists.right_angle(hand.front, s)
+    angles = fits.left_angle(hand.front, s), fits.right_angle(hand.front, s)
     return cases.case_of(hand.front, s, *angles, hand.numbers[lists.MERGE])
 
 
@@ -387,8 +387,8 @@ def test_table_1_90_degrees_are_the_limit_and_80_may_be_set():
 def test_table_1_angles_are_those_of_the_unmeshed_area():
     """At a re-entrant corner the angle is 270 degrees, not 90."""
     hand = HandFront(around((0.0, -1.0), (1.0, 1.0)))
-    assert lists.left_angle(hand.front, 0) == pytest.approx(1.5 * math.pi)
-    assert lists.right_angle(hand.front, 0) == pytest.approx(0.5 * math.pi)
+    assert fits.left_angle(hand.front, 0) == pytest.approx(1.5 * math.pi)
+    assert fits.right_angle(hand.front, 0) == pytest.approx(0.5 * math.pi)
 
 
 # Sec. 3.3 and 3.6: boundaries; Fig. 4: the whole

@@ -9,6 +9,7 @@ import numpy as np
 from .cases import choose_by_case
 from .compile import kernel
 from .field import length_at
+from .fits import far_from_front, fits, left_angle, near_nodes, right_angle
 from .front import (
     ACTIVE,
     DONE,
@@ -32,12 +33,7 @@ from .front import (
     Front,
     add_node,
     attach,
-    far_from_front,
-    fits,
-    left_angle,
-    near_nodes,
     propose_node,
-    right_angle,
 )
 from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .triangles import quality, turned

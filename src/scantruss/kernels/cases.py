@@ -8,6 +8,7 @@ import numpy as np
 
 from .boxes import put, take
 from .compile import kernel
+from .fits import clear_of_front, far_from_front, fits, left_angle, near_nodes, right_angle
 from .front import (
     LENGTH,
     MERGE,
@@ -22,17 +23,11 @@ from .front import (
     add_node,
     add_triangle,
     attach,
-    clear_of_front,
     edge_exists,
     enqueue,
-    far_from_front,
-    fits,
-    left_angle,
     link,
-    near_nodes,
     propose_node,
     remove_segment,
-    right_angle,
 )
 from .surface import Surface, fit_patch, flood, onto_patch, patch_normal, walk
 from .triangles import distance_to_segment, on_unmeshed_side, quality, shape_quality, turned
