@@ -20,10 +20,10 @@ from .lines.network import NO_LINES, Lines
 from .machine import in_parts
 from .rolls import boundary_loops
 from .scan.cloud import PointCloud
+from .scan.orientation import check_two_sided
 from .scan.sites import (
     Sites,
     broad_normals,
-    check_two_sided,
     is_graded,
     prepare_sites,
     sites_with,
@@ -127,7 +127,7 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
         External loops first, each piece's longest loop being external; empty for a closed surface.
     """
     sites = prepare_sites(cloud, settings)
-    check_two_sided(sites)
+    check_two_sided(sites.surface, sites.thickness)
     if progress:
         progress("boundary", 0.4)
     loops = _external_first(_find_loops(sites, settings))

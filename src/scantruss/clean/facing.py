@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels import facing as near_kernels
 from ..kernels import normals as kernels
 from ..machine import in_parts
-from ..scan.sites import HEAD_ON, STEEP, face_outside
+from ..scan.orientation import HEAD_ON, STEEP, face_one_side, face_outside
 from .nearby import AROUND, PART, Nearby, grow_tree
 from .thinning import thin_to
 
@@ -44,11 +44,7 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     place, own = few.tree.points, np.ascontiguousarray(normals[chosen])
     neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS])
     kernels.cut_steep_links(place, own, neighbors, STEEP)
-    weights = np.empty(neighbors.shape, np.uint8)
-    kernels.link_weights(place, own, neighbors, weights)
-    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
-    piece = np.empty(len(place), np.int64)
-    kernels.orient_normals(place, own, neighbors, order, piece)
+    piece = face_one_side(place, own, neighbors)
     face_outside(place, own, piece)
     planes, thickness = np.empty_like(own), np.empty(len(place))
     kernels.site_normals(place, neighbors, planes, thickness, 0, len(place))

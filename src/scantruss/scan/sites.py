@@ -4,38 +4,25 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ..clean.duplicates import find_repeated, has_repeats
 from ..clean.strays import find_strays, has_strays
-from ..errors import InputError
 from ..kernels import normals as facing
-from ..kernels import sites as kernels
-from ..kernels.boxes import SearchBoxes, new_boxes
+from ..kernels.boxes import SearchBoxes
 from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
-from .cloud import PointCloud, bounds_of
+from .cloud import PointCloud
 from .field import Wish, length_field, wish_of
-from .streamline import is_dense, points_near, streamlined
+from .linked import ROUGH, SHEETS, Linked, group, is_rough, linked, linked_finer, settled_to_sheet, thinned
+from .orientation import STEEP, face_one_side, face_outside
+from .streamline import points_near
 
-NEIGHBORS = 12  # links of a site
-CLOSE = 1.5  # size of the search boxes while sites are chosen, in their radii
-MANY = 250_000  # points from which on they no longer fit into the cache, and are sorted
-LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
 PART = 20_000  # fewest points for a thread of their own
-FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
-HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
-STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
-ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
-SOME_ROUGH = 0.002  # share of such sites from which on that is done
-SHEETS = 0.12  # sites thicker than this may be several sheets
-FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
-FINEST = 1.0  # spacings between the finest sites
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +116,7 @@ def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
     in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, reach, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
-    grouped, start, _ = _group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
+    grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
     return surface._replace(points=grouped, start=start)
 
 
@@ -176,193 +163,65 @@ def _prepare(
     wish: Wish | None,
     measured: int | None = None,
 ) -> Sites:
+    """Return the sites of points, of which those from the number `measured` on are made up."""
     radius = max(box_size * length, 0.25 * spacing)
-    repeated = 0
+    repeated, strays = 0, 0
     if drop_repeated and has_repeats(points):
         kept = ~find_repeated(points)
         repeated = int(len(points) - kept.sum())
         points = np.ascontiguousarray(points[kept])
-    whole, size = points, FINE * radius if measured is None else 0.0
-    points = _fewer(whole, size, spacing)
-    if measured is None:  # made-up points come last
-        points = _sorted(points, radius)
-    found = _linked(points, radius, length, spacing)
-    strays = 0
+    whole = points
+    if measured is None:
+        points = thinned(whole, radius, spacing)
+    found = linked(points, radius, length, spacing)
     if stray_distance and has_strays(found.neighbors):
         stray = find_strays(whole, stray_distance, length)
         strays = int(stray.sum())
         if strays:
             whole = np.ascontiguousarray(whole[~stray])
-            points = _sorted(_fewer(whole, size, spacing), radius)
-            found = _linked(points, radius, length, spacing)
-    rough = ROUGH * length
-    if _is_rough(found, SHEETS * length):
-        fine = _linked_finer(whole, radius, length, spacing)
+            points = thinned(whole, radius, spacing)
+            found = linked(points, radius, length, spacing)
+    if is_rough(found, SHEETS * length):
+        fine = linked_finer(whole, radius, length, spacing)
         if fine is not None:
             points, (found, radius) = whole, fine
-    measured = len(found.chosen) if measured is None else int((found.chosen < measured).sum())
-    owner, _, grouped, start, boxes, mean, neighbors, normals, thickness = found
-    if _is_rough(found, rough):
-        settled = np.empty_like(mean)
-        kernels.settle_sites(mean, neighbors, thickness, rough, 0.6 * length, settled)
-        joined, chosen, mean, boxes, neighbors = _settled(settled, radius, length, spacing)
-        grouped, start, _ = _group(points, joined[owner], len(chosen))
-        measured = int((chosen < measured).sum())
-        normals, thickness = _normals(mean, neighbors)
-    facing.trust_thin_sites(mean, normals, neighbors, thickness, rough, STEEP)
-    facing.cut_steep_links(mean, normals, neighbors, STEEP)
-    weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
-    facing.link_weights(mean, normals, neighbors, weights)
-    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
-    piece = np.empty(len(mean), np.int64)
-    facing.orient_normals(mean, normals, neighbors, order, piece)
-    smoothed = np.empty_like(normals)
-    facing.smooth_normals(normals, neighbors, 0.7, smoothed)
-    face_outside(mean, smoothed, piece)
-    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
-    scratch = np.zeros(len(mean), np.int64)
-    surface = Surface(
-        grouped,
-        start,
-        mean,
-        smoothed,
-        neighbors,
-        scale,
-        scratch,
-        scratch.copy(),
-        np.zeros(1, np.int64),
-        np.ones(len(mean)),
-    )
+    if is_rough(found, ROUGH * length):
+        found = settled_to_sheet(found, points, radius, length, spacing)
+    surface, piece = _faced_surface(found, radius, length, spacing)
     surface = surface._replace(field=length_field(surface, wish))
     piece = _number(piece)
     area = _site_areas(surface)
     graded = area / surface.field**2
-    large = _large_pieces(piece, area, graded, length)
-    total, scaled = float(area.sum()), float(graded.sum())
-    dense = whole if len(points) < len(whole) else None
-    return Sites(surface, boxes, piece, thickness, spacing, total, scaled, large, strays, repeated, measured, dense)
-
-
-def _fewer(points: np.ndarray, size: float, spacing: float) -> np.ndarray:
-    """Return one point of each box of a size where they lie much denser, else all."""
-    return points[streamlined(points, size)] if is_dense(spacing, size) else points
-
-
-def _sorted(points: np.ndarray, radius: float) -> np.ndarray:
-    """Return many points sorted by much larger sites: what lies together in space then does so in memory, in all that follows.
-
-    By sites, not by boxes: a scan that is turned or moved stays sorted as it was.
-    """
-    if len(points) < MANY:
-        return points
-    owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)
-    return _group(points, owner, len(places))[0]
-
-
-def _settled(
-    points: np.ndarray, radius: float, length: float, spacing: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
-    """Return the nearest site of each point, the point of each site and where it is, the sites by box and their neighbours."""
-    owner, chosen, places, boxes = sites_of_points(points, radius)
-    neighbors = _neighbors(places, boxes, length, radius, spacing)
-    in_parts(
-        len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)
+    return Sites(
+        surface,
+        found.boxes,
+        piece,
+        found.thickness,
+        spacing,
+        float(area.sum()),
+        float(graded.sum()),
+        _large_pieces(piece, area, graded, length),
+        strays,
+        repeated,
+        len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
+        whole if len(points) < len(whole) else None,
     )
-    return owner, chosen, places, boxes, neighbors
 
 
-class _Linked(NamedTuple):
-    """Sites of one thinning radius, linked; their normals of either sign."""
-
-    owner: np.ndarray  #: (N,) int64 site of each point
-    chosen: np.ndarray  #: (S,) int64 point of each site
-    grouped: np.ndarray  #: (N, 3) the points sorted by site
-    start: np.ndarray  #: (S + 1,) int64 where each site's points start
-    boxes: SearchBoxes
-    mean: np.ndarray  #: (S, 3)
-    neighbors: np.ndarray  #: (S, NEIGHBORS) int64
-    normals: np.ndarray  #: (S, 3)
-    thickness: np.ndarray  #: (S,)
-
-
-def _linked(points: np.ndarray, radius: float, length: float, spacing: float) -> _Linked:
-    """Return the sites of points for one thinning radius."""
-    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
-    grouped, start, mean = _group(points, owner, len(chosen))
-    return _Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
-
-
-def _linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[_Linked, float] | None:
-    """Return finer sites, and their radius, where these form smooth sheets; None where they do not.
-
-    Sheets that lie side by side, a few sites apart, look like one rough layer. They come apart as soon as the sites are finer.
-    """
-    for _ in range(FINER):
-        radius *= 0.5
-        if radius < FINEST * spacing:
-            return None
-        found = _linked(points, radius, length, spacing)
-        if not _is_rough(found, ROUGH * length):
-            return found, radius
-    return None
-
-
-def _is_rough(found: _Linked, rough: float) -> bool:
-    """Whether the sites form a thick layer, no sheet."""
-    return bool((found.thickness > rough).mean() > SOME_ROUGH)
-
-
-def _group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points sorted by site, where each site's points start, and their means."""
-    start, mean = np.zeros(sites + 1, np.int64), np.zeros((sites, 3))
-    grouped, index = np.empty_like(points), np.empty(len(points), np.int64)
-    kernels.group_points(points, owner, start, grouped, index, mean)
-    return grouped, start, mean
-
-
-def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:
-    """Return the neighbours of each site (S, 3) among the others."""
-    neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
-    far = max(0.7 * length, 3.0 * spacing)
-    near = max(2.9 * radius, 1.5 * spacing)
-    in_parts(
-        len(places), 3000, lambda _, begin, end: kernels.nearest_sites(places, boxes, near, far, neighbors, begin, end)
-    )
-    kernels.link_back(places, neighbors)
-    return neighbors
-
-
-def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal of each site (either sign) and the thickness of the points there."""
-    normals, thickness = np.empty_like(mean), np.empty(len(mean))
-    in_parts(
-        len(mean), 3000, lambda _, begin, end: facing.site_normals(mean, neighbors, normals, thickness, begin, end)
-    )
-    return normals, thickness
-
-
-def sites_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
-    """Return a site within the radius of each point, the point of each site and where it is (S, 3), and the sites by box.
-
-    Sites are points that keep the radius: each that has no earlier site nearer.
-    """
-    owner = np.full(len(points), -1, np.int64)
-    lower, upper = bounds_of(points)
-    capacity, begin, count = 1 << 14, 0, 0
-    chosen, places = np.empty(capacity, np.int64), np.empty((capacity, 3))
-    while True:
-        boxes = new_boxes(lower, upper, CLOSE * radius, capacity, capacity)
-        kernels.put_all(boxes, points, chosen[:count])
-        begin, count = kernels.choose_sites(points, radius, boxes, owner, chosen, places, begin, count)
-        if begin == len(points):
-            break
-        chosen = np.concatenate([chosen[:count], np.empty(3 * capacity, np.int64)])
-        places = np.concatenate([places[:count], np.empty((3 * capacity, 3))])
-        capacity = len(chosen)
-    places, chosen = places[:count].copy(), chosen[:count].copy()
-    boxes = new_boxes(lower, upper, 4.0 * radius, count, count)
-    kernels.put_all(boxes, places, np.arange(count))
-    return owner, chosen, places, boxes
+def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
+    """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
+    mean, normals, neighbors = found.mean, found.normals, found.neighbors
+    facing.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    facing.cut_steep_links(mean, normals, neighbors, STEEP)
+    piece = face_one_side(mean, normals, neighbors)
+    smoothed = np.empty_like(normals)
+    facing.smooth_normals(normals, neighbors, 0.7, smoothed)
+    face_outside(mean, smoothed, piece)
+    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
+    stamp, queue, counter = np.zeros(len(mean), np.int64), np.zeros(len(mean), np.int64), np.zeros(1, np.int64)
+    field = np.ones(len(mean))
+    surface = Surface(found.grouped, found.start, mean, smoothed, neighbors, scale, stamp, queue, counter, field)
+    return surface, piece
 
 
 def _number(piece: np.ndarray) -> np.ndarray:
@@ -389,35 +248,3 @@ def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, lengt
     large = (np.bincount(piece, graded) >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
     large[0] = True
     return tuple(int(i) for i in np.flatnonzero(large))
-
-
-def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
-    """Turn the normals of each piece away from its centre; upwards where that does not tell (a plate)."""
-    _, inverse = np.unique(piece, return_inverse=True)
-    inverse = inverse.ravel()
-    count = np.bincount(inverse)
-    centre = np.stack([np.bincount(inverse, mean[:, c]) / count for c in range(3)], axis=1)
-    arm = mean - centre[inverse]
-    size = np.sqrt(np.bincount(inverse, (arm**2).sum(axis=1)) / count)
-    bulge = np.bincount(inverse, (arm * normals).sum(axis=1)) / count
-    up = np.stack([np.bincount(inverse, normals[:, c]) / count for c in range(3)], axis=1)
-    for i in range(len(count)):
-        side = bulge[i]
-        if abs(side) < 0.01 * max(size[i], 1e-300):
-            side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
-        if side < 0:
-            normals[inverse == i] *= -1.0
-
-
-def check_two_sided(sites: Sites) -> None:
-    """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
-
-    Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
-    or overgrown that happens by chance.
-    """
-    surface = sites.surface
-    smooth = 0.15 * surface.scale[4]
-    if facing.head_on_links(surface.mean, surface.normals, surface.neighbors, sites.thickness, smooth) >= HEAD_ON:
-        raise InputError(
-            "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
-        )

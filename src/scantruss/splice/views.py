@@ -11,7 +11,8 @@ from ..kernels import overlap as kernels_of_overlap
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..machine import in_parts
-from ..scan.sites import sites_of_points
+from ..scan.linked import sites_of_points
+from ..scan.orientation import face_one_side
 
 AROUND = 14  # neighbours of a place, for its normal
 FEWEST = 5  # neighbours below which a place is left out: it lies on no surface
@@ -56,7 +57,7 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
     facing.site_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
-        _face_one_side(places, normals, neighbors)
+        _face_as_seen(places, normals, neighbors)
     else:
         kernels_of_overlap.face_like(places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing)
     smoothed = np.empty_like(normals)
@@ -104,13 +105,9 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
     return neighbors
 
 
-def _face_one_side(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
+def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Turn all normals to one side: along the links of each piece, the pieces as one sensor sees them, outwards as a whole."""
-    weights = np.empty(neighbors.shape, np.uint8)
-    facing.link_weights(places, normals, neighbors, weights)
-    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
-    piece = np.empty(len(places), np.int64)
-    facing.orient_normals(places, normals, neighbors, order, piece)
+    piece = face_one_side(places, normals, neighbors)
     number, inverse, counts = np.unique(piece, return_inverse=True, return_counts=True)
     sums = np.zeros((len(number), 3))
     np.add.at(sums, inverse, normals)

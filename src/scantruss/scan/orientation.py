@@ -1,0 +1,53 @@
+"""Normals turned to one side of a sheet, and to the outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels import normals as kernels
+from ..kernels.surface import Surface
+
+HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
+STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
+
+
+def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> np.ndarray:
+    """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,)."""
+    weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
+    kernels.link_weights(mean, normals, neighbors, weights)
+    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
+    piece = np.empty(len(mean), np.int64)
+    kernels.orient_normals(mean, normals, neighbors, order, piece)
+    return piece
+
+
+def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
+    """Turn the normals of each piece away from its centre; upwards where that does not tell (a plate)."""
+    _, inverse = np.unique(piece, return_inverse=True)
+    inverse = inverse.ravel()
+    count = np.bincount(inverse)
+    centre = np.stack([np.bincount(inverse, mean[:, c]) / count for c in range(3)], axis=1)
+    arm = mean - centre[inverse]
+    size = np.sqrt(np.bincount(inverse, (arm**2).sum(axis=1)) / count)
+    bulge = np.bincount(inverse, (arm * normals).sum(axis=1)) / count
+    up = np.stack([np.bincount(inverse, normals[:, c]) / count for c in range(3)], axis=1)
+    for i in range(len(count)):
+        side = bulge[i]
+        if abs(side) < 0.01 * max(size[i], 1e-300):
+            side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
+        if side < 0:
+            normals[inverse == i] *= -1.0
+
+
+def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
+    """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
+
+    Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
+    or overgrown that happens by chance.
+    """
+    smooth = 0.15 * surface.scale[4]
+    if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
+        raise InputError(
+            "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
+        )
