@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from .boxes import SearchBoxes, box_index, put, slot_of
+from .boxes import SearchBoxes, box_index, nearest, put, slot_of
 from .compile import kernel
 from .triangles import distance_to_triangle
-from .vectors import dot, row, subtract
+from .vectors import norm, row, subtract
 
 
 @kernel
@@ -56,17 +54,8 @@ def nearest_distances(
     for q in range(len(others)):
         x, y, z = row(others, q)
         reach = near
-        while True:
-            best = math.inf
-            for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
-                for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
-                    for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                        p = boxes.first[slot_of(boxes, i, j, k)]
-                        while p >= 0:
-                            d = subtract(row(places, p), (x, y, z))
-                            best = min(best, dot(d, d))
-                            p = boxes.next[p]
-            if best <= reach * reach:
-                distance[q] = math.sqrt(best)
-                break
+        found = nearest(boxes, places, x, y, z, reach)
+        while found < 0:
             reach *= 2.0
+            found = nearest(boxes, places, x, y, z, reach)
+        distance[q] = norm(subtract(row(places, found), (x, y, z)))
