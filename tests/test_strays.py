@@ -6,7 +6,9 @@ from shapes import make
 
 import scantruss as st
 from scantruss.clean import clean_points, strays
+from scantruss.clean.nearby import Nearby
 from scantruss.kernels import sites as kernels
+from scantruss.kernels import strays as kernels_of_strays
 from scantruss.kernels.boxes import new_boxes
 from scantruss.scan.cloud import measure_gap
 from scantruss.scan.sites import prepare_sites
@@ -147,3 +149,55 @@ def test_a_far_dense_ball_goes_though_it_has_a_tenth_of_the_points():
     ball = way / np.linalg.norm(way, axis=1)[:, None] * 7.0 * rng.random((2000, 1)) ** (1 / 3) + [0.0, 0.0, 80.0]
     clean = clean_points(np.concatenate([shape.points, ball]), smooth=False, normals=False)
     assert (clean.kept >= 20_000).sum() == 0 and (clean.kept < 20_000).sum() >= 0.995 * 20_000
+
+
+def principal(points):
+    """Mean of points (N, 3), their plane's normal, and their sums of squares about the mean along the principal axes, smallest first."""
+    squares, axes = np.linalg.eigh(np.cov(points.T, bias=True) * len(points))
+    return points.mean(axis=0), axes[:, 0], squares.clip(0.0)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("flat", [1.0, 0.2, 0.0])
+def test_planes_are_measured_as_principal_axes_tell(seed, flat):
+    points = np.random.default_rng(seed).normal(size=(60, 3)) * [1.0, 0.8, flat]
+    near = Nearby.of(points)
+    which = np.arange(0, 60, 3)
+    thick, aside = np.empty((2, len(which)))
+    kernels_of_strays.measure_planes(near.tree, which, near.neighbors, thick, aside, 0, len(which))
+    for row, p in enumerate(which):
+        beside = near.tree.points[near.neighbors[p]] - near.tree.points[p]
+        mean, normal, squares = principal(beside)
+        rms, radius = np.sqrt(squares[0] / len(beside)), np.linalg.norm(beside, axis=1).max()
+        assert thick[row] == pytest.approx(rms / radius, abs=1e-6)
+        if flat:
+            assert aside[row] == pytest.approx(abs(mean @ normal) / rms, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(4))
+def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(seed):
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(150, 3)) * [1.0, 0.9, 0.3]
+    near = Nearby.of(points)
+    alive, which = rng.random(150) < 0.7, np.arange(0, 150, 7)
+    bulk = np.empty(len(which))
+    kernels_of_strays.measure_bulk(near.tree, alive, which, bulk, 0, len(which))
+    most = kernels_of_strays.BULK
+    for row, p in enumerate(which):
+        order = np.argsort(((near.tree.points - near.tree.points[p]) ** 2).sum(axis=1), kind="stable")[: 2 * most]
+        around = near.tree.points[order[alive[order]][:most]]
+        squares = principal(around)[2]
+        assert bulk[row] == pytest.approx(squares[0] / squares.sum(), abs=1e-9)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("extent, expected", [((1, 1, 1), 1 / 3), ((1, 1, 0), 0.0), ((1, 0, 0), 0.0)])
+def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(extent, expected):
+    points = np.random.default_rng(0).normal(size=(8000, 3)) * extent
+    near = Nearby.of(points)
+    middle = np.flatnonzero(np.linalg.norm(near.tree.points, axis=1) < 0.5)[:200]
+    bulk = np.empty(len(middle))
+    kernels_of_strays.measure_bulk(near.tree, np.ones(8000, np.bool_), middle, bulk, 0, len(middle))
+    assert bulk.mean() == pytest.approx(expected, abs=0.1)

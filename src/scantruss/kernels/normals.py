@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .vectors import Vector, dot, row, smallest_eigenvector, subtract, unit
+from .vectors import Vector, dot, row, smallest_eigenvector, spread_along, subtract, unit
 
 
 @kernel
@@ -32,10 +32,7 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
             xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
             yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
     v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-    square = (
-        v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
-    )
-    return v, math.sqrt(max(square, 0.0) / count)
+    return v, math.sqrt(max(spread_along(v, xx, xy, xz, yy, yz, zz), 0.0) / count)
 
 
 @kernel

@@ -10,7 +10,7 @@ from .compile import kernel
 from .patches import FLAT, FULL, PATCH, doubt, fit
 from .quadric import COLUMNS
 from .tree import DEEPEST, Tree, nearest
-from .vectors import dot, row, smallest_eigenvector, subtract
+from .vectors import Vector, dot, norm, row, smallest_eigenvector, spread_along, subtract
 
 ROUNDS = 3  # fits of a patch, each with the points that lie off the one before weighed down
 BULK = 40  # points around a place that tell a cloud from a crease
@@ -97,34 +97,45 @@ def stand_off(
 
 
 @kernel
+def _plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, float]:
+    """Mean and plane normal of offsets (>=count, 3), and the sums of squares about the mean: across the plane, and in all."""
+    cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
+    for k in range(count):
+        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        cx, cy, cz = cx + x, cy + y, cz + z
+        xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+        yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+    cx, cy, cz = cx / count, cy / count, cz / count
+    xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
+    yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
+    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+    return (cx, cy, cz), v, max(spread_along(v, xx, xy, xz, yy, yz, zz), 0.0), xx + yy + zz
+
+
+@kernel
 def measure_planes(
     tree: Tree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
 ) -> None:
     """How thick the nearest of points `which` lie, in radii, and how far off their plane each is, in thicknesses; (P,), filled."""
+    offsets = np.empty((neighbors.shape[1], 3))
     for i in range(begin, end):
         p = which[i]
         place = row(tree.points, p)
-        count, radius = 0, 0.0
-        cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
+        count = 0
         for k in range(neighbors.shape[1]):
             if neighbors[p, k] >= 0:
-                x, y, z = subtract(row(tree.points, neighbors[p, k]), place)
-                count, cx, cy, cz = count + 1, cx + x, cy + y, cz + z
-                xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-                yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
-                radius = math.sqrt(x * x + y * y + z * z)
+                offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(
+                    row(tree.points, neighbors[p, k]), place
+                )
+                count += 1
+        radius = norm(row(offsets, count - 1)) if count else 0.0
         thick[i], aside[i] = np.inf, np.inf
         if count < FLAT or radius == 0.0:
             continue
-        cx, cy, cz = cx / count, cy / count, cz / count
-        xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
-        yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
-        v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-        rest = v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
-        rms = math.sqrt(max(v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + rest, 0.0) / count)
-        off = abs(dot((cx, cy, cz), v))
+        mean, normal, across, _ = _plane_of(offsets, count)
+        rms = math.sqrt(across / count)
         thick[i] = rms / radius
-        aside[i] = off / max(rms, 1e-9 * radius)
+        aside[i] = abs(dot(mean, normal)) / max(rms, 1e-9 * radius)
 
 
 @kernel
@@ -134,28 +145,18 @@ def measure_bulk(tree: Tree, alive: np.ndarray, which: np.ndarray, bulk: np.ndar
     0 on a surface, 1/3 where points lie to all sides alike, and little more than half of that in a sharp crease.
     """
     stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
+    offsets = np.empty((BULK, 3))
     for i in range(begin, end):
-        p = which[i]
-        place = row(tree.points, p)
+        place = row(tree.points, which[i])
         count = 0
-        cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
         for k in range(nearest(tree, place[0], place[1], place[2], 2 * BULK, stack, found, away)):
             if alive[found[k]] and count < BULK:
-                x, y, z = subtract(row(tree.points, found[k]), place)
-                count, cx, cy, cz = count + 1, cx + x, cy + y, cz + z
-                xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-                yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+                offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(row(tree.points, found[k]), place)
+                count += 1
         bulk[i] = 0.0
-        if count < FLAT:
-            continue
-        cx, cy, cz = cx / count, cy / count, cz / count
-        xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
-        yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
-        v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-        across = (
-            v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
-        )
-        bulk[i] = across / max(xx + yy + zz, 1e-300)
+        if count >= FLAT:
+            _, _, across, spread = _plane_of(offsets, count)
+            bulk[i] = across / max(spread, 1e-300)
 
 
 @kernel

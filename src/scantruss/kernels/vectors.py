@@ -68,6 +68,12 @@ def across(normal: Vector) -> Vector:
 
 
 @kernel
+def spread_along(v: Vector, xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> float:
+    """Return v' M v of a symmetric 3x3 matrix: for second moments and a unit vector the sum of squares along it."""
+    return v[0] * (xx * v[0] + 2.0 * (xy * v[1] + xz * v[2])) + v[1] * (yy * v[1] + 2.0 * yz * v[2]) + v[2] * zz * v[2]
+
+
+@kernel
 def smallest_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> Vector:
     """Unit eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix (closed form); (0, 0, 1) for a zero matrix."""
     largest = max(abs(xx), abs(yy), abs(zz), abs(xy), abs(xz), abs(yz))
