@@ -79,7 +79,6 @@ def grid_from_cloud(
     progress: Progress | None = None,
     keep_failed: bool = False,
     read_seconds: float = 0.0,
-    again: bool = True,
 ) -> Grid:
     """Return the grid of a point cloud; see `grid_from_points`.
 
@@ -95,8 +94,6 @@ def grid_from_cloud(
         Return a grid that fails its certificate too.
     read_seconds : float
         What reading took [s], for the table of times.
-    again : bool
-        Try other settings where no grid passes the checks.
 
     Returns
     -------
@@ -111,21 +108,16 @@ def grid_from_cloud(
     checked = perf_counter()
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
-
-    def check(grid: Grid) -> Grid:
-        return certified(grid, boundary, settings)
-
     try:
-        front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
-        before = grid.before or front.quality
+        grid, advanced = _attempt(cloud, boundary, settings, progress)
     except FrontError as error:
-        for other in _others(boundary, settings) if again else ():
-            with suppress(ScanTrussError):
-                grid = grid_from_cloud(cloud, other, progress=progress, again=False)
-                return grid.replace(seconds=grid.seconds | {"total": read_seconds + perf_counter() - started})
-        if not isinstance(error, CertificateError) or not keep_failed or len(error.grid.triangles) == 0:
+        other = _other_attempt(cloud, boundary, settings, progress)
+        if other is not None:
+            grid, advanced = other
+        elif keep_failed and isinstance(error, CertificateError) and len(error.grid.triangles):
+            grid, advanced = error.grid.replace(settings=settings), found
+        else:
             raise
-        grid, before, advanced = error.grid, error.grid.before, found
     ended = perf_counter()
     seconds = {
         "read": read_seconds + checked - started,
@@ -134,7 +126,31 @@ def grid_from_cloud(
         "optimize": ended - advanced,
         "total": read_seconds + ended - started,
     }
-    return grid.replace(settings=settings, before=before, seconds=seconds)
+    return grid.replace(seconds=seconds)
+
+
+def _attempt(
+    cloud: PointCloud, boundary: Boundary, settings: Settings, progress: Progress | None
+) -> tuple[Grid, float]:
+    """Return a grid that passes the checks, and when its front was done; `FrontError` where there is none."""
+
+    def check(grid: Grid) -> Grid:
+        return certified(grid, boundary, settings)
+
+    front, grid, advanced = _checked_grid(cloud, boundary, settings, check, progress)
+    return grid.replace(settings=settings, before=grid.before or front.quality), advanced
+
+
+def _other_attempt(
+    cloud: PointCloud, boundary: Boundary, settings: Settings, progress: Progress | None
+) -> tuple[Grid, float] | None:
+    """Return the same by other settings than those that failed; None where none passes either."""
+    from .boundary import find_boundary
+
+    for other in _others(boundary, settings):
+        with suppress(ScanTrussError):
+            return _attempt(cloud, find_boundary(cloud, other, progress=progress), other, progress)
+    return None
 
 
 def _others(boundary: Boundary, settings: Settings) -> Iterator[Settings]:
