@@ -70,8 +70,8 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("seed", range(5))
-def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed):
+@pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125), (3, 0.125), (4, 0.0)])
+def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, left_out):
     """All lie on it. Up to an eighth of its nodes are nearest to no post and are left out: the front makes these itself."""
     _, boundary = boundary_of(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)
     nodes = lay_rows(boundary, 1.0, Rows())
@@ -82,7 +82,7 @@ def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed):
     beside = away < 1.5
     assert away[beside] == pytest.approx(1.0, abs=1e-6)
     assert away[~beside] == pytest.approx(3**0.5, abs=1e-6)
-    assert (~beside).sum() <= 6 * 0.125 * inside.sum()
+    assert (~beside).sum() <= 6 * left_out * inside.sum()
     steps = (nodes.places[near] - nodes.places[inside][:, None])[beside]
     turns = np.degrees(np.arctan2(steps[..., 1], steps[..., 0])) % 60.0
     assert np.minimum(turns, 60.0 - turns).max() < 2.0

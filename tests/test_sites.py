@@ -89,7 +89,13 @@ def test_sites_move_with_the_cloud(points, radius, seed):
     for row in distance:
         assume(np.diff(np.unique(np.append(row, radius))).min(initial=1.0) > 1e-9)
     moved = points @ turn_of(seed).T + [3.0, -7.0, 0.5]
-    assert thinned(moved, radius)[1].tolist() == thinned(points, radius)[1].tolist()
+    owner, chosen = thinned(points, radius)
+    other, same = thinned(moved, radius)
+    assert same.tolist() == chosen.tolist()
+    links = np.stack([np.append(np.delete(np.arange(len(chosen)), s), -1) for s in range(len(chosen))])
+    settle_points(points, points[chosen], links, owner, 0, len(points))
+    settle_points(moved, moved[chosen], links, other, 0, len(points))
+    assert other.tolist() == owner.tolist()
 
 
 @pytest.mark.kernels

@@ -22,7 +22,6 @@ MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
-
 HOPELESS = 2.2  # energy that moves at random and a first settling may cost: what costs more never pays in the end
 
 
