@@ -13,8 +13,9 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial import cKDTree
 
 from scantruss.errors import InputError
+from scantruss.kernels.origin import BLOCK, move_points, widen_bounds
 from scantruss.scan import cloud as clouds
-from scantruss.scan.cloud import PointCloud, measure_spacing
+from scantruss.scan.cloud import PointCloud, bounds_of, measure_spacing
 
 
 def bowl(count: int, seed: int = 0) -> np.ndarray:
@@ -204,3 +205,41 @@ def test_the_gap_of_a_triangular_pattern_is_its_spacing_and_is_measured_once(mon
     assert cloud.gap == pytest.approx(1.0, rel=1e-9)
     monkeypatch.setattr(clouds, "measure_gap", lambda _: -1.0)
     assert cloud.gap == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.kernels
+@given(
+    hnp.arrays(np.float64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.floats(-1e6, 1e6)), st.integers(0, 40)
+)
+def test_bounds_of_parts_are_those_of_all(points: np.ndarray, at: int) -> None:
+    bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
+    widen_bounds(points, bounds, 0, min(at, len(points)))
+    widen_bounds(points, bounds, min(at, len(points)), len(points))
+    assert (bounds[0] == points.min(axis=0)).all() and (bounds[1] == points.max(axis=0)).all()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf])
+def test_a_coordinate_that_is_not_finite_shows_in_the_bounds_of_its_axis(odd: float) -> None:
+    points = np.random.default_rng(0).random((9, 3))
+    points[4, 1] = odd
+    lower, upper = bounds_of(points)
+    assert np.isfinite(lower).tolist() == np.isfinite(upper).tolist() == [True, False, True]
+
+
+@pytest.mark.kernels
+def test_moved_points_and_their_sums_are_those_of_plain_arrays() -> None:
+    points = np.random.default_rng(1).normal(size=(BLOCK + 100, 3)) + [10.0, 20.0, -5.0]
+    origin = np.array([8.0, 16.0, -4.0])
+    moved, sums = np.empty_like(points), np.empty((2, 9))
+    move_points(points, origin, moved, sums, 0, 2)
+    assert (moved == points - origin).all()
+    products = moved.T @ moved
+    assert sums[:, :3].sum(axis=0) == pytest.approx(moved.sum(axis=0))
+    assert sums[:, 3:].sum(axis=0) == pytest.approx(products[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]])
+
+
+def test_the_bounds_of_a_cloud_are_those_of_its_points() -> None:
+    points = np.random.default_rng(2).random((500, 3)) * [1.0, 300.0, 7.0] + [4.5e5, 5.4e6, 100.3]
+    cloud = PointCloud.from_array(points)
+    assert (cloud.bounds[0] == cloud.points.min(axis=0)).all() and (cloud.bounds[1] == cloud.points.max(axis=0)).all()

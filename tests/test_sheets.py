@@ -9,7 +9,7 @@ from small_clouds import sheet
 import scantruss as st
 from scantruss.boundary import find_boundary
 from scantruss.grid.proof import certify
-from scantruss.grid.sheets import faults_on_sheets
+from scantruss.grid.sheets import faults_on_sheets, nodes_of_sites
 from scantruss.kernels import boundary as kernels
 from scantruss.kernels import normals as facing
 from scantruss.pipeline import grid_from_cloud
@@ -51,11 +51,11 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next():
     both = grid_from_cloud(cloud, settings)
     assert both.topology.components == 2
     sites = prepare_sites(cloud, settings)
-    assert faults_on_sheets(both, sites, 1.0) == []
+    assert faults_on_sheets(both, sites, nodes_of_sites(both, sites, 1.0)) == []
     lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
     used, numbered = np.unique(lower, return_inverse=True)
     half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
-    (fault,) = faults_on_sheets(half, sites, 1.0)
+    (fault,) = faults_on_sheets(half, sites, nodes_of_sites(half, sites, 1.0))
     assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
@@ -94,10 +94,11 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
     grid, sites = grid_from_cloud(cloud, settings), prepare_sites(cloud, settings)
-    assert faults_on_sheets(grid, sites, 1.0) == []
+    assert faults_on_sheets(grid, sites, nodes_of_sites(grid, sites, 1.0)) == []
     x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
     slit = (abs(x) < 0.6) & (y < 1.5)
-    (fault,) = faults_on_sheets(grid.replace(triangles=grid.triangles[~slit]), sites, 1.0)
+    torn = grid.replace(triangles=grid.triangles[~slit])
+    (fault,) = faults_on_sheets(torn, sites, nodes_of_sites(torn, sites, 1.0))
     assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5
 
 

@@ -6,10 +6,12 @@ import numpy as np
 
 from ..kernels import repeats as kernels
 from ..kernels import strays as trees
+from ..machine import in_parts
 from .nearby import grow_tree
 
 SAMPLE = 500  # points of which repeats are looked for before it is worth looking for all
 SHARE = 0.01  # part of these that must be repeated
+PART = 50_000  # fewest points for a thread of their own
 COPIES = 16  # a point may be repeated almost so often and its spacing be told
 SAID = 300  # points at which the spacing is measured
 DENSEST = 0.05  # part of the points that lie closer than what counts as spacing here
@@ -29,7 +31,12 @@ def has_repeats(points: np.ndarray) -> bool:
     points = np.ascontiguousarray(points, np.float64)
     chosen = np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)
     slots = np.full(1 << 12, -1, np.int64)
-    return kernels.count_repeats(points, points.view(np.int64), np.unique(chosen), slots) > SHARE * len(chosen)
+    bits = points.view(np.int64)
+    repeats = [kernels.enter_points(points, bits, np.unique(chosen), slots)]
+    in_parts(
+        len(points), PART, lambda _, begin, end: repeats.append(kernels.count_repeats(points, bits, slots, begin, end))
+    )
+    return sum(repeats) > SHARE * len(chosen)
 
 
 def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels import facing as near_kernels
 from ..kernels import normals as kernels
 from ..machine import in_parts
-from ..scan.orientation import HEAD_ON, STEEP, face_one_side, face_outside
+from ..scan.orientation import HEAD_ON, cut_steep_links, face_one_side, face_outside
 from .nearby import AROUND, PART, Nearby, grow_tree
 from .thinning import thin_to
 
@@ -43,7 +43,7 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     chosen = np.flatnonzero(stays)[few.tree.ids]
     place, own = few.tree.points, np.ascontiguousarray(normals[chosen])
     neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS])
-    kernels.cut_steep_links(place, own, neighbors, STEEP)
+    cut_steep_links(place, own, neighbors)
     piece = face_one_side(place, own, neighbors)
     face_outside(place, own, piece)
     planes, thickness = np.empty_like(own), np.empty(len(place))
@@ -57,4 +57,4 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
         PART,
         lambda _, begin, end: near_kernels.turn_like_beside(tree, settled, points, turned, BESIDE, begin, end),
     )
-    return Facing(turned, len(np.unique(piece)), head_on if head_on >= HEAD_ON else 0)
+    return Facing(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)

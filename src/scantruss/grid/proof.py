@@ -17,10 +17,12 @@ from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_field, s
 from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
-from .sheets import faults_on_sheets
+from .sheets import faults_on_sheets, nodes_of_sites
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
+    from ..kernels.boxes import SearchBoxes
+    from ..scan.sites import Sites
     from ..settings import Settings
     from .grid import Grid
 
@@ -44,9 +46,30 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     Certificate
         Nothing is raised where it does not pass; see `Certificate.faults`.
     """
+    if len(grid.triangles) == 0:
+        return replace(_topology(grid, boundary, settings), faults=(Fault("empty", "has no triangles"),))
+    if not np.isfinite(grid.nodes).all():
+        return replace(_topology(grid, boundary, settings), faults=(Fault("empty", "has nodes that are nowhere"),))
+    sites, length = boundary.sites, settings.length
+    places = scan_places(sites)
+    boxes = boxes_of(places, 0.5 * length)
+    with ThreadPoolExecutor(1) as pool:  # kernels, which leave the interpreter to the rest
+        nearest = pool.submit(nodes_of_sites, grid, sites, length)
+        left = pool.submit(distances_to_grid, places, boxes, grid, length)
+        told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
+        cuts = find_crossings(grid.nodes, grid.triangles)
+    told = replace(told, crossings=len(cuts), **_cover(grid, sites, length, places, boxes, left.result()))
+    faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
+    known = {fault.kind for fault in faults}
+    faults += [f for f in faults_on_sheets(grid, sites, nearest.result()) if f.kind not in known]
+    return replace(told, faults=tuple(faults))
+
+
+def _topology(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
+    """Return what a grid is and what its scan is, apart from where they lie."""
     found = grid.topology
     closed = found.manifold and found.orientable
-    told = Certificate(
+    return Certificate(
         unit=grid.unit,
         reach=REACH * settings.length,
         manifold=found.manifold,
@@ -58,29 +81,13 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         euler=found.euler,
         handles=(2 * found.components - found.boundary_loops - found.euler) // 2 if closed else None,
     )
-    if len(grid.triangles) == 0:
-        return replace(told, faults=(Fault("empty", "has no triangles"),))
-    if not np.isfinite(grid.nodes).all():
-        return replace(told, faults=(Fault("empty", "has nodes that are nowhere"),))
-    with ThreadPoolExecutor(2) as pool:  # mostly kernels
-        crossing = pool.submit(find_crossings, grid.nodes, grid.triangles)
-        reaching = pool.submit(_cover, grid, boundary, settings.length)
-        on_sheets = pool.submit(faults_on_sheets, grid, boundary.sites, settings.length)
-        extremes = _extremes(grid, settings)
-    cuts = crossing.result()
-    told = replace(told, crossings=len(cuts), **reaching.result(), **extremes)
-    faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
-    known = {fault.kind for fault in faults}
-    faults += [f for f in on_sheets.result() if f.kind not in known]
-    return replace(told, faults=tuple(faults))
 
 
-def _cover(grid: Grid, boundary: Boundary, length: float) -> dict[str, Any]:
-    """Return how far scan and grid lie from each other."""
-    places = scan_places(boundary.sites)
-    boxes = boxes_of(places, 0.5 * length)
-    left = distances_to_grid(places, boxes, grid, length)
-    local = length * scan_field(boundary.sites)
+def _cover(
+    grid: Grid, sites: Sites, length: float, places: np.ndarray, boxes: SearchBoxes, left: np.ndarray
+) -> dict[str, Any]:
+    """Return how far scan and grid lie from each other; places (P, 3) of the scan by box, `left` (P,) their distance from the grid."""
+    local = length * scan_field(sites)
     middles = grid.nodes[grid.triangles].mean(axis=1)
     members = np.full(len(middles), length) if grid.desired is None else grid.desired[grid.triangles].mean(axis=1)
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired

@@ -20,16 +20,21 @@ TORN = 4  #: members from node to node at which their parts of the scan, side by
 LINKS = 3  #: so many links between such parts are no chance
 
 
-def faults_on_sheets(grid: Grid, sites: Sites, length: float) -> list[Fault]:
-    """Return what is wrong with how a grid covers each sheet of the scan, desired member length given [scan unit]."""
+def nodes_of_sites(grid: Grid, sites: Sites, length: float) -> np.ndarray:
+    """Return the node nearest to each site on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
     surface = with_own_scratch(sites.surface)  # grids are certified side by side
     nearest = np.empty(len(sites.piece), np.int64)
     nearest_nodes(surface, sites.boxes, grid.nodes, COVER * length, nearest)
+    return nearest
+
+
+def faults_on_sheets(grid: Grid, sites: Sites, nearest: np.ndarray) -> list[Fault]:
+    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_sites`."""
     left = np.flatnonzero((nearest < 0) & np.isin(sites.piece, sites.pieces))
     share = len(left) / max(int(np.isin(sites.piece, sites.pieces).sum()), 1)
     faults = []
     if share > LEFT_OUT:
-        where = place_of(surface.mean[left[0]] + grid.origin)
+        where = place_of(sites.surface.mean[left[0]] + grid.origin)
         faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
     torn = torn_place(grid, sites, nearest)
     if torn is not None:
@@ -47,7 +52,7 @@ def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | No
     Parameters
     ----------
     nearest : (S,) int64
-        Node of each site, -1 for none, as `kernels.parts.nearest_nodes`.
+        Node of each site, as `nodes_of_sites`.
     """
     pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])

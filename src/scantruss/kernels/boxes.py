@@ -63,9 +63,8 @@ def slot_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
 
 
 @kernel
-def put(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> int:
-    """Put an item into its box; returns 1 when that box was new."""
-    i, j, k = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
+def put_into(boxes: SearchBoxes, item: int, i: int, j: int, k: int) -> int:
+    """Put an item into a box; returns 1 when that box was new."""
     slot = slot_of(boxes, i, j, k)
     new = 0
     if boxes.keys[slot] == -1:
@@ -74,6 +73,12 @@ def put(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> int:
     boxes.next[item] = boxes.first[slot]
     boxes.first[slot] = item
     return new
+
+
+@kernel
+def put(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> int:
+    """Put an item into the box of a place; returns 1 when that box was new."""
+    return put_into(boxes, item, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
 
 
 @kernel

@@ -4,29 +4,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from .boxes import SearchBoxes, box_index, nearest, search
+from .boxes import SearchBoxes, box_index, nearest, put_into, slot_of
 from .compile import kernel
+
+COPIES = 27  # boxes that a place may be put into
 
 
 @kernel
-def mark_around(boxes: SearchBoxes, sample: np.ndarray, marked: np.ndarray) -> None:
-    """Mark the 27 search boxes around each place (K, 3); marked (2^m,) bool, several boxes may share a mark."""
-    for s in range(len(sample)):
-        i, j, k = (
-            box_index(boxes, 0, sample[s, 0]),
-            box_index(boxes, 1, sample[s, 1]),
-            box_index(boxes, 2, sample[s, 2]),
-        )
-        for a in range(max(i - 1, 0), min(i + 2, boxes.counts[0])):
-            for b in range(max(j - 1, 0), min(j + 2, boxes.counts[1])):
-                for c in range(max(k - 1, 0), min(k + 2, boxes.counts[2])):
-                    marked[_mark_of(boxes, a, b, c) & (len(marked) - 1)] = True
+def mark_around(boxes: SearchBoxes, places: np.ndarray, reach: float, marked: np.ndarray) -> None:
+    """Mark the search boxes within reach of each place (K, 3); marked (2^m,) bool, several boxes may share a mark."""
+    for s in range(len(places)):
+        x, y, z = places[s, 0], places[s, 1], places[s, 2]
+        for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+            for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+                for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                    marked[_mark_of(boxes, i, j, k) & (len(marked) - 1)] = True
 
 
 @kernel
 def _mark_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
     key = (i * boxes.counts[1] + j) * boxes.counts[2] + k
     return (key * 613) ^ (key >> 17)
+
+
+@kernel
+def spread_sample(boxes: SearchBoxes, sample: np.ndarray, size: float, marked: np.ndarray) -> None:
+    """Put each place (K, 3) into all boxes within `size` of it, and mark these.
+
+    boxes : no smaller than `size`, so that a place reaches three along an axis at most, with room for COPIES * K items, of which
+    item i stands for place i // COPIES. marked : (2^m,) bool, several boxes may share a mark.
+    """
+    for s in range(len(sample)):
+        x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]
+        item = COPIES * s
+        for i in range(box_index(boxes, 0, x - size), box_index(boxes, 0, x + size) + 1):
+            for j in range(box_index(boxes, 1, y - size), box_index(boxes, 1, y + size) + 1):
+                for k in range(box_index(boxes, 2, z - size), box_index(boxes, 2, z + size) + 1):
+                    put_into(boxes, item, i, j, k)
+                    marked[_mark_of(boxes, i, j, k) & (len(marked) - 1)] = True
+                    item += 1
 
 
 @kernel
@@ -41,22 +57,23 @@ def lower_to_nearest(
     begin: int,
     end: int,
 ) -> None:
-    """Lower the squared distance (K,) of each point of a sample to that of the nearest of points[begin:end] within a box's size.
+    """Lower the squared distance (K,) of each point of a sample to that of the nearest of points[begin:end] within `size`.
 
-    Points nearer than `same` coincide and do not count. boxes : of the sample, no smaller than `size`.
+    Points nearer than `same` coincide and do not count. boxes, marked : of `spread_sample`.
     """
-    found = np.empty(len(sample), np.int64)
     mask = len(marked) - 1
     for p in range(begin, end):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         i, j, k = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
         if marked[_mark_of(boxes, i, j, k) & mask]:
-            for f in range(search(boxes, sample, x, y, z, size, found)):
-                s = found[f]
+            item = boxes.first[slot_of(boxes, i, j, k)]
+            while item >= 0:
+                s = item // COPIES
                 dx, dy, dz = sample[s, 0] - x, sample[s, 1] - y, sample[s, 2] - z
                 dd = dx * dx + dy * dy + dz * dz
-                if same * same < dd < square[s]:
+                if same * same < dd < square[s] and dd <= size * size:
                     square[s] = dd
+                item = boxes.next[item]
 
 
 @kernel
@@ -90,4 +107,7 @@ def nearest_places(
 ) -> None:
     """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 where there is none; boxes : of the places."""
     for p in range(begin, end):
-        number[p] = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        number[p] = nearest(boxes, places, x, y, z, 0.5 * reach)  # most have one
+        if number[p] < 0:
+            number[p] = nearest(boxes, places, x, y, z, reach)

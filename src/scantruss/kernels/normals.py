@@ -76,9 +76,11 @@ def trust_thin_sites(
 
 
 @kernel
-def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float) -> None:
-    """Drop neighbours that stand over a site rather than beside it: they lie on another sheet."""
-    for s in range(len(mean)):
+def cut_steep_links(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
+) -> None:
+    """Drop neighbours that stand over a site from `begin` to `end` - 1 rather than beside it: they lie on another sheet."""
+    for s in range(begin, end):
         held = 0
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
@@ -93,13 +95,15 @@ def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
 
 
 @kernel
-def link_weights(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray) -> None:
+def link_weights(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray, begin: int, end: int
+) -> None:
     """How much the normals of neighbours disagree when one is mirrored to the other: 254 sqrt(1 - |cosine|), (S, K) uint8; 255 = no link.
 
     Mirroring at the plane half-way follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009). Steps of a
     third of a degree: links that are as certain are taken in their order, which lie together, not all over the scan.
     """
-    for s in range(len(mean)):
+    for s in range(begin, end):
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
             weights[s, k] = 255
@@ -163,9 +167,11 @@ def orient_normals(
 
 
 @kernel
-def smooth_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray) -> None:
-    """Mean normal of each site and of those neighbours whose normals have a cosine over `facing` with its own."""
-    for s in range(len(normals)):
+def smooth_normals(
+    normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray, begin: int, end: int
+) -> None:
+    """Mean normal of each site from `begin` to `end` - 1 and of those neighbours whose normals have a cosine over `facing` with its own."""
+    for s in range(begin, end):
         a = row(normals, s)
         x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
         for k in range(neighbors.shape[1]):

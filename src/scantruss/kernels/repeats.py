@@ -44,8 +44,8 @@ def mark_repeats(points: np.ndarray, bits: np.ndarray, slots: np.ndarray, repeat
 
 
 @kernel
-def count_repeats(points: np.ndarray, bits: np.ndarray, chosen: np.ndarray, slots: np.ndarray) -> int:
-    """Number of points that repeat one of the chosen (ascending) or are among them and repeat another one."""
+def enter_points(points: np.ndarray, bits: np.ndarray, chosen: np.ndarray, slots: np.ndarray) -> int:
+    """Enter the chosen points (ascending) into a table; returns how many repeat another of them."""
     mask = len(slots) - 1
     count = 0
     for i in range(len(chosen)):
@@ -57,7 +57,15 @@ def count_repeats(points: np.ndarray, bits: np.ndarray, chosen: np.ndarray, slot
             count += 1
         else:
             slots[slot] = p
-    for p in range(len(points)):
+    return count
+
+
+@kernel
+def count_repeats(points: np.ndarray, bits: np.ndarray, slots: np.ndarray, begin: int, end: int) -> int:
+    """Number of points from `begin` to `end` - 1 that repeat one that is entered in a table."""
+    mask = len(slots) - 1
+    count = 0
+    for p in range(begin, end):
         slot = _mixed(bits[p, 0], bits[p, 1], bits[p, 2]) & mask
         while slots[slot] >= 0:
             if slots[slot] != p and _same(points, p, slots[slot]):

@@ -114,7 +114,7 @@ def settle_points(
 
 @kernel
 def group_points(
-    points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, index: np.ndarray, mean: np.ndarray
+    points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, mean: np.ndarray
 ) -> None:
     """Sort the points by site (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each site's points."""
     sites = len(start) - 1
@@ -124,17 +124,17 @@ def group_points(
         start[s + 1] += start[s]
     at = start.copy()
     for p in range(len(points)):
-        s = owner[p]
-        to = at[s]
-        at[s] += 1
-        index[to] = p
-        for c in range(3):
-            grouped[to, c] = points[p, c]
-            mean[s, c] += points[p, c] - points[index[start[s]], c]
+        to = at[owner[p]]
+        at[owner[p]] += 1
+        grouped[to, 0], grouped[to, 1], grouped[to, 2] = row(points, p)
     for s in range(sites):
-        n = start[s + 1] - start[s]
-        for c in range(3):
-            mean[s, c] = grouped[start[s], c] + mean[s, c] / max(n, 1)
+        first = row(grouped, start[s])
+        x = y = z = 0.0
+        for i in range(start[s] + 1, start[s + 1]):
+            d = subtract(row(grouped, i), first)
+            x, y, z = x + d[0], y + d[1], z + d[2]
+        n = max(start[s + 1] - start[s], 1)
+        mean[s, 0], mean[s, 1], mean[s, 2] = first[0] + x / n, first[1] + y / n, first[2] + z / n
 
 
 @kernel

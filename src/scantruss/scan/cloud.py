@@ -16,7 +16,6 @@ LARGEST = 1e100  # coordinates beyond this overflow when squared
 SAMPLE = 600  # points at which the spacing is measured
 ROUGHLY = 60  # of them at which it is guessed first
 FEW = 200  # points at which the gap is measured
-BLOCK = 1 << 14  # points looked at in one go
 PART = 50_000  # fewest points for a thread of their own
 
 
@@ -44,7 +43,7 @@ class PointCloud:
     @cached_property
     def spacing(self) -> float:
         """Typical distance between neighbouring points [scan unit]; measured once."""
-        return measure_spacing(self.points)
+        return measure_spacing(self.points, self.bounds)
 
     @cached_property
     def gap(self) -> float:
@@ -80,10 +79,11 @@ class PointCloud:
         clean, lower, upper = _drop_not_finite(array, said)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
-        moved = np.empty(clean.shape)
-        in_parts(len(clean), PART, lambda _, begin, end: np.subtract(clean[begin:end], origin, out=moved[begin:end]))
-        _check_not_on_a_line(moved, extent, said)
-        return cls(points=moved, origin=origin, unit=unit, dropped=len(array) - len(clean), name=name)
+        moved, sums = _moved(clean, origin)
+        _check_not_on_a_line(len(moved), sums, extent, said)
+        cloud = cls(points=moved, origin=origin, unit=unit, dropped=len(array) - len(clean), name=name)
+        cloud.__dict__["bounds"] = lower - origin, upper - origin  # exact, as all points
+        return cloud
 
 
 def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
@@ -118,20 +118,15 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
 
 
 def bounds_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smallest and largest coordinates, (3,) each; a NaN shows in both."""
+    """Return the smallest and largest coordinates, (3,) each; NaN where one is NaN or infinite."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
+    from ..kernels.origin import widen_bounds
+
+    array = np.ascontiguousarray(array)
     found = np.empty((processors(), 2, 3))
     found[:, 0], found[:, 1] = math.inf, -math.inf
-
-    def look(part: int, begin: int, end: int) -> None:
-        for at in range(begin, end, BLOCK):  # a block at a time stays in the cache
-            block = array[at : min(at + BLOCK, end)]
-            for axis in range(3):
-                found[part, 0, axis] = np.minimum(found[part, 0, axis], block[:, axis].min())
-                found[part, 1, axis] = np.maximum(found[part, 1, axis], block[:, axis].max())
-
-    in_parts(len(array), PART, look)
+    in_parts(len(array), PART, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
     return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
@@ -159,20 +154,31 @@ def _local_origin(lower: np.ndarray, upper: np.ndarray, extent: float) -> np.nda
     return origin
 
 
-def _check_not_on_a_line(points: np.ndarray, extent: float, said: str) -> None:
+def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points from their own origin (N, 3), and the sums (9,) of their coordinates and of the products of these."""
+    from ..kernels.origin import BLOCK, move_points
+
+    blocks = -(-len(points) // BLOCK)
+    moved, sums = np.empty(points.shape), np.empty((blocks, 9))
+    points = np.ascontiguousarray(points)
+    in_parts(blocks, PART // BLOCK, lambda _, begin, end: move_points(points, origin, moved, sums, begin, end))
+    return moved, sums.sum(axis=0)
+
+
+def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, said: str) -> None:
     """Refuse points whose spread across their main direction is rounding.
 
     A strip is at least about one spacing wide, that is 1 / N of its length; what is much narrower is a line.
     """
-    mean = np.array([points[:, axis].mean() for axis in range(3)]) / extent
-    covariance = points.T @ points / (len(points) * extent * extent) - np.outer(mean, mean)
+    mean, products = sums[:3] / (count * extent), sums[3:] / (count * extent * extent)
+    covariance = products[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3) - np.outer(mean, mean)
     _, middle, largest = np.maximum(np.linalg.eigvalsh(covariance), 0.0)
-    least = min(max(0.1 / len(points), 1e-6), 1e-3)
+    least = min(max(0.1 / count, 1e-6), 1e-3)
     if middle <= least * least * largest:
         raise InputError(f"{said}all points lie on a line; a grid needs points spread over a surface")
 
 
-def measure_spacing(points: np.ndarray) -> float:
+def measure_spacing(points: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | None = None) -> float:
     """Return the typical distance between neighbouring points.
 
     The median of the distance to the nearest other point that does not coincide, at up to 600 points taken evenly
@@ -181,6 +187,7 @@ def measure_spacing(points: np.ndarray) -> float:
     Parameters
     ----------
     points : (N, 3) array [scan unit]
+    bounds : their smallest and largest coordinates, where these are known
 
     Returns
     -------
@@ -191,7 +198,7 @@ def measure_spacing(points: np.ndarray) -> float:
     if len(points) < 2:
         return 0.0
     sample = points[np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)]
-    lower, upper = bounds_of(points)
+    lower, upper = bounds or bounds_of(points)
     same = 8 * np.finfo(float).eps * float(max(np.abs(lower).max(), np.abs(upper).max()))
     sample, place = np.unique(sample, axis=0, return_inverse=True)
     if len(place) < len(points):
@@ -270,12 +277,11 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
     from ..kernels import nearby
     from ..kernels.boxes import new_boxes
-    from ..kernels.sites import put_all
 
-    boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.0 * size, len(sample), len(sample))
-    put_all(boxes, sample, np.arange(len(sample)))
+    copies = nearby.COPIES * len(sample)
+    boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.5 * size, copies, copies)
     marked = np.zeros(1 << 16, np.bool_)
-    nearby.mark_around(boxes, sample, marked)
+    nearby.spread_sample(boxes, sample, size, marked)
     squares = np.full((processors(), len(sample)), math.inf)
 
     def search_part(part: int, begin: int, end: int) -> None:

@@ -151,6 +151,6 @@ def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.nd
 def group(points: np.ndarray, owner: np.ndarray, sites: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the points sorted by site, where each site's points start, and their means."""
     start, mean = np.zeros(sites + 1, np.int64), np.zeros((sites, 3))
-    grouped, index = np.empty_like(points), np.empty(len(points), np.int64)
-    kernels.group_points(points, owner, start, grouped, index, mean)
+    grouped = np.empty_like(points)
+    kernels.group_points(points, owner, start, grouped, mean)
     return grouped, start, mean

@@ -18,7 +18,7 @@ from ..settings import Settings
 from .cloud import PointCloud
 from .field import Wish, length_field, wish_of
 from .linked import ROUGH, SHEETS, Linked, group, is_rough, linked, linked_finer, settled_to_sheet, thinned
-from .orientation import STEEP, face_one_side, face_outside
+from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, smoothed
 from .streamline import points_near
 
 PART = 20_000  # fewest points for a thread of their own
@@ -142,9 +142,7 @@ def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
     """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
     normals = surface.normals
     for _ in range(passes):
-        smoothed = np.empty_like(normals)
-        facing.smooth_normals(normals, surface.neighbors, 0.0, smoothed)
-        normals = smoothed
+        normals = smoothed(normals, surface.neighbors, 0.0)
     return normals
 
 
@@ -212,24 +210,23 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
     """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     facing.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
-    facing.cut_steep_links(mean, normals, neighbors, STEEP)
+    cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
-    smoothed = np.empty_like(normals)
-    facing.smooth_normals(normals, neighbors, 0.7, smoothed)
-    face_outside(mean, smoothed, piece)
+    normals = smoothed(normals, neighbors, 0.7)
+    face_outside(mean, normals, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     stamp, queue, counter = np.zeros(len(mean), np.int64), np.zeros(len(mean), np.int64), np.zeros(1, np.int64)
     field = np.ones(len(mean))
-    surface = Surface(found.grouped, found.start, mean, smoothed, neighbors, scale, stamp, queue, counter, field)
+    surface = Surface(found.grouped, found.start, mean, normals, neighbors, scale, stamp, queue, counter, field)
     return surface, piece
 
 
 def _number(piece: np.ndarray) -> np.ndarray:
     """Number the pieces by size, largest first."""
-    _, inverse, counts = np.unique(piece, return_inverse=True, return_counts=True)
+    counts = np.bincount(piece)
     rank = np.empty(len(counts), np.int64)
     rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
-    return rank[inverse.ravel()]
+    return rank[piece]
 
 
 def _site_areas(surface: Surface) -> np.ndarray:

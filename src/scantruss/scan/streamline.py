@@ -11,7 +11,6 @@ import numpy as np
 from ..kernels import nearby
 from ..kernels import streamline as kernels
 from ..kernels.boxes import new_boxes
-from ..kernels.sites import put_all
 from ..machine import in_parts, processors
 from .cloud import bounds_of
 
@@ -19,7 +18,7 @@ DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan i
 PART = 200_000  # fewest points for a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
 MARKS = 1 << 18  # of boxes near a place
-ROOM = 1 << 16  # boxes that the first table has room for
+ROOM, MOST_ROOM = 1 << 16, 1 << 19  # boxes that the first table has room for
 
 
 def is_dense(spacing: float, size: float) -> bool:
@@ -41,46 +40,56 @@ def streamlined(points: np.ndarray, size: float) -> np.ndarray:
         Which points stay; the same for any number of processors.
     """
     lower, upper = bounds_of(points)
-    parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
+    room = min(max(len(points) // 2, ROOM), MOST_ROOM)
+    parts: dict[int, _First] = {}
 
     def choose(part: int, begin: int, end: int) -> None:
-        parts[part] = _first_of_boxes(points, lower, upper, size, ALL, begin, end)
+        parts[part] = _First(points, lower, upper, size, room)
+        parts[part].choose(ALL, begin, end)
 
     in_parts(len(points), PART, choose)
-    found = [part for part in parts if len(part)]
-    if len(found) == 1:
-        return found[0]
-    both = np.concatenate(found)
-    return _first_of_boxes(points, lower, upper, size, both, 0, len(both))
+    first, *others = (parts[part] for part in sorted(parts))
+    for other in others:
+        first.choose(other.chosen, 0, len(other.chosen))
+    return first.chosen
 
 
-def _first_of_boxes(
-    points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, among: np.ndarray, begin: int, end: int
-) -> np.ndarray:
-    """The first in each box of the points `among` (M,) from `begin` to `end` - 1."""
-    room, count = ROOM, 0
-    chosen = np.empty(room, np.int64)
-    boxes = new_boxes(lower, upper, size, 0, room)
-    while True:
-        begin, count = kernels.choose_first(points, boxes, among, chosen, begin, end, count)
-        if begin == end:
-            return chosen[:count].copy()
-        room *= 4
-        chosen = np.concatenate([chosen[:count], np.empty(room - count, np.int64)])
-        boxes = new_boxes(lower, upper, size, 0, room)
-        kernels.choose_first(points, boxes, chosen[:count].copy(), chosen, 0, count, 0)
+class _First:
+    """The first points of boxes, as far as they have been looked at."""
+
+    def __init__(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, room: int) -> None:
+        self.points, self.lower, self.upper, self.size = points, lower, upper, size
+        self.found, self.count = np.empty(room, np.int64), 0
+        self.boxes = new_boxes(lower, upper, size, 0, room)
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """(K,) int64 the points so far."""
+        return self.found[: self.count]
+
+    def choose(self, among: np.ndarray, begin: int, end: int) -> None:
+        """Look at the points `among` (M,) from `begin` to `end` - 1, at all points for an empty one."""
+        while begin < end:
+            begin, self.count = kernels.choose_first(self.points, self.boxes, among, self.found, begin, end, self.count)
+            if begin < end:
+                self._make_room()
+
+    def _make_room(self) -> None:
+        old = self.chosen
+        self.found = np.empty(4 * len(self.found), np.int64)
+        self.boxes = new_boxes(self.lower, self.upper, self.size, 0, len(self.found))
+        kernels.choose_first(self.points, self.boxes, old, self.found, 0, self.count, 0)
 
 
 def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
     """Return which points (N, 3) lie within `reach` of any of the places (K, 3), and some more, (M,) int64 in order."""
-    boxes = new_boxes(places.min(axis=0), places.max(axis=0), 2.0 * reach, len(places), len(places))
-    put_all(boxes, places, np.arange(len(places)))
+    boxes = new_boxes(places.min(axis=0), places.max(axis=0), reach, 0, 0)
     marked = np.zeros(MARKS, np.bool_)
-    nearby.mark_around(boxes, places, marked)
+    nearby.mark_around(boxes, places, reach, marked)
     parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
 
     def look(part: int, begin: int, end: int) -> None:
-        found = np.empty((end - begin) // 8 + 1024, np.int64)
+        found = np.empty((end - begin) // 4 + 1024, np.int64)
         count = nearby.list_marked(points, boxes, marked, begin, end, found)
         if count > len(found):
             found = np.empty(count, np.int64)

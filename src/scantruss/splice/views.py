@@ -12,7 +12,7 @@ from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..machine import in_parts
 from ..scan.linked import sites_of_points
-from ..scan.orientation import face_one_side
+from ..scan.orientation import face_one_side, smoothed
 
 AROUND = 14  # neighbours of a place, for its normal
 FEWEST = 5  # neighbours below which a place is left out: it lies on no surface
@@ -60,13 +60,18 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
         _face_as_seen(places, normals, neighbors)
     else:
         kernels_of_overlap.face_like(places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing)
-    smoothed = np.empty_like(normals)
-    facing.smooth_normals(normals, neighbors, 0.7, smoothed)
+    normals_around = smoothed(normals, neighbors, 0.7)
     aside = np.zeros(len(places))
     kernels_of_overlap.mark_rim(places, normals, neighbors, aside)
     noise = float(np.median(thickness)) if len(places) else 0.0
     return View(
-        places, smoothed, aside > RIM, boxes_of(places, 1.5 * spacing), spacing, noise, abs(_bulge(places, smoothed))
+        places,
+        normals_around,
+        aside > RIM,
+        boxes_of(places, 1.5 * spacing),
+        spacing,
+        noise,
+        abs(_bulge(places, normals_around)),
     )
 
 
@@ -77,7 +82,7 @@ def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     count = len(chosen)
     mean = np.zeros((count, 3))
     start = np.zeros(count + 1, np.int64)
-    kernels.group_points(points, owner, start, np.empty_like(points), np.empty(len(points), np.int64), mean)
+    kernels.group_points(points, owner, start, np.empty_like(points), mean)
     return mean
 
 
@@ -108,16 +113,15 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
 def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Turn all normals to one side: along the links of each piece, the pieces as one sensor sees them, outwards as a whole."""
     piece = face_one_side(places, normals, neighbors)
-    number, inverse, counts = np.unique(piece, return_inverse=True, return_counts=True)
-    sums = np.zeros((len(number), 3))
-    np.add.at(sums, inverse, normals)
-    sign = np.ones(len(number))
+    counts = np.bincount(piece)
+    sums = np.stack([np.bincount(piece, normals[:, c]) for c in range(3)], axis=1)
+    sign = np.ones(len(counts))
     votes = np.flatnonzero(counts >= PIECE * len(places))
     view = sums[np.argmax(counts)] if len(counts) else np.zeros(3)
     for _ in range(5):
         sign = np.where(sums @ view < 0.0, -1.0, 1.0)
         view = (sign[votes, None] * sums[votes]).sum(axis=0) if len(votes) else view
-    normals *= sign[inverse][:, None]
+    normals *= sign[piece][:, None]
     if len(places) and _bulge(places, normals) < 0.0:
         normals *= -1.0
 
