@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import normals as facing
+from ..kernels import normals as normal_kernels
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..machine import in_parts
@@ -40,7 +40,7 @@ class Linked(NamedTuple):
     thickness: np.ndarray  #: (S,)
 
 
-def thinned(points: np.ndarray, radius: float, spacing: float) -> np.ndarray:
+def thin_dense(points: np.ndarray, radius: float, spacing: float) -> np.ndarray:
     """Return those of very dense points that serve as well as all of them, sorted where they are many.
 
     Sorted by much larger sites, what lies together in space does so in memory, in all that follows. By sites, not by boxes: a scan
@@ -54,14 +54,14 @@ def thinned(points: np.ndarray, radius: float, spacing: float) -> np.ndarray:
     return group(points, owner, len(places))[0]
 
 
-def linked(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
+def link_sites(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
     """Return the sites of points for one thinning radius."""
     owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
     grouped, start, mean = group(points, owner, len(chosen))
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
 
-def linked_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
+def link_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
     """Return finer sites, and their radius, where these form smooth sheets; None where they do not.
 
     Sheets that lie side by side, a few sites apart, look like one rough layer. They come apart as soon as the sites are finer.
@@ -70,13 +70,13 @@ def linked_finer(points: np.ndarray, radius: float, length: float, spacing: floa
         radius *= 0.5
         if radius < FINEST * spacing:
             return None
-        found = linked(points, radius, length, spacing)
+        found = link_sites(points, radius, length, spacing)
         if not is_rough(found, ROUGH * length):
             return found, radius
     return None
 
 
-def settled_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
+def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
     """Return the sites of a rough layer moved to its middle, thinned and linked anew."""
     moved = np.empty_like(found.mean)
     kernels.settle_sites(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
@@ -143,7 +143,9 @@ def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.nd
     """Return the normal of each site (either sign) and the thickness of the points there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
-        len(mean), 3000, lambda _, begin, end: facing.site_normals(mean, neighbors, normals, thickness, begin, end)
+        len(mean),
+        3000,
+        lambda _, begin, end: normal_kernels.site_normals(mean, neighbors, normals, thickness, begin, end),
     )
     return normals, thickness
 

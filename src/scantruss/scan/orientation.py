@@ -36,7 +36,7 @@ def _counted_off(piece: np.ndarray) -> np.ndarray:
     return number
 
 
-def smoothed(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:
+def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:
     """Return mean normals (S, 3) of sites and those linked to them whose normals have a cosine over `facing` with their own."""
     means = np.empty_like(normals)
     in_parts(len(normals), PART, lambda _, i, j: kernels.smooth_normals(normals, neighbors, facing, means, i, j))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..clean.duplicates import find_repeated, has_repeats
 from ..clean.strays import find_strays, has_strays
-from ..kernels import normals as facing
+from ..kernels import normals as normal_kernels
 from ..kernels.boxes import SearchBoxes
 from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
@@ -17,11 +17,10 @@ from ..machine import in_parts
 from ..settings import Settings
 from .cloud import PointCloud
 from .field import Wish, length_field, wish_of
-from .linked import ROUGH, SHEETS, Linked, group, is_rough, linked, linked_finer, settled_to_sheet, thinned
-from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, smoothed
+from .linked import PART, ROUGH, SHEETS, Linked, group, is_rough, link_finer, link_sites, settle_to_sheet, thin_dense
+from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from .streamline import points_near
 
-PART = 20_000  # fewest points for a thread of their own
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 
 
@@ -142,7 +141,7 @@ def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
     """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
     normals = surface.normals
     for _ in range(passes):
-        normals = smoothed(normals, surface.neighbors, 0.0)
+        normals = mean_normals(normals, surface.neighbors, 0.0)
     return normals
 
 
@@ -170,21 +169,21 @@ def _prepare(
         points = np.ascontiguousarray(points[kept])
     whole = points
     if measured is None:
-        points = thinned(whole, radius, spacing)
-    found = linked(points, radius, length, spacing)
+        points = thin_dense(whole, radius, spacing)
+    found = link_sites(points, radius, length, spacing)
     if stray_distance and has_strays(found.neighbors):
         stray = find_strays(whole, stray_distance, length)
         strays = int(stray.sum())
         if strays:
             whole = np.ascontiguousarray(whole[~stray])
-            points = thinned(whole, radius, spacing)
-            found = linked(points, radius, length, spacing)
+            points = thin_dense(whole, radius, spacing)
+            found = link_sites(points, radius, length, spacing)
     if is_rough(found, SHEETS * length):
-        fine = linked_finer(whole, radius, length, spacing)
+        fine = link_finer(whole, radius, length, spacing)
         if fine is not None:
             points, (found, radius) = whole, fine
     if is_rough(found, ROUGH * length):
-        found = settled_to_sheet(found, points, radius, length, spacing)
+        found = settle_to_sheet(found, points, radius, length, spacing)
     surface, piece = _faced_surface(found, radius, length, spacing)
     surface = surface._replace(field=length_field(surface, wish))
     piece = _number(piece)
@@ -209,10 +208,10 @@ def _prepare(
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
     """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    facing.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    normal_kernels.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
-    normals = smoothed(normals, neighbors, 0.7)
+    normals = mean_normals(normals, neighbors, 0.7)
     face_outside(mean, normals, piece)
     scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
     stamp, queue, counter = np.zeros(len(mean), np.int64), np.zeros(len(mean), np.int64), np.zeros(1, np.int64)

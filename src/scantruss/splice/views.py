@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import normals as facing
+from ..kernels import normals as normal_kernels
 from ..kernels import overlap as kernels_of_overlap
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..machine import in_parts
 from ..scan.linked import sites_of_points
-from ..scan.orientation import face_one_side, smoothed
+from ..scan.orientation import face_one_side, mean_normals
 
 AROUND = 14  # neighbours of a place, for its normal
 FEWEST = 5  # neighbours below which a place is left out: it lies on no surface
@@ -55,12 +55,12 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
         places = np.ascontiguousarray(places[sound])
         neighbors = link(places, spacing)
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
-    facing.site_normals(places, neighbors, normals, thickness, 0, len(places))
+    normal_kernels.site_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
         _face_as_seen(places, normals, neighbors)
     else:
         kernels_of_overlap.face_like(places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing)
-    normals_around = smoothed(normals, neighbors, 0.7)
+    normals_around = mean_normals(normals, neighbors, 0.7)
     aside = np.zeros(len(places))
     kernels_of_overlap.mark_rim(places, normals, neighbors, aside)
     noise = float(np.median(thickness)) if len(places) else 0.0
