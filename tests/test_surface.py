@@ -193,3 +193,28 @@ def test_a_flood_reaches_what_is_linked_within_reach(seed, reach):
     assert set(found) == expected
     for other in rng.integers(len(surface.mean), size=5).tolist():
         assert linked(surface, site, other, tuple(place), reach) == (other in expected)
+
+
+@cache
+def slit_sheet():
+    """Sites of a sheet with a slit from its middle to one side: around its end there are links, across it none."""
+    points = sheet(8.0, 8.0, 0.12)
+    slit = (np.abs(points[:, 0]) < 0.9) & (points[:, 1] < 0.0)
+    return sites_of(points[~slit]).surface
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("reach", [1.2, 1.6, 2.5, 4.0])
+def test_sites_on_both_sides_of_a_slit_are_linked_if_the_way_around_its_end_is_within_reach(reach):
+    surface = slit_sheet()
+    rng = np.random.default_rng(int(10 * reach))
+    x, y = surface.mean[:, 0], surface.mean[:, 1]
+    left, right = (np.flatnonzero((s * x > 0.9) & (s * x < 1.5) & (y < 0.0) & (y > -2.5)) for s in (-1.0, 1.0))
+    found = []
+    for a, b in zip(rng.choice(left, 40), rng.choice(right, 40), strict=True):
+        place = 0.5 * (surface.mean[a] + surface.mean[b])
+        expected = int(b) in naive.reachable(surface.neighbors, surface.mean, int(a), place, reach)
+        assert linked(surface, int(a), int(b), tuple(place), reach) == expected
+        found.append(expected)
+    assert any(found) or reach < 2.0
+    assert not all(found) or reach > 3.0

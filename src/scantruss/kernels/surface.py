@@ -86,8 +86,40 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
     """Whether site b can be reached from site a over links within `reach` of a place."""
     if a == b:
         return True
+    target = row(surface.mean, b)
+    if _square(target, place) > reach * reach:
+        return False
+    if _walks_to(surface, a, b, place, reach):
+        return True
     count = flood(surface, a, place, reach)
-    return count > 0 and surface.stamp[b] == surface.counter[0] and _queued(surface, b, count)
+    return surface.stamp[b] == surface.counter[0] and _queued(surface, b, count)
+
+
+@kernel
+def _square(a: Vector, b: Vector) -> float:
+    """Squared distance of two places."""
+    d = subtract(a, b)
+    return dot(d, d)
+
+
+@kernel
+def _walks_to(surface: Surface, a: int, b: int, place: Vector, reach: float) -> bool:
+    """Whether steps that each come nearer to site b lead from site a to it, all within `reach` of a place: most that are linked are so."""
+    target = row(surface.mean, b)
+    site, best = a, _square(row(surface.mean, a), target)
+    while True:
+        to = -1
+        for k in range(surface.neighbors.shape[1]):
+            n = surface.neighbors[site, k]
+            if n < 0:
+                break
+            at = row(surface.mean, n)
+            square = _square(at, target)
+            if square < best and _square(at, place) <= reach * reach:
+                best, to = square, n
+        if to < 0:
+            return site == b
+        site = to
 
 
 @kernel
