@@ -11,6 +11,8 @@ from hypothesis import strategies as some
 from rough import rough_disc, rough_sphere, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
+from scantruss.report.figures import count_holes
+
 CHECK = Path(__file__).resolve().parents[2] / "shared" / "check"
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.2), (2, 1, 0)]
@@ -82,6 +84,21 @@ def test_topology_of_known_grids(name, components, loops, euler, manifold, orien
     assert (topology.components, topology.euler, topology.manifold) == (components, euler, manifold)
     if manifold:
         assert (topology.boundary_loops, topology.orientable) == (loops, orientable)
+
+
+def test_every_loop_is_a_hole_but_the_outer_rim_of_its_piece():
+    ring = strip_of(12)
+    beside = np.vstack([ring.nodes, ring.nodes + (100, 0, 0)])
+    two_rings = make_grid(beside, np.vstack([ring.triangles, ring.triangles + len(ring.nodes)]))
+    for grid, holes in (
+        (fan(), 0),
+        (icosahedron(), 0),
+        (two_pieces(), 0),
+        (ring, 1),
+        (two_rings, 2),
+        (make_grid([], []), 0),
+    ):
+        assert count_holes(grid) == holes
 
 
 @given(some.sets(some.integers(0, 19)), some.integers(0, 1))

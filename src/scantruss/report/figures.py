@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import words_of_place
+from ..grid.quality import labels
 
 if TYPE_CHECKING:
     from ..boundary import Boundary
@@ -47,17 +48,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
 
 def count_holes(grid: Grid) -> int:
     """Count the loops that are not the outer rim of their piece: every piece with a boundary has one."""
-    label = np.arange(len(grid.nodes))
-    first, second = grid.edges.T
-    while True:
-        lowest = np.minimum(label[first], label[second])
-        after = label.copy()
-        np.minimum.at(after, first, lowest)
-        np.minimum.at(after, second, lowest)
-        after = after[after]
-        if np.array_equal(after, label):
-            break
-        label = after
+    label = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     pieces = {int(label[loop[0]]) for loop in grid.boundary_loops}
     return len(grid.boundary_loops) - len(pieces)
 
