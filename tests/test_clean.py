@@ -241,9 +241,16 @@ def test_the_command_counts_what_it_does_and_writes_normals(tmp_path, capsys):
 def test_the_command_refuses_before_it_reads(tmp_path, capsys):
     scan = tmp_path / "scan.xyz"
     np.savetxt(scan, make("scallop", 500).points)
-    for words in (["out.what"], [str(scan)], ["out.ply", "--spacing", "0"], ["out.ply", "--stray-distance", "-1"]):
+    for words, line in (
+        (["out.what"], "no format for a cloud"),
+        ([str(scan)], "would overwrite the scan"),
+        (["out.ply", "--spacing", "0"], "--spacing must be a positive length in the scan's unit, got 0"),
+        (["out.ply", "--duplicates", "-1"], "--duplicates must be a number of 0 or more, got -1"),
+        (["out.ply", "--stray-distance", "-1"], "--stray-distance must be a number of 0 or more, got -1"),
+    ):
         assert main(["clean", str(scan), *words]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1 and line in said
     assert list(tmp_path.iterdir()) == [scan]
 
 

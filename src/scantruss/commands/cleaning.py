@@ -59,14 +59,15 @@ def clean_parser() -> Parser:
 
 def clean(values: Namespace) -> None:
     """Clean a scan and save it."""
-    from ..options import settings_of
+    from ..options import READING, settings_of
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.writers import write_points
     from .gridding import note_compiling, read_scan, said_of_cloud_file
 
     out, report = _outputs(values)
-    settings = settings_of(Namespace(**vars(values), length=1.0))
+    chosen = {name: value for name, value in vars(values).items() if name in READING}  # steps share names with settings
+    settings = settings_of(Namespace(**chosen, length=1.0))
     steps = _steps(values)
     with Bars() as bars:
         cloud = read_scan(values.scan, settings, bars)
