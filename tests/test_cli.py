@@ -6,15 +6,17 @@ import signal
 import subprocess
 import sys
 from dataclasses import fields, replace
+from pathlib import Path
+from textwrap import indent
 
 import numpy as np
 import pytest
 
 import scantruss as st
-from scantruss import pipeline
+from scantruss import cli, pipeline
 from scantruss.cli import main
 from scantruss.commands import gridding
-from scantruss.errors import FrontError, words_of_place
+from scantruss.errors import CertificateError, FrontError, words_of_place
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
 from scantruss.options import option_of
@@ -462,6 +464,37 @@ def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
     monkeypatch.setattr(gridding, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (None, 0),
+        (ZeroDivisionError(), 1),
+        (st.InputError("no"), 2),
+        (FrontError("stuck"), 2),
+        (OSError(28, "No space"), 2),
+        (MemoryError(), 2),
+        (CertificateError("fails"), 3),
+        (KeyboardInterrupt(), 130),
+        (BrokenPipeError(), 141),
+        (cli._Stopped(), 143),
+    ],
+)
+def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(error, status, monkeypatch, capsys):
+    def run(_):
+        if error is not None:
+            raise error
+
+    monkeypatch.delenv("SCANTRUSS_TRACEBACK", raising=False)
+    monkeypatch.setattr(cli, "run", run)
+    monkeypatch.setattr(os, "dup2", lambda *_: None)
+    assert main([]) == status
+    assert capsys.readouterr().err.count("\n") == (status not in (0, 141))
+    listed = cli.HELP.partition("Exit status")[2].partition("\n")[2]
+    assert status in [int(line.split()[0]) for line in listed.splitlines()]
+    readme = Path(__file__).resolve().parents[1] / "README.md"
+    assert indent(listed, "  ") in readme.read_text(encoding="utf-8")
 
 
 def test_the_command_itself_refuses_with_status_two(place):

@@ -1,7 +1,6 @@
 """The command line: the front that reads words, and the only place that says what went wrong and leaves.
 
-A refusal is one line on stderr and exit status 2, or 3 where a grid fails its certificate; nothing is written then. Heavy
-imports wait for a command.
+A refusal is one line on stderr and an exit status of `HELP`; nothing is written then. Heavy imports wait for a command.
 """
 
 from __future__ import annotations
@@ -34,8 +33,15 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
   scantruss demo  [FOLDER]                 all of it on a bundled scan
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.
-Exit status: 0 done; 2 refused, as input or settings do not do; 3 the grid fails its certificate and is not
-written unless --keep-failed is given. One line says why.
+
+Exit status; one line says why it is not 0:
+  0    done
+  1    a fault of ScanTruss
+  2    refused: a scan, setting or file does not do
+  3    the grid fails its certificate; it is written only with --keep-failed
+  130  interrupted (Ctrl-C)
+  141  the reader of the output has left, as in "| head -1"; no line
+  143  stopped (SIGTERM)
 """
 
 
