@@ -12,7 +12,7 @@ import pytest
 from shapes import make
 
 from scantruss import ahead
-from scantruss.commands.gridding import note_compiling
+from scantruss.commands.shared import STAGES, note_compiling
 from scantruss.kernels import compile as compiling
 
 needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
@@ -166,7 +166,7 @@ class Notes:
 def test_a_line_says_that_a_long_compile_is_about_to_come_and_only_then(tmp_path, monkeypatch):
     """After `info` only the kernels of the boundary are stored; a `grid` still compiles for long."""
     monkeypatch.setattr(compiling, "FOLDER", tmp_path)
-    stages = ("boundary", "front", "optimize")
+    stages = STAGES
     for stored, compiles in (
         ((), stages),
         (("boundary.free_directions-86.py311.1.nbc",), stages[1:]),

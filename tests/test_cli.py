@@ -15,7 +15,7 @@ import pytest
 import scantruss as st
 from scantruss import cli, pipeline
 from scantruss.cli import main
-from scantruss.commands import gridding
+from scantruss.commands import gridding, showing
 from scantruss.errors import CertificateError, FrontError, words_of_place
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
@@ -60,8 +60,9 @@ def place(tmp_path, monkeypatch):
 @pytest.fixture
 def ready(place, monkeypatch):
     """The same, with a finished grid in place of the long work."""
-    monkeypatch.setattr(gridding, "read_scan", lambda *_: PointCloud.from_array(plate()))
-    monkeypatch.setattr(gridding, "make_grid", lambda *_, **__: hexagon())
+    for command in (gridding, showing):
+        monkeypatch.setattr(command, "read_scan", lambda *_: PointCloud.from_array(plate()))
+        monkeypatch.setattr(command, "make_grid", lambda *_, **__: hexagon())
     return place
 
 

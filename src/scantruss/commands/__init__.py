@@ -1,4 +1,7 @@
-"""The commands: what each one takes, does and says; everything heavy is imported where it is used."""
+"""The commands: what each one takes, does and says.
+
+Outputs and settings are checked before anything is read; everything heavy is imported inside the functions.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from .cleaning import clean, clean_parser
-from .gridding import demo, demo_parser, grid, grid_parser, info, info_parser, print_parser, print_solid
+from .gridding import grid, grid_parser
+from .looking import info, info_parser
+from .printing import print_parser, print_solid
 from .scaling import sweep, sweep_parser, thin, thin_parser
+from .showing import demo, demo_parser
 from .splicing import splice, splice_parser
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
+from .shared import note_compiling, read_scan, said_of_cloud_file
 
 if TYPE_CHECKING:
     from ..clean.steps import CleanCloud
@@ -63,7 +64,6 @@ def clean(values: Namespace) -> None:
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.writers import write_points
-    from .gridding import note_compiling, read_scan, said_of_cloud_file
 
     out, report = _outputs(values)
     chosen = {name: value for name, value in vars(values).items() if name in READING}  # steps share names with settings

@@ -1,19 +1,16 @@
-"""``scantruss info``, ``grid``, ``print`` and ``demo``.
-
-Outputs and settings are checked before anything is read; everything heavy is imported inside the functions.
-"""
+"""The command ``scantruss grid``: a scan in, a grid and its settings out."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ..errors import CertificateError, FormatError, InputError
+from ..errors import CertificateError, FormatError
 from ..settings import CURVATURE
+from .shared import SCAN, STAGES, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -21,55 +18,6 @@ if TYPE_CHECKING:
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
     from ..settings import Settings
-
-
-SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
-
-
-def info_parser() -> Parser:
-    """Options of ``scantruss info``."""
-    from ..options import READING, Parser, add_settings
-
-    parser = Parser(
-        "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
-    )
-    parser.add_argument("scan", metavar="SCAN", help=SCAN)
-    add_memory(parser)
-    add_settings(parser, ("length", "method", "thin_spacing", *READING))
-    return parser
-
-
-def info(values: Namespace) -> None:
-    """Print what a scan holds."""
-    from ..options import settings_of
-    from ..pipeline import check_length, suggest_length
-    from ..report.figures import cloud_lines, loop_rows
-    from ..report.terminal import Bars, print_lines, print_table
-
-    given = "length" in values
-    settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
-    with Bars() as bars:
-        settings = thin_to_fit(values.scan, settings, values.memory)
-        if settings.thin_spacing and not given and "thin_spacing" not in values:
-            from ..scan.fit import spacing_to_look
-
-            settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings))
-        cloud = read_scan(values.scan, settings, bars)
-        print_lines(cloud_lines(cloud))
-        settings = settings if given else settings.replace(length=suggest_length(cloud))
-        check_length(cloud, settings)
-        with note_compiling(bars, settings.method, "boundary"):
-            from ..boundary import find_boundary
-
-            boundary = find_boundary(cloud, settings, progress=bars)
-        note_strays(bars, cloud, settings)
-    field = boundary.sites.surface.field
-    longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
-    print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
-    if boundary.loops:
-        print_table(("boundary", "length", "corners"), loop_rows(boundary))
-    else:
-        print_lines(["none, the scan is closed"])
 
 
 def grid_parser() -> Parser:
@@ -97,18 +45,6 @@ def grid_parser() -> Parser:
     add_memory(parser)
     add_settings(parser)
     return parser
-
-
-def add_memory(parser: Parser) -> None:
-    """Add the option that says how large a scan may be."""
-    from ..options import size_of_memory
-
-    parser.add_argument(
-        "--memory",
-        metavar="SIZE",
-        type=size_of_memory,
-        help="a larger scan is thinned, as 4GB (default: half of what is free)",
-    )
 
 
 def grid(values: Namespace) -> None:
@@ -175,57 +111,6 @@ def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
     taken[path.resolve()] = what
 
 
-def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan, and say so where points were left out."""
-    from ..scan.readers import read_points
-
-    bars("read", 0.0)
-    if settings.thin_spacing:
-        cloud = read_thinned_scan(path, settings, bars)
-    else:
-        cloud = read_points(path, unit=settings.unit, selection=settings.selection)
-    bars("read", 1.0)
-    for note in cloud.notes:
-        bars.note(note)
-    if cloud.dropped:
-        bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
-    return cloud
-
-
-def said_of_cloud_file(out: Path, unit: str) -> list[str]:
-    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes."""
-    suffix = out.suffix.lower()
-    if suffix in (".las", ".laz"):
-        return ["classes, returns, colours and reference system are not kept; --class and --returns choose before"]
-    if suffix == ".e57" and not unit:
-        return [
-            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
-        ]
-    return []
-
-
-def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
-    """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
-    from ..scan.fit import spacing_to_fit
-
-    spacing = spacing_to_fit(path, settings, memory)
-    return settings.replace(thin_spacing=spacing) if spacing else settings
-
-
-def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan that is thinned while it is read, and say so."""
-    from ..scan.fit import read_thinned
-
-    with note_compiling(bars):
-        cloud, read = read_thinned(path, settings, bars)
-    unit = f" {cloud.unit}" if cloud.unit else ""
-    bars.note(
-        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
-        " --thin-spacing 0 takes all"
-    )
-    return cloud
-
-
 def make_grid(
     cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
 ) -> Grid:
@@ -234,7 +119,7 @@ def make_grid(
     from ..pipeline import check_length, grid_from_cloud
 
     check_length(cloud, settings)
-    said = note_compiling(bars, settings.method, "boundary", "front", "optimize")
+    said = note_compiling(bars, settings.method, *STAGES)
     with said, CompileAhead(settings.method, bars) as progress:
         grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=read_seconds)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
@@ -249,34 +134,6 @@ def make_grid(
     return grid
 
 
-def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Say so where stray points were left out."""
-    from ..scan.sites import prepare_sites
-
-    sites = prepare_sites(cloud, settings)
-    if sites.repeated:
-        bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
-    if sites.strays:
-        bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
-
-
-@contextmanager
-def note_compiling(bars: Bars, method: str = "default", *stages: str) -> Iterator[None]:
-    """Say so, once, where kernels must be compiled, which takes long: at the start where the stages are known to need it."""
-    from ..ahead import are_compiled, can_be_stored
-    from ..kernels.compile import tell_of_compiling
-
-    def tell() -> None:
-        bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
-
-    if are_compiled(method, *stages):
-        with tell_of_compiling(tell):
-            yield
-    else:
-        tell()
-        yield
-
-
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
     """Print the figures of Table 2, the worst places and what was written."""
     from ..report.figures import certificate_rows, grid_lines, quality_rows
@@ -286,85 +143,3 @@ def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
     if result.certificate is not None:
         print_table(("worst", "", "at"), certificate_rows(result.certificate))
     print_lines([*grid_lines(result, points), "wrote " + " ".join(map(str, written))])
-
-
-def print_parser() -> Parser:
-    """Options of ``scantruss print``."""
-    from ..options import Parser, number
-
-    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
-    parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
-    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    parser.add_argument("out", metavar="OUT", help="model, .3mf or .stl")
-    parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
-    parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
-    parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
-    return parser
-
-
-def print_solid(values: Namespace) -> None:
-    """Make the printable model of a saved grid."""
-    from ..export.files import check_place
-    from ..report.saving import SaveTogether
-    from ..report.terminal import print_lines
-
-    out = check_place(values.out, (".3mf", ".stl"))
-    if not Path(values.grid).exists():
-        raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
-    if out.exists() and out.samefile(values.grid):
-        raise FormatError(f"the model {out} would overwrite the grid; name another file")
-    from ..export.json_file import read_grid
-    from ..export.solid import print_model
-
-    result = read_grid(values.grid)
-    with SaveTogether() as save:
-        solid = print_model(
-            result,
-            save.beside(out),
-            member_diameter=values.member_diameter,
-            node_diameter=values.node_diameter,
-            scale=values.scale,
-        )
-    size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
-    bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
-    print_lines([*solid.notes, *said_of_model(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
-
-
-def said_of_model(out: Path, unit: str) -> list[str]:
-    """What to say of the unit that a printer will take a model for."""
-    if out.suffix.lower() == ".stl" and unit != "mm":
-        return [
-            f"STL holds no unit and printers take it for mm; its numbers are {unit or 'of a unit that is not known'}"
-        ]
-    if not unit:
-        return ["the unit of the grid is not known, so the model says mm; scantruss grid --unit says it"]
-    return []
-
-
-def demo_parser() -> Parser:
-    """Options of ``scantruss demo``."""
-    from ..options import Parser
-
-    parser = Parser(
-        "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
-    )
-    parser.add_argument(
-        "folder", metavar="FOLDER", nargs="?", default="scantruss-demo", help="default ./scantruss-demo"
-    )
-    return parser
-
-
-def demo(values: Namespace) -> None:
-    """Do the main job on the bundled scan."""
-    from ..demo import SCAN, demo_settings, save_demo
-    from ..report.terminal import Bars
-
-    folder = Path(values.folder)
-    if folder.exists() and not folder.is_dir():
-        raise FormatError(f"{folder} is a file; name a folder for the demo")
-    with Bars() as bars:
-        cloud = read_scan(str(SCAN), demo_settings(), bars)
-        result = make_grid(cloud, demo_settings(), bars)
-        bars("picture, solid", 0.0)
-        written = save_demo(folder, result, cloud)
-    show_grid(result, len(cloud.points), written)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
+from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, thin_to_fit
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ..sweep import Trial
     from ..workers import Workers
 
-STAGES = ("boundary", "front", "optimize")  # of a grid
 MANY = 20_000_000  # points of which several workers thin a scan by default
 
 
@@ -61,7 +61,6 @@ def thin(values: Namespace) -> None:
     from ..scan.streaming import thin_open_scan
     from ..scan.thin import check_spacing
     from ..scan.writers import check_cloud_output, write_points
-    from .gridding import note_compiling, said_of_cloud_file
 
     check_spacing(values.spacing)
     out = check_cloud_output(values.out)
@@ -108,7 +107,6 @@ def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
 def sweep_parser() -> Parser:
     """Options of ``scantruss sweep``."""
     from ..options import Parser, add_settings
-    from .gridding import add_memory
 
     parser = Parser(
         "sweep",
@@ -159,7 +157,6 @@ def sweep(values: Namespace) -> None:
     from ..report.choosing import head_of, rows_of
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
-    from .gridding import note_compiling, read_scan, thin_to_fit
 
     folder = Path(values.out)
     if folder.exists() and not folder.is_dir():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import FormatError, InputError
 from ..settings import UNITS
+from .shared import note_compiling, said_of_cloud_file
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -106,7 +107,6 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     from ..scan.readers import read_points
     from ..splice import splice_scans
     from ..splice.pose_file import read_poses
-    from .gridding import note_compiling
 
     poses = read_poses(values.poses) if values.poses else {}
     unknown = sorted(name for name in poses if name not in names and Path(name).name not in names)
@@ -137,7 +137,6 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
 def show_splice(result: Splice, written: list[Path]) -> None:
     """Print the pairs, the worst of them and what was written."""
     from ..report.terminal import print_lines, print_table
-    from .gridding import said_of_cloud_file
 
     unit = f" {result.unit}" if result.unit else ""
     rows = [

@@ -1,0 +1,108 @@
+"""What several commands do alike: read a scan, thin it to fit, and say what a user should know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..options import Parser
+    from ..report.terminal import Bars
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
+SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
+STAGES = ("boundary", "front", "optimize")  # of a grid
+
+
+def add_memory(parser: Parser) -> None:
+    """Add the option that says how large a scan may be."""
+    from ..options import size_of_memory
+
+    parser.add_argument(
+        "--memory",
+        metavar="SIZE",
+        type=size_of_memory,
+        help="a larger scan is thinned, as 4GB (default: half of what is free)",
+    )
+
+
+def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan, and say so where points were left out."""
+    from ..scan.readers import read_points
+
+    bars("read", 0.0)
+    if settings.thin_spacing:
+        cloud = read_thinned_scan(path, settings, bars)
+    else:
+        cloud = read_points(path, unit=settings.unit, selection=settings.selection)
+    bars("read", 1.0)
+    for note in cloud.notes:
+        bars.note(note)
+    if cloud.dropped:
+        bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
+    return cloud
+
+
+def said_of_cloud_file(out: Path, unit: str) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes."""
+    suffix = out.suffix.lower()
+    if suffix in (".las", ".laz"):
+        return ["classes, returns, colours and reference system are not kept; --class and --returns choose before"]
+    if suffix == ".e57" and not unit:
+        return [
+            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
+        ]
+    return []
+
+
+def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
+    """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
+    from ..scan.fit import spacing_to_fit
+
+    spacing = spacing_to_fit(path, settings, memory)
+    return settings.replace(thin_spacing=spacing) if spacing else settings
+
+
+def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan that is thinned while it is read, and say so."""
+    from ..scan.fit import read_thinned
+
+    with note_compiling(bars):
+        cloud, read = read_thinned(path, settings, bars)
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    bars.note(
+        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
+        " --thin-spacing 0 takes all"
+    )
+    return cloud
+
+
+def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Say so where stray points were left out."""
+    from ..scan.sites import prepare_sites
+
+    sites = prepare_sites(cloud, settings)
+    if sites.repeated:
+        bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
+    if sites.strays:
+        bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
+
+
+@contextmanager
+def note_compiling(bars: Bars, method: str = "default", *stages: str) -> Iterator[None]:
+    """Say so, once, where kernels must be compiled, which takes long: at the start where the stages are known to need it."""
+    from ..ahead import are_compiled, can_be_stored
+    from ..kernels.compile import tell_of_compiling
+
+    def tell() -> None:
+        bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
+
+    if are_compiled(method, *stages):
+        with tell_of_compiling(tell):
+            yield
+    else:
+        tell()
+        yield

@@ -1,0 +1,43 @@
+"""The command ``scantruss demo``: the main job on the bundled scan."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import FormatError
+from .gridding import make_grid, show_grid
+from .shared import read_scan
+
+if TYPE_CHECKING:
+    from ..options import Parser
+
+
+def demo_parser() -> Parser:
+    """Options of ``scantruss demo``."""
+    from ..options import Parser
+
+    parser = Parser(
+        "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
+    )
+    parser.add_argument(
+        "folder", metavar="FOLDER", nargs="?", default="scantruss-demo", help="default ./scantruss-demo"
+    )
+    return parser
+
+
+def demo(values: Namespace) -> None:
+    """Do the main job on the bundled scan."""
+    from ..demo import SCAN, demo_settings, save_demo
+    from ..report.terminal import Bars
+
+    folder = Path(values.folder)
+    if folder.exists() and not folder.is_dir():
+        raise FormatError(f"{folder} is a file; name a folder for the demo")
+    with Bars() as bars:
+        cloud = read_scan(str(SCAN), demo_settings(), bars)
+        result = make_grid(cloud, demo_settings(), bars)
+        bars("picture, solid", 0.0)
+        written = save_demo(folder, result, cloud)
+    show_grid(result, len(cloud.points), written)
