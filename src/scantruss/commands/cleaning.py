@@ -6,7 +6,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FormatError, InputError
+from ..errors import InputError
+from .outputs import claim, cloud_output, inputs_of
 from .shared import note_compiling, read_scan, said_of_cloud_file
 
 if TYPE_CHECKING:
@@ -89,16 +90,13 @@ def clean(values: Namespace) -> None:
 def _outputs(values: Namespace) -> tuple[Path, Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..export.files import check_place
-    from ..scan.paths import files_of
-    from ..scan.writers import check_cloud_output
 
-    out = check_cloud_output(values.out)
+    out = cloud_output(values.out)
     report = check_place(values.report, (".json",)) if values.report else None
-    taken = {Path(name).resolve(): "polygon" for name in getattr(values, "crop", ())}
-    taken |= {file.resolve(): "scan" for file in files_of(values.scan)}
-    for path, what in ((out, "clean cloud"), (report, "report")):
-        if path is not None and path.resolve() in taken:
-            raise FormatError(f"the {what} {path} would overwrite the {taken[path.resolve()]}; name another file")
+    taken = inputs_of(values)
+    claim(out, "clean cloud", taken)
+    if report is not None:
+        claim(report, "report", taken)
     return out, report
 
 

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError
-from ..settings import CURVATURE
+from .outputs import claim, inputs_of
 from .shared import SCAN, STAGES, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
@@ -84,31 +84,17 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     from ..export.csv_file import nodes_path
     from ..export.files import check_place
     from ..export.formats import check_output
-    from ..scan.paths import files_of
 
-    inputs = [(str(file), "scan") for file in files_of(values.scan)]
-    inputs += [(values.settings, "settings"), (values.fixed_file, "list of fixed nodes")]
-    if isinstance(length := vars(values).get("length"), str) and not length.startswith(CURVATURE):
-        inputs.append((length, "file of lengths"))
-    inputs += [(name, "fixed line") for name in getattr(values, "fixed_lines", ())]
-    inputs += [(name, "polygon") for name in getattr(values, "crop", ()) if Path(name).is_file()]
-    taken = {Path(name).resolve(): what for name, what in inputs if name}
+    taken = inputs_of(values)
     for out in outs:
-        _take(check_output(out), "grid", taken)
+        claim(check_output(out), "grid", taken)
         if out.suffix.lower() == ".csv":
-            _take(nodes_path(out), "table of nodes", taken)
+            claim(nodes_path(out), "table of nodes", taken)
     if report is not None:
-        _take(check_place(report, (".json",)), "report", taken)
+        claim(check_place(report, (".json",)), "report", taken)
     check_place(settings_file, (".json",))
     if taken.get(settings_file.resolve(), "settings") != "settings":  # a run may repeat the settings it saved itself
         raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
-
-
-def _take(path: Path, what: str, taken: dict[Path, str]) -> None:
-    """Claim a path for an output, unless something else is there."""
-    if (before := taken.get(path.resolve())) is not None:
-        raise FormatError(f"the {what} {path} would overwrite the {before}; name another file")
-    taken[path.resolve()] = what
 
 
 def make_grid(

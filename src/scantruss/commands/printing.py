@@ -6,7 +6,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError, InputError
+from ..errors import InputError
+from .outputs import claim
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -35,8 +36,7 @@ def print_solid(values: Namespace) -> None:
     out = check_place(values.out, (".3mf", ".stl"))
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
-    if out.exists() and out.samefile(values.grid):
-        raise FormatError(f"the model {out} would overwrite the grid; name another file")
+    claim(out, "model", {Path(values.grid).resolve(): "grid"})
     from ..export.json_file import read_grid
     from ..export.solid import print_model
 

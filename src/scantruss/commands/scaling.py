@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FormatError, InputError
+from ..errors import InputError
+from .outputs import Taken, claim, cloud_output, inputs_of, result_folder
 from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, thin_to_fit
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from ..sweep import Trial
     from ..workers import Workers
 
+TABLES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
 MANY = 20_000_000  # points of which several workers thin a scan by default
 
 
@@ -57,19 +59,14 @@ def thin(values: Namespace) -> None:
     from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
     from ..scan.opened import open_scan
-    from ..scan.paths import files_of
     from ..scan.streaming import thin_open_scan
     from ..scan.thin import check_spacing
-    from ..scan.writers import check_cloud_output, write_points
+    from ..scan.writers import write_points
 
     check_spacing(values.spacing)
-    out = check_cloud_output(values.out)
-    files = files_of(values.scans)
-    polygons = [Path(name) for name in getattr(values, "crop", ())]
-    for what, taken in (("scan", files), ("polygon", polygons)):
-        if out.resolve() in {file.resolve() for file in taken}:
-            raise FormatError(f"the thinned scan {out} would overwrite the {what}; name another file")
-    scan = open_scan(files, getattr(values, "unit", ""), selection_of(values))
+    out = cloud_output(values.out)
+    claim(out, "thinned scan", inputs_of(values))
+    scan = open_scan(values.scans, getattr(values, "unit", ""), selection_of(values))
     sources = scan.sources
     few = sum(source.points for source in sources) < MANY
     with Bars() as bars, _workers(values, bars, 1 if few else None) as workers:
@@ -158,10 +155,9 @@ def sweep(values: Namespace) -> None:
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
 
-    folder = Path(values.out)
-    if folder.exists() and not folder.is_dir():
-        raise FormatError(f"{folder} is a file; name a folder for the grids")
+    folder = result_folder(values.out)
     trials, varied = trials_of_words(values)
+    claim_results(folder, trials, inputs_of(values))
     shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
     with Bars() as bars:
         fitting = thin_to_fit(values.scan, shortest, values.memory)
@@ -177,6 +173,16 @@ def sweep(values: Namespace) -> None:
         _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
     print_table(head, rows)
     print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+
+
+def claim_results(folder: Path, trials: list[Trial], taken: Taken) -> None:
+    """Refuse a folder in which a result cannot be written, or would be where something else is."""
+    from ..export.files import check_place
+
+    for name in (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png"))):
+        claim(folder / name, "result", taken)
+        if folder.exists():
+            check_place(folder / name, (Path(name).suffix,))
 
 
 def _method_to_compile(trials: list[Trial], usual: str) -> str:
@@ -217,7 +223,7 @@ def _is_list(value: Any) -> bool:
 def _save(
     folder: Path, title: str, trials: list[Trial], outcomes: list[Any], head: tuple[str, ...], rows: list[Any]
 ) -> None:
-    """Save grids, pictures and tables together, or nothing."""
+    """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
     from ..export.sheet import encode_sheet
     from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
     from ..report.saving import SaveTogether
@@ -228,9 +234,9 @@ def _save(
             if outcome.grid:
                 save.beside(folder / f"{trial.name}.json").write_bytes(outcome.grid)
                 save.beside(folder / f"{trial.name}.png").write_bytes(outcome.picture)
-        save.beside(folder / "table.csv").write_bytes(encode_table_csv(head, rows))
-        save.beside(folder / "table.md").write_bytes(encode_table_markdown(head, rows))
-        save.beside(folder / "index.html").write_bytes(encode_page(title, head, rows, trials, outcomes))
         both = zip(trials, outcomes, strict=True)
         pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
-        save.beside(folder / "overview.png").write_bytes(encode_sheet(pictures))
+        page = encode_page(title, head, rows, trials, outcomes)
+        tables = (encode_table_csv(head, rows), encode_table_markdown(head, rows), page, encode_sheet(pictures))
+        for name, content in zip(TABLES, tables, strict=True):
+            save.beside(folder / name).write_bytes(content)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError
 from .gridding import make_grid, show_grid
+from .outputs import result_folder
 from .shared import read_scan
 
 if TYPE_CHECKING:
@@ -32,9 +31,7 @@ def demo(values: Namespace) -> None:
     from ..demo import SCAN, demo_settings, save_demo
     from ..report.terminal import Bars
 
-    folder = Path(values.folder)
-    if folder.exists() and not folder.is_dir():
-        raise FormatError(f"{folder} is a file; name a folder for the demo")
+    folder = result_folder(values.folder)
     with Bars() as bars:
         cloud = read_scan(str(SCAN), demo_settings(), bars)
         result = make_grid(cloud, demo_settings(), bars)

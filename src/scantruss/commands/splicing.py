@@ -6,8 +6,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import FormatError, InputError
+from ..errors import InputError
 from ..settings import UNITS
+from .outputs import claim, cloud_output, inputs_of
 from .shared import note_compiling, said_of_cloud_file
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def splice(values: Namespace) -> None:
     files = scan_files(values.scans)
     out = Path(values.out)
     poses_file = out.with_suffix(".poses.json")
-    check_outputs(values, files, out, poses_file)
+    check_outputs(values, out, poses_file)
     names = names_of(files)
     with Bars() as bars:
         result = splice_files(values, files, names, bars)
@@ -86,18 +87,15 @@ def names_of(files: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [file.as_posix() for file in files]
 
 
-def check_outputs(values: Namespace, files: list[Path], out: Path, poses_file: Path) -> None:
+def check_outputs(values: Namespace, out: Path, poses_file: Path) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from ..export.files import check_place
-    from ..scan.writers import check_cloud_output
 
-    check_cloud_output(out)
-    check_place(out, (out.suffix.lower(),))
+    taken = inputs_of(values)
+    claim(cloud_output(out), "whole", taken)
     check_place(poses_file, (".json",))
-    taken = {file.resolve() for file in files}
-    for path in (out, poses_file):
-        if path.resolve() in taken:
-            raise FormatError(f"{path} would overwrite a scan; name another file")
+    if taken.get(poses_file.resolve()) != "poses":  # a run may replace the poses that it starts from
+        claim(poses_file, "file of poses", taken)
     if values.use_poses and not values.poses:
         raise InputError("--use-poses needs --poses FILE, the poses to be used")
 
