@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .outputs import Taken, claim, cloud_output, inputs_of, result_folder
-from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, thin_to_fit
+from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, say_of_cloud, thin_to_fit
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -77,10 +77,7 @@ def thin(values: Namespace) -> None:
             result = thin_open_scan(
                 scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars
             )
-        for note in result.notes:
-            bars.note(note)
-        if result.dropped:
-            bars.note(f"{result.dropped:,} points with NaN or infinite coordinates are left out")
+        say_of_cloud(bars, result)
         bars("write", 0.0)
         with SaveTogether() as save:
             write_points(save.beside(out), result.points, unit=result.unit)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ..options import Parser
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
+    from ..scan.streaming import Thinned
     from ..settings import Settings
 
 SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
@@ -39,11 +40,17 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     else:
         cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     bars("read", 1.0)
-    for note in cloud.notes:
-        bars.note(note)
-    if cloud.dropped:
-        bars.note(f"{cloud.dropped} points with NaN or infinite coordinates are left out")
+    say_of_cloud(bars, cloud)
     return cloud
+
+
+def say_of_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
+    """Say what was left out of a cloud or converted in it, with its name where it is one of several."""
+    said = list(cloud.notes)
+    if cloud.dropped:
+        said.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
+    for note in said:
+        bars.note(note if name in note else f"{name}: {note}")
 
 
 def said_of_cloud_file(out: Path, unit: str) -> list[str]:

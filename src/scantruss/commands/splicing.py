@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..settings import UNITS
 from .outputs import claim, cloud_output, inputs_of
-from .shared import note_compiling, said_of_cloud_file
+from .shared import note_compiling, said_of_cloud_file, say_of_cloud
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -114,10 +114,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     for place, (file, name) in enumerate(zip(files, names, strict=True)):
         bars("read", place / len(files))
         cloud = read_points(file, unit=values.unit)
-        for note in cloud.notes:
-            bars.note(note)
-        if cloud.dropped:
-            bars.note(f"{name}: {cloud.dropped} points with NaN or infinite coordinates are left out")
+        say_of_cloud(bars, cloud, name)
         clouds.append(cloud)
     with note_compiling(bars):
         result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
