@@ -1,6 +1,7 @@
 """Scans in frames of their own come together where the truth says; what does not belong is refused by name."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from scipy.spatial import cKDTree
 
 import scantruss as st
 from scantruss.cli import main
+from scantruss.commands.splicing import splice_parser
 from scantruss.errors import FormatError, InputError
 from scantruss.scan.cloud import PointCloud, measure_spacing
 from scantruss.splice import pairs as pair_module
@@ -321,6 +323,17 @@ def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(place, c
     assert json.loads(Path("out.poses.json").read_text())["left_out"] == ["x.xyz", "y.xyz"]
     assert main(["splice", "*.xyz", "-o", "all.ply", "--all"]) == 2
     assert "x.xyz fits nowhere" in capsys.readouterr().err and not Path("all.ply").exists()
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz", ".e57", ".ply"])
+def test_what_is_said_of_the_file_names_only_options_that_splice_has(place, capsys, scanned, monkeypatch, suffix):
+    monkeypatch.setattr("scantruss.splice.splice_scans", lambda *_, **__: scanned[2])
+    assert main(["splice", "*.xyz", "-o", f"out{suffix}"]) == 0
+    said = capsys.readouterr().out.partition("wrote ")[2]
+    assert ("reference system are not kept" in said) == (suffix in (".las", ".laz"))
+    options = set(re.findall(r"--[a-z][a-z-]*", said))
+    assert options <= set(splice_parser()._option_string_actions)
+    assert options == ({"--unit"} if suffix == ".e57" else set())
 
 
 def test_it_can_be_stopped(scanned):

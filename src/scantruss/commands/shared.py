@@ -53,11 +53,15 @@ def say_of_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> Non
         bars.note(note if name in note else f"{name}: {note}")
 
 
-def said_of_cloud_file(out: Path, unit: str) -> list[str]:
-    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes."""
+def said_of_cloud_file(out: Path, unit: str, *, selects: bool = True) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes.
+
+    `selects`: the command has options for taking points by class and return.
+    """
     suffix = out.suffix.lower()
     if suffix in (".las", ".laz"):
-        return ["classes, returns, colours and reference system are not kept; --class and --returns choose before"]
+        more = "; --class and --returns choose before" if selects else ""
+        return [f"classes, returns, colours and reference system are not kept{more}"]
     if suffix == ".e57" and not unit:
         return [
             "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"

@@ -151,6 +151,6 @@ def show_splice(result: Splice, written: list[Path]) -> None:
         [
             f"{told}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
-            *said_of_cloud_file(written[0], result.unit),
+            *said_of_cloud_file(written[0], result.unit, selects=False),
         ]
     )
