@@ -14,6 +14,7 @@ from shapes import make
 from scantruss import ahead
 from scantruss.commands.shared import STAGES, note_compiling
 from scantruss.kernels import compile as compiling
+from scantruss.report.terminal import Bars
 
 needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
@@ -152,10 +153,11 @@ def test_the_example_compiles_for_the_types_of_a_run(method, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-class Notes:
-    """Stands for the bars."""
+class Notes(Bars):
+    """Bars that keep what they are to say."""
 
     def __init__(self):
+        super().__init__()
         self.lines = []
 
     def note(self, line):
@@ -185,6 +187,22 @@ def test_a_line_says_that_a_long_compile_is_about_to_come_and_only_then(tmp_path
             pass
         assert bool(bars.lines) == bool(compiles)
     assert not ahead.are_compiled("paper", "front") and not ahead.are_compiled("paper", "optimize")
+
+
+@needs_jit
+def test_a_run_says_it_once_however_many_parts_of_it_compile(tmp_path, monkeypatch):
+    """A scan that is thinned while it is read compiles for that, then for its boundary, then for the grid."""
+    monkeypatch.setattr(compiling, "FOLDER", tmp_path)
+    bars = Notes()
+    for stages in ((), STAGES[:1], STAGES):
+
+        @compiling.kernel
+        def twice(x):
+            return 2.0 * x
+
+        with note_compiling(bars, "default", *stages):
+            assert twice(4.0) == 8.0
+    assert bars.lines == ["compiling kernels, once on this machine"]
 
 
 @needs_jit

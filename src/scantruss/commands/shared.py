@@ -104,12 +104,12 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
 
 @contextmanager
 def note_compiling(bars: Bars, method: str = "default", *stages: str) -> Iterator[None]:
-    """Say so, once, where kernels must be compiled, which takes long: at the start where the stages are known to need it."""
+    """Say so, once a run, where kernels must be compiled, which takes long: at the start where stages are known to need it."""
     from ..ahead import are_compiled, can_be_stored
     from ..kernels.compile import tell_of_compiling
 
     def tell() -> None:
-        bars.note("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
+        bars.note_once("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
 
     if are_compiled(method, *stages):
         with tell_of_compiling(tell):

@@ -23,6 +23,7 @@ class Bars(AbstractContextManager["Bars"]):
         self._rich: RichProgress | None = None
         self._tasks: dict[str, TaskID] = {}
         self._current = ""
+        self._said: set[str] = set()
 
     def __enter__(self) -> Bars:
         """Start drawing, if there is somebody to look."""
@@ -60,6 +61,12 @@ class Bars(AbstractContextManager["Bars"]):
             self._rich.console.print(line, highlight=False, markup=False)
         else:
             print(line, flush=True)
+
+    def note_once(self, line: str) -> None:
+        """Say one line, unless it was said in this way before."""
+        if line not in self._said:
+            self._said.add(line)
+            self.note(line)
 
 
 def print_lines(lines: list[str]) -> None:
