@@ -288,6 +288,9 @@ def test_the_command_writes_the_whole_and_the_poses(place, capsys):
     kept = json.loads(Path("kept.poses.json").read_text())
     for name, scan in values["scans"].items():
         assert np.allclose(kept["scans"][name]["matrix"], scan["matrix"], atol=1e-12)
+    same = ["-o", "whole.ply", "--poses", "whole.poses.json", "--use-poses", "--unit", "m"]
+    assert main(["splice", "*.xyz", *same]) == 0  # a run may replace the poses that it starts from
+    assert json.loads(Path("whole.poses.json").read_text())["scans"] == kept["scans"]
 
 
 @pytest.mark.parametrize(
