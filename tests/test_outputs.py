@@ -10,6 +10,7 @@ from small_grids import fan
 
 from scantruss.cli import main
 from scantruss.export.formats import write
+from scantruss.scan import fit, opened, readers  # here, so that none of them is loaded while another is barred
 from scantruss.settings import Settings
 
 RING = "-99,-99\n99,-99\n99,99\n-99,99\n"
@@ -45,8 +46,8 @@ def refused(capsys, words):
 @pytest.fixture
 def unread(place, monkeypatch):
     """The same, where no scan may be read."""
-    for name in ("scan.readers.read_points", "scan.opened.open_scan", "scan.fit.spacing_to_fit"):
-        monkeypatch.setattr(f"scantruss.{name}", lambda *_, **__: pytest.fail("a scan was read"))
+    for module, name in ((readers, "read_points"), (opened, "open_scan"), (fit, "spacing_to_fit")):
+        monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("a scan was read"))
     return place
 
 
