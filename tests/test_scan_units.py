@@ -145,7 +145,14 @@ def test_named_degrees_are_refused_in_text(tmp_path: Path, header: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "comment", ["comment unit: mm", "comment units mm", "obj_info unit = millimeters", "comment VCGLIB unit mm"]
+    "comment",
+    [
+        "comment unit: mm",
+        "comment units mm",
+        "obj_info unit = millimeters",
+        "comment VCGLIB unit mm",
+        "comment unit in mm",
+    ],
 )
 def test_ply_says_its_unit_in_a_comment(tmp_path: Path, comment: str) -> None:
     path = tmp_path / "a.ply"
@@ -161,6 +168,10 @@ def test_ply_says_its_unit_in_a_comment(tmp_path: Path, comment: str) -> None:
         ("X [mm],Y [mm],Z [mm]", "mm", 1), ("z_m,x_m,y_m", "m", 1), ("E (ft),N (ft),H (ft)", "foot", 1),
         ('"x[inch]","y[inch]","z"', "inch", 1), ("x (m),y (m),z (ft)", "m", 0.3048), ("x [cm],y [cm],z [m]", "cm", 100),
         ("# unit: mm\nx,y,z", "mm", 1), ("// Units: cm\nx,y,z", "cm", 1), ("# units of time: s\nx,y,z", "", 1),
+        ("# Coordinates unit in m\nx,y,z", "m", 1), ("# units in mm\nx,y,z", "mm", 1), ("# unit in: mm\nx,y,z", "mm", 1),
+        ("# the unit in this file is mm\nx,y,z", "", 1), ("# unit in which x is given: mm\nx,y,z", "", 1),
+        ("# unit: in\nx,y,z", "inch", 1), ("# units (in)\nx,y,z", "inch", 1), ("# units: in, degrees\nx,y,z", "inch", 1),
+        ("# unit in\n# m is for metres\nx,y,z", "inch", 1), ("# unit in-house\nx,y,z", "", 1),
         ("x (m),y (ft),z (ft)", "", 1), ("x,y,z", "", 1), ("x_in,y_in,z_in", "", 1), ("x,y,z [mm]", "", 1),
     ],
 )  # fmt: skip
