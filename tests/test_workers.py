@@ -8,6 +8,7 @@ import threading
 import time
 import warnings
 from contextlib import contextmanager, suppress
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -177,6 +178,48 @@ def test_a_worker_of_a_cluster_that_dies_is_made_good(tmp_path):
         found = dict(crew.run(leave_once, range(5), str(tmp_path)))
     assert (tmp_path / "left").exists()
     assert found == {number: number for number in range(5)}
+
+
+class Stub:
+    """A client whose jobs are lost, each of some as often as is said, and done one after the other."""
+
+    def __init__(self, lost):
+        self.lost, self.key = dict(lost), 0
+
+    def submit(self, work, job, common, pure):
+        from concurrent.futures import CancelledError
+
+        def result():
+            if self.lost.get(job):
+                self.lost[job] -= 1
+                raise CancelledError
+            return work(job, common)
+
+        self.key += 1
+        return SimpleNamespace(key=str(self.key), result=result)
+
+
+class InTurn(list):
+    """What stands for `distributed.as_completed`."""
+
+    add = list.append
+
+    def __next__(self):
+        return self.pop(0)
+
+
+@pytest.mark.parametrize(("lost", "given_up"), [({10: 1, 40: 1, 70: 1, 95: 1, 99: 3}, False), ({50: 4}, True)])
+def test_only_deaths_with_nothing_done_between_end_the_work_of_a_cluster(monkeypatch, lost, given_up):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "as_completed", InTurn)
+    monkeypatch.setattr(module, "AHEAD", 1)
+    crew = Cluster.__new__(Cluster)
+    crew.count, crew._client = 1, Stub(lost)
+    if given_up:
+        with pytest.raises(ScanTrussError, match="die again and again"):
+            list(crew.run(add, range(100)))
+    else:
+        assert dict(crew.run(add, range(100))) == {number: number for number in range(100)}
 
 
 def test_a_cluster_is_not_asked_for_without_its_packages(monkeypatch):

@@ -224,6 +224,7 @@ class Cluster(Workers):
                 common = self._share(shared)
                 submit(number, job)
                 continue
+            deaths = 0
             yield number, result
 
     def _share(self, shared: Any) -> Any:
