@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from jobs import add, die_always, die_once, leave_once, refuse
 
+from scantruss import cli
 from scantruss import workers as module
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.machine import processors
@@ -119,22 +120,31 @@ def test_a_local_cluster_that_does_not_start_names_another_way(monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held here")
-def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "handler", "error"),
+    [(signal.SIGINT, signal.default_int_handler, KeyboardInterrupt), (signal.SIGTERM, cli._stop, cli._Stopped)],
+    ids=["interrupted", "stopped"],
+)
+def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch, number, handler, error):
     distributed = pytest.importorskip("distributed")
     held, closed = [], []
 
     class Slow:
         def __init__(self, **options):
             held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
             time.sleep(0.5)
 
         def close(self):
             closed.append(True)
 
     monkeypatch.setattr(distributed, "LocalCluster", Slow)
-    with pytest.raises(KeyboardInterrupt):
-        Cluster(2)
+    before = signal.signal(number, handler)
+    try:
+        with pytest.raises(error):
+            Cluster(2)
+    finally:
+        signal.signal(number, before)
     assert held == [True] and closed == [True]  # held, so that no worker dies of it with a traceback
 
 
