@@ -151,7 +151,7 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
 def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
     source = tile.source
     content = read_content(source.path, wanted)
-    if content.metres != source.metres:
+    if (content.metres, content.z_metres) != (source.metres, source.z_metres):
         raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
     yield content
 
