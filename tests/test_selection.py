@@ -121,6 +121,17 @@ def test_what_a_las_file_calls_deleted_is_left_out(tmp_path: Path, version: str,
     for read in (read_points, lambda path: thin_scan(path, 1.0)):
         with pytest.raises(InputError, match=r"no point of a.la. is left: of 600 points 600 marked as withheld$"):
             read(path)
+    chosen = Selection(classes=(9,))
+    other = tmp_path / f"b{suffix}"
+    other.write_bytes(las(P, suffix, version=version, classification=CLASS))
+    for read in (
+        lambda names: read_points(names, selection=chosen),
+        lambda names: thin_scan(names, 1.0, selection=chosen),
+    ):
+        with pytest.raises(InputError, match=r"of 600 points 600 marked as withheld$"):
+            read(path)
+        with pytest.raises(InputError, match=r"of 1,200 points .*; some of them have classes 2 5 6, x, y, z from"):
+            read([path, other])
 
 
 def inside(x: float, y: float, ring: list[tuple[float, float]]) -> bool:

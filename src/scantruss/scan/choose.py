@@ -26,16 +26,17 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
 
 def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     """Return what could be selected of a file, in words; "" where it has no points."""
+    if not len(points):
+        return ""
     said = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
         if name in attributes:
             values = np.unique(attributes[name])[:20]
             said.append(f" {words} {' '.join(f'{value:g}' for value in values)}")
-    if "confidence" in attributes and len(points):
+    if "confidence" in attributes:
         said.append(f" confidence up to {np.nanmax(attributes['confidence']):.4g}")
-    if len(points):
-        corners = (np.nanmin(points, axis=0), np.nanmax(points, axis=0))
-        said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
+    corners = (np.nanmin(points, axis=0), np.nanmax(points, axis=0))
+    said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
     return ",".join(said)
 
 

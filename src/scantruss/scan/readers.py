@@ -199,5 +199,6 @@ def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
         )
     left_out = add_counts([part.left_out for part in parts])
     said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
-    has = f"; the scan has{parts[0].held}" if parts[0].held else ""
+    held = next((part.held for part in parts if part.held), "")
+    has = f"; {'the scan has' if len(parts) == 1 else 'some of them have'}{held}" if held else ""
     return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {said}{has}")
