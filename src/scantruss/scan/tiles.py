@@ -184,8 +184,14 @@ def _ply(path: Path) -> Source | None:
     if not header.order or vertex is None or vertex.name != "vertex" or vertex.has_lists:
         return None
     rows = row_type(vertex, header.order, [0] * len(vertex.properties))
-    if not {"x", "y", "z"} <= set(rows.names or ()):
+    own = [p.name for p in vertex.properties]
+    lower = [name.lower() for name in own]
+    if not {"x", "y", "z"} <= set(lower):
         return None
+    first = {
+        lower.index(axis): axis for axis in "xyz"
+    }  # X and x may both be there; the first is read, as by `read_ply`
+    rows.names = tuple(first.get(i, f"other {i}" if name in "xyz" else name) for i, name in enumerate(rows.names or ()))
     return replace(_rows(path, vertex.count, header.start, rows), metres=metres_of(header.unit))
 
 
