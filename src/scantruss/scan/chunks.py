@@ -43,7 +43,7 @@ class Chunk(NamedTuple):
 
     points: np.ndarray  #: (K, 3) float64 [unit of the scan], in the scan's own frame
     read: int  #: points that were read
-    left_out: dict[str, int]  #: of these, what each part of the selection left out
+    left_out: dict[str, int]  #: of these, what the file calls none and what each part of the selection left out
     notes: tuple[str, ...] = ()  #: what the reader of a whole file says
     held: str = ""  #: what could have been selected, where nothing was
     promised: int = 0  #: points that count lines among them promise: texts of several scans

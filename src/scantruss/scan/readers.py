@@ -56,7 +56,7 @@ class Part:
     unit: str
     system: str  #: reference system, "" where the file does not say it
     count: int  #: points in the file
-    left_out: dict[str, int]  #: what each part of the selection left out
+    left_out: dict[str, int]  #: what the file calls none and what each part of the selection left out
     held: str  #: what could have been selected, where nothing was
     notes: tuple[str, ...]
 

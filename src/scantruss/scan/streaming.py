@@ -131,7 +131,8 @@ class Told:
 
     def __init__(self) -> None:
         self.read = 0  #: points that were read
-        self.left_out: dict[str, int] = {}  #: of these, what each part of the selection left out
+        #: of these, what files call none and what each part of the selection left out
+        self.left_out: dict[str, int] = {}
         self.notes: tuple[str, ...] = ()
         self.held = ""  #: what could have been selected, of a part of which nothing was
         self.promised = 0  #: points that count lines promise
