@@ -191,6 +191,22 @@ def test_dense_clouds_of_strays_go():
     assert (clean.kept[away < 4 * shape.noise] < len(shape.points)).sum() > 0.994 * 30_000
 
 
+def test_a_narrow_cloud_goes_however_many_points_it_has_and_nothing_where_the_share_is_none():
+    shape = make("gable", 20_000)
+    rng = np.random.default_rng(0)
+    debris = np.array([0.0, 0.0, 60.0]) + 4.0 * spacing_of(shape, 20_000) * rng.normal(size=(2_000, 3))
+    few = np.array([0.0, 0.0, -60.0]) + 0.5 * spacing_of(shape, 20_000) * rng.normal(size=(5, 3))
+    near = Nearby.of(np.concatenate([shape.points, debris, few]))
+
+    def loose(share):
+        return near.in_order(find_loose_pieces(near, share))
+
+    for share in (1e-6, 0.005):
+        found = loose(share)
+        assert found[20_000:22_000].mean() > 0.95 and found[22_000:].all() and not found[:20_000].any()
+    assert not loose(0.0).any()
+
+
 def test_switched_off_all_points_come_back():
     points = make("scallop", 5000, outliers=0.1, duplicates=0.1).points
     nothing = dict.fromkeys(("duplicates", "stray_distance", "loose_pieces", "layer_distance"))

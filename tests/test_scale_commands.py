@@ -175,6 +175,35 @@ def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatc
     assert "no points but NaN" in refused(capsys, "info", "none.npy", "--memory", "1kB")
 
 
+@pytest.mark.parametrize("place_of_all", [(0, 0, 0), (5e5, 5.4e6, 200)])
+def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, monkeypatch, place_of_all):
+    """One point in a hundred at (0, 0, 0), with others at a far place: no echo."""
+    monkeypatch.setattr(fit, "FEWEST", 1000)
+    monkeypatch.setattr(fit, "BULK", 3000)
+    points = plate() + place_of_all
+    np.save("clean.npy", points)
+    points[::100] = -9999.0
+    np.save("holes.npy", points)
+    settings, shares = st.Settings(length=4.0), []
+    looks = [
+        fit.spacing_to_look(name, settings, lambda *told: shares.append(told)) for name in ("clean.npy", "holes.npy")
+    ]
+    assert looks[0] == pytest.approx(np.linalg.norm(np.ptp(plate(), axis=0)) / fit.LOOK, rel=0.02)
+    assert looks[1] == pytest.approx(looks[0], rel=0.02)
+    assert shares[-1] == ("look", 1.0)
+    assert main(["info", "holes.npy", "--memory", "1MB"]) == 0
+    assert "thinned while it was read" in capsys.readouterr().out
+
+
+def test_a_first_look_sees_thin_far_ends(place):
+    """A few points of a scan reach as far again as all others: a scanner sees far in few directions."""
+    chance = np.random.default_rng(0)
+    points = np.concatenate([chance.uniform(-1, 1, (20_000, 3)), chance.uniform(-3, 3, (100, 3))])
+    np.save("far.npy", points)
+    found = fit.spacing_to_look("far.npy", st.Settings(length=1.0))
+    assert found == pytest.approx(np.linalg.norm(np.ptp(points, axis=0)) / fit.LOOK, rel=0.01)
+
+
 def test_what_fits_into_memory_is_taken_as_it_is(place):
     settings = st.Settings(length=4.0)
     assert fit.spacing_to_fit(["scan.npy"], settings) == 0.0

@@ -145,7 +145,14 @@ def test_named_degrees_are_refused_in_text(tmp_path: Path, header: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "comment", ["comment unit: mm", "comment units mm", "obj_info unit = millimeters", "comment VCGLIB unit mm"]
+    "comment",
+    [
+        "comment unit: mm",
+        "comment units mm",
+        "obj_info unit = millimeters",
+        "comment VCGLIB unit mm",
+        "comment unit in mm",
+    ],
 )
 def test_ply_says_its_unit_in_a_comment(tmp_path: Path, comment: str) -> None:
     path = tmp_path / "a.ply"
@@ -161,6 +168,10 @@ def test_ply_says_its_unit_in_a_comment(tmp_path: Path, comment: str) -> None:
         ("X [mm],Y [mm],Z [mm]", "mm", 1), ("z_m,x_m,y_m", "m", 1), ("E (ft),N (ft),H (ft)", "foot", 1),
         ('"x[inch]","y[inch]","z"', "inch", 1), ("x (m),y (m),z (ft)", "m", 0.3048), ("x [cm],y [cm],z [m]", "cm", 100),
         ("# unit: mm\nx,y,z", "mm", 1), ("// Units: cm\nx,y,z", "cm", 1), ("# units of time: s\nx,y,z", "", 1),
+        ("# Coordinates unit in m\nx,y,z", "m", 1), ("# units in mm\nx,y,z", "mm", 1), ("# unit in: mm\nx,y,z", "mm", 1),
+        ("# the unit in this file is mm\nx,y,z", "", 1), ("# unit in which x is given: mm\nx,y,z", "", 1),
+        ("# unit: in\nx,y,z", "inch", 1), ("# units (in)\nx,y,z", "inch", 1), ("# units: in, degrees\nx,y,z", "inch", 1),
+        ("# unit in\n# m is for metres\nx,y,z", "inch", 1), ("# unit in-house\nx,y,z", "", 1),
         ("x (m),y (ft),z (ft)", "", 1), ("x,y,z", "", 1), ("x_in,y_in,z_in", "", 1), ("x,y,z [mm]", "", 1),
     ],
 )  # fmt: skip
@@ -176,7 +187,14 @@ def test_text_says_its_unit_in_its_header(tmp_path: Path, header: str, unit: str
     assert (thinned.unit, thinned.notes, len(thinned.points)) == (unit, cloud.notes, len(P))
     assert read_points(path, unit="foot").unit == "foot"
     path.write_bytes(text(P, f"{header}\n", ",").decode().encode("utf-16"))
-    assert read_points(path).unit == thin_scan(path, 1e-5).unit == unit
+    assert same_words(path) == (unit, cloud.notes)
+
+
+def same_words(path: Path) -> tuple[str, tuple[str, ...]]:
+    """Return the unit and the notes of a scan, in memory as when it is thinned while it is read."""
+    cloud, thinned = read_points(path), thin_scan(path, 1e-5)
+    assert (cloud.unit, cloud.notes) == (thinned.unit, thinned.notes)
+    return cloud.unit, cloud.notes
 
 
 def test_parquet_says_its_unit_in_its_columns(tmp_path: Path) -> None:
@@ -186,7 +204,7 @@ def test_parquet_says_its_unit_in_its_columns(tmp_path: Path) -> None:
     path = tmp_path / "a.parquet"
     parquet.write_table(arrow.table({"z (ft)": P[:, 2], "x (m)": P[:, 0], "y (m)": P[:, 1]}), path)
     cloud = read_points(path)
-    assert cloud.unit == thin_scan(path, 1e-5).unit == "m"
+    assert same_words(path) == ("m", cloud.notes) and "heights of a.parquet are in foot" in cloud.notes[0]
     assert np.allclose(cloud.points + cloud.origin, P * [1, 1, 0.3048], rtol=0, atol=1e-9)
 
 

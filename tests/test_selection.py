@@ -14,6 +14,7 @@ from scan_files import las, parquet_file, pcd, plate, text, written
 from scantruss.cli import main
 from scantruss.errors import FormatError, InputError
 from scantruss.options import Parser, add_reading, selection_of
+from scantruss.scan import chunks
 from scantruss.scan.choose import in_polygon
 from scantruss.scan.readers import read_points
 from scantruss.scan.streaming import thin_scan
@@ -255,3 +256,22 @@ def test_packed_text_and_several_files_select_too(tmp_path: Path) -> None:
     assert np.allclose(cloud.points + cloud.origin, np.concatenate([expected, expected]), rtol=0, atol=1e-9)
     assert f"{2 * (CLASS != 5).sum()} points of other classes are left out" in " ".join(cloud.notes).replace(",", "")
     assert written(".csv", P[:5]).startswith(b"x,y,z\n")
+
+
+def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch) -> None:
+    """Of points that are NaN nothing is told, and nobody is warned of them."""
+    monkeypatch.setattr(chunks, "SAMPLE", 100)
+    rows = np.zeros(600, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("class", "f4"), ("confidence", "f8")])
+    rows["x"], rows["y"], rows["z"] = P.T
+    rows["class"], rows["confidence"] = CLASS, np.nan
+    rows["x"][:300], rows["class"][:300] = np.nan, 7
+    np.save(tmp_path / "a.npy", rows)
+    np.save(tmp_path / "b.npy", np.full((600, 3), np.nan))
+    for read in (
+        lambda name, chosen: read_points(tmp_path / name, selection=chosen),
+        lambda name, chosen: thin_scan(tmp_path / name, 1.0, selection=chosen),
+    ):
+        with pytest.raises(InputError, match=r"no point of a.npy is left: .* classes 2 5 6, x, y, z from [0-9]"):
+            read("a.npy", Selection(classes=(9,), confidence=0.5))
+        with pytest.raises(InputError, match=r"no point of b.npy is left: of 600 points 600 outside the box$"):
+            read("b.npy", Selection(crop=("box:0,0,1,1",)))

@@ -1,14 +1,16 @@
 """The printed model: one watertight manifold solid with every opening of the grid."""
 
 import io
+import json
 import zipfile
 
 import numpy as np
 import pytest
 import trimesh
-from small_grids import dome, fan, icosahedron, make_grid, two_pieces
+from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
 import scantruss as st
+from scantruss.demo import save_demo
 from scantruss.export.solid import Solid, build_solid, is_watertight
 from scantruss.export.solid_files import encode_3mf, encode_stl, lattice_step, put_on_lattice
 
@@ -30,6 +32,14 @@ def expected_genus(grid):
             left -= found
             waiting += found
     return len(grid.edges) - len(neighbours) + pieces, pieces
+
+
+def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path):
+    """They differ from those asked for where no grid of the default method passes its certificate."""
+    made = st.Settings(length=24.0, unit="mm", method="paper")
+    grid = dome(4, 24.0, settings=made)
+    save_demo(tmp_path, grid, cloud_over(grid))
+    assert st.Settings.from_dict(json.loads((tmp_path / "grid.settings.json").read_text())) == made
 
 
 @pytest.mark.parametrize("suffix", [".3mf", ".stl"])

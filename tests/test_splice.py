@@ -136,6 +136,13 @@ def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_give
     assert turned < 0.5 and moved < given.spacing and not given.left_out
 
 
+def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(saddles):
+    scans, _ = saddles
+    chance = np.random.default_rng(100)
+    with pytest.raises(InputError, match="in more ways than one"):
+        splice_scans(clouds_of(scans), NAMES[:2], poses={name: random_pose(chance) for name in NAMES[:2]})
+
+
 def test_units_do_not_matter(scanned):
     """The same scans a thousand times as large, far from the origin."""
     scans, _, _result = scanned

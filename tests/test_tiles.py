@@ -29,17 +29,16 @@ def write_las(path, points, point_format=3):
     las.write(path)
 
 
-def write_ply(path, points, order="<", kind="<f8", more=""):
+def write_ply(path, points, order="<", kind="<f8", more="", axes="xyz"):
     word = {"<": "little", ">": "big"}[order]
     names = [("x", order + kind[1:]), ("y", order + kind[1:]), ("quality", "u1"), ("z", order + kind[1:])]
     rows = np.zeros(len(points), names)
     rows["x"], rows["y"], rows["z"] = points.T
     typed = {"f4": "float", "f8": "double"}[kind[1:]]
-    head = (
-        f"ply\nformat binary_{word}_endian 1.0\nelement vertex {len(points)}\nproperty {typed} x\nproperty {typed} y\n"
-    )
-    head += f"property uchar quality\nproperty {typed} z\n{more}end_header\n"
-    path.write_bytes(head.encode() + rows.tobytes())
+    named = [(typed, axes[0]), (typed, axes[1]), ("uchar", axes[3:] or "quality"), (typed, axes[2])]
+    head = f"ply\nformat binary_{word}_endian 1.0\nelement vertex {len(points)}\n"
+    head += "".join(f"property {kind} {name}\n" for kind, name in named)
+    path.write_bytes(f"{head}{more}end_header\n".encode() + rows.tobytes())
 
 
 def write_structured(path, points):
@@ -73,6 +72,8 @@ WAYS = {
     "laz 6": ("scan.laz", lambda path, points: write_las(path, points, 6)),
     "ply": ("scan.ply", write_ply),
     "ply big": ("scan.ply", lambda path, points: write_ply(path, points, ">", ">f4")),
+    "ply large letters": ("scan.ply", lambda path, points: write_ply(path, points, axes="XYZ")),
+    "ply both letters": ("scan.ply", lambda path, points: write_ply(path, points, axes="XYZy")),
     "ply ascii": ("scan.ply", write_ascii_ply),
     "npy": ("scan.npy", np.save),
     "npy float32, wide": ("scan.npy", lambda path, points: np.save(path, np.column_stack([points] * 2).astype("f4"))),
@@ -104,6 +105,12 @@ def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(way, tmp_path,
         both = np.concatenate(found)
         assert all(points.dtype == np.float64 and points.flags.c_contiguous for points in found)
         assert np.array_equal(both, wanted, equal_nan=True)
+
+
+@pytest.mark.parametrize("axes", ["xyz", "XYZ", "xYZy"])
+def test_binary_ply_is_entered_anywhere_whatever_its_letters(axes, tmp_path):
+    write_ply(tmp_path / "scan.ply", cloud(), axes=axes)
+    assert len(list(tiles_of([find_source(tmp_path / "scan.ply")], 100))) == COUNT / 100
 
 
 def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path, monkeypatch):

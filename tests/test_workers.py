@@ -8,11 +8,13 @@ import threading
 import time
 import warnings
 from contextlib import contextmanager, suppress
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from jobs import add, die_always, die_once, leave_once, refuse
 
+from scantruss import cli
 from scantruss import workers as module
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.machine import processors
@@ -118,22 +120,31 @@ def test_a_local_cluster_that_does_not_start_names_another_way(monkeypatch):
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held here")
-def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch):
+@pytest.mark.parametrize(
+    ("number", "handler", "error"),
+    [(signal.SIGINT, signal.default_int_handler, KeyboardInterrupt), (signal.SIGTERM, cli._stop, cli._Stopped)],
+    ids=["interrupted", "stopped"],
+)
+def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch, number, handler, error):
     distributed = pytest.importorskip("distributed")
     held, closed = [], []
 
     class Slow:
         def __init__(self, **options):
             held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
             time.sleep(0.5)
 
         def close(self):
             closed.append(True)
 
     monkeypatch.setattr(distributed, "LocalCluster", Slow)
-    with pytest.raises(KeyboardInterrupt):
-        Cluster(2)
+    before = signal.signal(number, handler)
+    try:
+        with pytest.raises(error):
+            Cluster(2)
+    finally:
+        signal.signal(number, before)
     assert held == [True] and closed == [True]  # held, so that no worker dies of it with a traceback
 
 
@@ -177,6 +188,48 @@ def test_a_worker_of_a_cluster_that_dies_is_made_good(tmp_path):
         found = dict(crew.run(leave_once, range(5), str(tmp_path)))
     assert (tmp_path / "left").exists()
     assert found == {number: number for number in range(5)}
+
+
+class Stub:
+    """A client whose jobs are lost, each of some as often as is said, and done one after the other."""
+
+    def __init__(self, lost):
+        self.lost, self.key = dict(lost), 0
+
+    def submit(self, work, job, common, pure):
+        from concurrent.futures import CancelledError
+
+        def result():
+            if self.lost.get(job):
+                self.lost[job] -= 1
+                raise CancelledError
+            return work(job, common)
+
+        self.key += 1
+        return SimpleNamespace(key=str(self.key), result=result)
+
+
+class InTurn(list):
+    """What stands for `distributed.as_completed`."""
+
+    add = list.append
+
+    def __next__(self):
+        return self.pop(0)
+
+
+@pytest.mark.parametrize(("lost", "given_up"), [({10: 1, 40: 1, 70: 1, 95: 1, 99: 3}, False), ({50: 4}, True)])
+def test_only_deaths_with_nothing_done_between_end_the_work_of_a_cluster(monkeypatch, lost, given_up):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "as_completed", InTurn)
+    monkeypatch.setattr(module, "AHEAD", 1)
+    crew = Cluster.__new__(Cluster)
+    crew.count, crew._client = 1, Stub(lost)
+    if given_up:
+        with pytest.raises(ScanTrussError, match="die again and again"):
+            list(crew.run(add, range(100)))
+    else:
+        assert dict(crew.run(add, range(100))) == {number: number for number in range(100)}
 
 
 def test_a_cluster_is_not_asked_for_without_its_packages(monkeypatch):

@@ -100,7 +100,8 @@ def warmed(way: Way) -> None:
 def yardstick() -> str:
     """Return a digest of what makes the clouds and measures the grids: rows measured otherwise are measured anew."""
     own = [Path(__file__).parent / name for name in ("child.py", "clouds.py", "figures.py")]
-    own += [ROOT / "benchmarks" / "measure.py", *(ROOT / "tests" / name for name in ("shapes.py", "surfaces.py"))]
+    clouds = ("shapes.py", "scans.py", "surfaces.py", "truths.py")
+    own += [ROOT / "benchmarks" / "measure.py", *(ROOT / "tests" / name for name in clouds)]
     return hashlib.sha256(b"".join(path.read_bytes() for path in own)).hexdigest()[:12]
 
 

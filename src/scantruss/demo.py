@@ -50,7 +50,7 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
         save.make_folder(folder)
         for name in names[:3]:
             write(grid, save.beside(folder / name), cloud=cloud)
-        save.json(folder / "grid.settings.json", demo_settings().to_dict())
+        save.json(folder / "grid.settings.json", (grid.settings or demo_settings()).to_dict())
         save.json(folder / "report.json", report_of(grid, len(cloud.points)))
         print_model(
             grid,

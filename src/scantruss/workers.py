@@ -224,6 +224,7 @@ class Cluster(Workers):
                 common = self._share(shared)
                 submit(number, job)
                 continue
+            deaths = 0
             yield number, result
 
     def _share(self, shared: Any) -> Any:
@@ -258,7 +259,7 @@ def _local_cluster(count: int) -> Any:
     try:
         threading.Thread(target=start).start()
         done.wait()  # `join` that was interrupted does not wait again
-    except KeyboardInterrupt:
+    except BaseException:  # ctrl-C, or the command line's word for a polite end
         done.wait()
         for cluster in made:
             with suppress(Exception):

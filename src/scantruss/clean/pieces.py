@@ -18,13 +18,14 @@ APART = (
 
 
 def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
-    """Return which points belong to pieces with fewer than this share of all points, away from all others; rows of the tree.
+    """Return which points belong to loose small pieces, away from all others; rows of the tree.
 
-    Of pieces that are no surface but a cloud the share may be larger, `BLOB` times. A small surface
-    that lies near a large one stays, and so does what lies near that.
+    Small is a piece with fewer than this share of all points, or than `AROUND` of them; one that is no surface but a cloud also with
+    fewer than `BLOB` times as many, or with any number where it is narrower than `NARROW` of the largest piece. A
+    small surface that lies near a large one stays, and so does what lies near that. No piece is small where the share is 0.
     """
     count = len(near.squares)
-    if count <= AROUND:
+    if count <= AROUND or share == 0.0:
         return np.zeros(count, np.bool_)
     piece = np.empty(count, np.int64)
     kernels.join_near(near.neighbors, near.squares, near.reach, LINK, piece)

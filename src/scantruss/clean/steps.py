@@ -65,7 +65,8 @@ def clean_points(
     stray_distance : float
         Points so many times farther from others than their neighbours are left out, and what stands off the surface.
     loose_pieces : float
-        Pieces with fewer than this share of the points, away from all others, are left out.
+        Pieces with fewer than this share of the points, away from all others, are left out; clouds of points that form no surface
+        with up to four times as many, or with any number where they are narrow beside the largest piece; 0 leaves out none.
     layer_distance : float
         Two layers up to so many mean spacings apart become one.
     smooth : bool

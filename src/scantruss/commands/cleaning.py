@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
     "stray-distance": ("NUMBER", 3.0, "points so many times farther from others than their neighbours are left out"),
-    "loose-pieces": ("SHARE", 0.005, "pieces with fewer than this share of all points, away from all, are left out"),
+    "loose-pieces": (
+        "SHARE",
+        0.005,
+        "pieces with fewer than this share of all points, away from all, are left out; narrow clouds with any number of points; 0: none",
+    ),
     "layer-distance": ("NUMBER", 2.0, "two layers up to so many spacings apart become one"),
 }
 KEEP = {

@@ -38,7 +38,7 @@ def info(values: Namespace) -> None:
         if settings.thin_spacing and not given and "thin_spacing" not in values:
             from ..scan.fit import spacing_to_look
 
-            settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings))
+            settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings, bars))
         cloud = read_scan(values.scan, settings, bars)
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 SAMPLE = 10_000  # points that tell where a file lies
+BULK = 100_000  # points that tell where most of them lie
+STRAY = (2.0, 98.0)  # percentiles of each coordinate between which they do
 
 
 def extent_of(points: np.ndarray) -> np.ndarray:
@@ -15,6 +17,11 @@ def extent_of(points: np.ndarray) -> np.ndarray:
     some = points[:: max(len(points) // SAMPLE, 1)]
     some = some[np.isfinite(some).all(axis=1)]
     return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
+
+
+def bulk_of(points: np.ndarray) -> np.ndarray:
+    """Return the lowest and highest coordinates of points (N, 3) but for a few stray ones at each end, (2, 3)."""
+    return np.percentile(points[:: max(len(points) // BULK, 1)], STRAY, axis=0)
 
 
 def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from ..selection import Selection, parts_of
 
 WORDS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
 PART = 1 << 17  # points tested against a polygon in one go
+NONE = np.empty(0)
 
 
 def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection: Selection) -> None:
@@ -25,17 +26,18 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
 
 
 def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
-    """Return what could be selected of a file, in words; "" where it has no points."""
-    if not len(points):
+    """Return what could be selected of a file, in words; "" where it has no points but NaN or infinite ones."""
+    real = np.isfinite(points).all(axis=1)
+    if not real.any():
         return ""
+    held = {name: values[real & np.isfinite(values)] for name, values in attributes.items()}
     said = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
-        if name in attributes:
-            values = np.unique(attributes[name])[:20]
-            said.append(f" {words} {' '.join(f'{value:g}' for value in values)}")
-    if "confidence" in attributes:
-        said.append(f" confidence up to {np.nanmax(attributes['confidence']):.4g}")
-    corners = (np.nanmin(points, axis=0), np.nanmax(points, axis=0))
+        if len(values := held.get(name, NONE)):
+            said.append(f" {words} {' '.join(f'{value:g}' for value in np.unique(values)[:20])}")
+    if len(values := held.get("confidence", NONE)):
+        said.append(f" confidence up to {values.max():.4g}")
+    corners = (points[real].min(axis=0), points[real].max(axis=0))
     said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
     return ",".join(said)
 

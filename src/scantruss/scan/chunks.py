@@ -43,7 +43,7 @@ class Chunk(NamedTuple):
 
     points: np.ndarray  #: (K, 3) float64 [unit of the scan], in the scan's own frame
     read: int  #: points that were read
-    left_out: dict[str, int]  #: of these, what each part of the selection left out
+    left_out: dict[str, int]  #: of these, what the file calls none and what each part of the selection left out
     notes: tuple[str, ...] = ()  #: what the reader of a whole file says
     held: str = ""  #: what could have been selected, where nothing was
     promised: int = 0  #: points that count lines among them promise: texts of several scans
@@ -151,7 +151,7 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
 def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
     source = tile.source
     content = read_content(source.path, wanted)
-    if content.metres != source.metres:
+    if (content.metres, content.z_metres) != (source.metres, source.z_metres):
         raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
     yield content
 

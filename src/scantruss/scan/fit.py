@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..machine import available_memory
-from .apart import extent_of, joined
-from .chunks import read_chunks
-from .cloud import PointCloud
+from .apart import BULK, bulk_of
+from .chunks import Reading, read_chunks
+from .cloud import LARGEST, PointCloud
 from .kinds import read_head
 from .opened import open_scan
 from .paths import Source as Names
 from .paths import files_of, name_of_files
 from .readers import PACKED, read_points
-from .streaming import Progress, thin_scan
-from .tiles import find_source, tiles_of
+from .streaming import Progress, Share, thin_scan
+from .tiles import Source, find_source, tiles_of
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -27,6 +28,7 @@ FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into mem
 BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
 PACKED_POINT = 8  # bytes; a point of a packed text has about as many
 FEWEST = 100_000  # points that are never too many
+FAR = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is none of it
 LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
 SHARE = 0.5  # of the memory at hand that a scan may take
 
@@ -54,15 +56,35 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
     return settings.length / FINENESS if points * BYTES > memory else 0.0
 
 
-def spacing_to_look(names: Names, settings: Settings) -> float:
-    """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit]."""
+def spacing_to_look(names: Names, settings: Settings, progress: Progress | None = None) -> float:
+    """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit].
+
+    Points far from most others, as (0, 0, 0) for no echo in a scan with national coordinates, have no say.
+    """
     sources, reading, _ = open_scan(names, settings.unit, settings.selection)
-    extent = extent_of(np.empty((0, 3)))
+    some = _sample(sources, reading, Share(progress, "look", sources))
+    if not len(some):
+        return 1.0  # who thins it says why
+    lower, upper = bulk_of(some)
+    away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
+    size = float(np.linalg.norm(np.ptp(some[away <= FAR * np.linalg.norm(upper - lower)], axis=0)))
+    return size / LOOK or 1.0
+
+
+def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.ndarray:
+    """Return points from everywhere in a scan, (K, 3): all of a small one, up to twice `BULK` of a large one.
+
+    By chance, as every n-th may be of one column of the scanner; the same each time.
+    """
+    some, share, chance = np.empty((0, 3)), 1.0, np.random.default_rng(0)
     for tile in tiles_of(sources):
         for chunk in read_chunks(tile, reading):
-            extent = joined(extent, extent_of(chunk.points))
-    size = float(np.linalg.norm(extent[1] - extent[0])) if np.isfinite(extent).all() else 0.0
-    return size / LOOK or 1.0  # without extent who thins it says why
+            report(chunk.read)
+            new = chunk.points if share == 1.0 else chunk.points[chance.random(len(chunk.points)) < share]
+            some = np.concatenate([some, new[(np.abs(new) <= LARGEST).all(axis=1)]])
+            while len(some) > 2 * BULK:
+                some, share = some[chance.random(len(some)) < 0.5], 0.5 * share
+    return some
 
 
 def _guess(path: Path) -> int:

@@ -38,15 +38,15 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
         raise unreadable(path, "Parquet", error) from None
 
 
-def metres_of_parquet(path: Path) -> float | None:
-    """Return the metres of the unit that the columns name, without reading them; None where they name none."""
+def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:
+    """Return the metres a unit of x and y, and of z, that the columns name, without reading them; None where they do not."""
     with suppress(Exception):  # pyarrow is not there, or the file is damaged: reading its points says so
         import pyarrow.parquet as parquet
 
         names = parquet.read_schema(path).names
         if columns := find_columns(names):
-            return metres_of_columns([names[c] for c in columns])[0]
-    return None
+            return metres_of_columns([names[c] for c in columns])
+    return None, None
 
 
 def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:

@@ -56,7 +56,7 @@ class Part:
     unit: str
     system: str  #: reference system, "" where the file does not say it
     count: int  #: points in the file
-    left_out: dict[str, int]  #: what each part of the selection left out
+    left_out: dict[str, int]  #: what the file calls none and what each part of the selection left out
     held: str  #: what could have been selected, where nothing was
     notes: tuple[str, ...]
 
@@ -109,16 +109,21 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
 def select(
     path: Path, content: Content, unit: str, selection: Selection, common: str = "", described: int | None = None
 ) -> Part:
-    """Return what is selected of some points of a file; where nothing is, so many of them are described, or all."""
+    """Return what is selected of some points of a file; where nothing is, about so many of them are described, or all."""
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, chosen = choose(points, content.attributes, selection)
-    some = {name: values[:described] for name, values in content.attributes.items()}
-    held = "" if kept.any() else describe(points[:described], some)
+    held = "" if kept.any() else _describe(points, content, described)
     if not kept.all():
         points = points[kept]
     count = len(kept) + sum(content.left_out.values())
     return Part(points, unit, content.system, count, content.left_out | chosen, held, notes)
+
+
+def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
+    """Return what could be selected, by about so many points from everywhere, as the first may all be NaN."""
+    some = slice(None, None, max(len(points) // most, 1) if most else 1)
+    return describe(points[some], {name: values[some] for name, values in content.attributes.items()})
 
 
 def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:

@@ -98,11 +98,11 @@ def thin_open_scan(
         raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
     workers = workers or Workers()
     sources, reading, notes = scan
-    rows, told = _all_rows(sources, reading, spacing, rim, workers, _Share(progress, "read", sources))
+    rows, told = _all_rows(sources, reading, spacing, rim, workers, Share(progress, "read", sources))
     if rows.points == rows.dropped:
         raise _nothing(sources, rows, told)
     if keep == "nearest":
-        chosen = _all_nearest(sources, reading, rows, spacing, workers, _Share(progress, "read again", sources))
+        chosen = _all_nearest(sources, reading, rows, spacing, workers, Share(progress, "read again", sources))
     else:
         chosen = means_of(rows.rows, spacing)
     added = points_at_rim(rows, spacing) if rim else chosen[:0]
@@ -111,7 +111,7 @@ def thin_open_scan(
     return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
 
 
-class _Share:
+class Share:
     """Report the share of points that are done."""
 
     def __init__(self, progress: Progress | None, stage: str, sources: Sequence[Source]) -> None:
@@ -120,6 +120,7 @@ class _Share:
         self._done = 0
 
     def __call__(self, points: int) -> None:
+        """So many more points are done."""
         self._done += points
         if self._progress:
             self._progress(self._stage, min(self._done / self._total, 1.0))
@@ -130,7 +131,8 @@ class Told:
 
     def __init__(self) -> None:
         self.read = 0  #: points that were read
-        self.left_out: dict[str, int] = {}  #: of these, what each part of the selection left out
+        #: of these, what files call none and what each part of the selection left out
+        self.left_out: dict[str, int] = {}
         self.notes: tuple[str, ...] = ()
         self.held = ""  #: what could have been selected, of a part of which nothing was
         self.promised = 0  #: points that count lines promise
@@ -147,7 +149,7 @@ class Told:
 
 
 def _all_rows(
-    sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: _Share
+    sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: Share
 ) -> tuple[Rows, Told]:
     """Return the boxes of all points that are taken."""
     thinning = Thinning(spacing, rim=rim)
@@ -215,7 +217,7 @@ def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Tol
 
 
 def _all_nearest(
-    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: _Share
+    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: Share
 ) -> np.ndarray:
     """Return the points nearest to the means of all boxes."""
     if workers.alone:

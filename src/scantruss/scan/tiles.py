@@ -103,25 +103,28 @@ def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
         if suffix == PACKED and Path(path.stem).suffix.lower() in READERS:
             with unpacked(path) as inner:
                 return replace(find_source(inner, wanted), path=path, kind="whole")
-        return Source(path, "whole", max(path.stat().st_size // TEXT_POINT, 1), metres=_metres(path))
+        metres, z_metres = _metres(path)
+        points = max(path.stat().st_size // TEXT_POINT, 1)
+        return Source(path, "whole", points, metres=metres, z_metres=z_metres)
     except OSError as error:
         raise FormatError(f"{path} cannot be read: {error.strerror or error}") from None
 
 
-def _metres(path: Path) -> float | None:
-    """Return what a file that is read whole says of its unit."""
+def _metres(path: Path) -> tuple[float | None, float | None]:
+    """Return the metres a unit of x and y, and of z, that a file that is read whole says."""
     suffix, head = path.suffix.lower(), read_head(path)
     if suffix == ".ply" and PLY.match(head):
-        return metres_of(read_header(path).unit)
+        return metres_of(read_header(path).unit), None
     if suffix == ".pcd" and kind_of(head) == "a PCD file":
-        return read_pcd_header(path).metres
+        return read_pcd_header(path).metres, None
     if suffix == ".npz" and head.startswith(b"PK"):
-        return metres_of_npz(path)
+        return metres_of_npz(path), None
     if suffix == ".parquet":
         return metres_of_parquet(path)
     if suffix in TEXTS:
-        return find_layout(path).metres
-    return 1.0 if suffix == ".e57" else None
+        layout = find_layout(path)
+        return layout.metres, layout.z_metres
+    return (1.0, 1.0) if suffix == ".e57" else (None, None)
 
 
 def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
@@ -181,8 +184,14 @@ def _ply(path: Path) -> Source | None:
     if not header.order or vertex is None or vertex.name != "vertex" or vertex.has_lists:
         return None
     rows = row_type(vertex, header.order, [0] * len(vertex.properties))
-    if not {"x", "y", "z"} <= set(rows.names or ()):
+    own = [p.name for p in vertex.properties]
+    lower = [name.lower() for name in own]
+    if not {"x", "y", "z"} <= set(lower):
         return None
+    first = {
+        lower.index(axis): axis for axis in "xyz"
+    }  # X and x may both be there; the first is read, as by `read_ply`
+    rows.names = tuple(first.get(i, f"other {i}" if name in "xyz" else name) for i, name in enumerate(rows.names or ()))
     return replace(_rows(path, vertex.count, header.start, rows), metres=metres_of(header.unit))
 
 

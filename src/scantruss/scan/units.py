@@ -15,7 +15,9 @@ from .content import Content
 
 SAME = 1e-5  # US survey feet are feet, to two parts in a million
 _NAMES = "mm|cm|m|inch|inches|foot|feet|ft|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?"
-PATTERN = rf"(?:units?|einheit)\W{{0,3}}({_NAMES}|in)\b"  #: in a comment of a file
+_INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # what follows tells it from the word: "the unit in this file is mm"
+_GAP = r"[^\w\r\n]"
+PATTERN = rf"(?:units?|einheit){_GAP}{{0,3}}(?:in{_GAP}{{1,3}})?({_NAMES}|{_INCH})\b"  #: in a comment of a file
 _IN_NAME = re.compile(rf"[(\[<]\s*({_NAMES}|in)\s*[)\]>]$|[\s_]({_NAMES})$", re.IGNORECASE)  # x_in may be an input
 _WORDS = {"feet": "foot", "ft": "foot", "in": "inch", "inches": "inch"}
 

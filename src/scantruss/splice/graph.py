@@ -86,7 +86,7 @@ def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> lis
     """Return the different ways in which two groups make a whole, the best first; only those that are about as good."""
     found: list[tuple[Fit, Group]] = []
     for pair in pairs[:MOST_WAYS]:
-        if any(_says_the_same(pair, whole, scans) for _, whole in found):
+        if any(says_the_same(pair, whole, scans) for _, whole in found):
             continue
         joined = _join(scans, one, other, pair) if pair.first in one.members else _join(scans, other, one, pair)
         if joined is not None and not any(_is_same(joined[1], whole, one, other, scans) for _, whole in found):
@@ -104,7 +104,7 @@ def _rivals(fit: Fit, best: Fit) -> bool:
     )
 
 
-def _says_the_same(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
+def says_the_same(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
     """Whether two scans lie in the whole as a pair says."""
     lies = invert(whole.poses[pair.second]) @ whole.poses[pair.first]
     return apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing

@@ -13,7 +13,7 @@ from ..scan.cloud import PointCloud
 from .doubt import leave_out_doubtful
 from .features import find_features
 from .fine import Fit, align
-from .graph import Group, assemble, fine_fit_of, fit_of, links_of, pairs_as_they_lie, settle
+from .graph import Group, assemble, fine_fit_of, fit_of, links_of, pairs_as_they_lie, says_the_same, settle
 from .merge import merge_scans
 from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
 from .pose_file import poses_for
@@ -133,17 +133,17 @@ def _put_together(
     """Return all scans with the strictness they were judged with, those that fit together, and who fits in several ways."""
     telling = [i for i, scan in enumerate(scans) if scan.tells]
     both = [(i, j) for j in telling for i in telling if i < j]
-    pairs = [pair for i, j in both for pair in _start(scans, given, i, j)]
-    done = {(pair.first, pair.second) for pair in pairs}
+    started = [pair for i, j in both for pair in _start(scans, given, i, j)]
+    done = {(pair.first, pair.second) for pair in started}
     wanted = [pair for pair in both if pair not in done]
+    pairs = list(started)
     if wanted:
         progress("features", 0.0)
         pairs += find_pairs(scans, find_features([scan.coarse for scan in scans]), wanted, progress)
     scans = with_strictness(scans, pairs)
     groups, doubtful = assemble(scans, rejudge(pairs, scans), progress)
     group = groups[0]
-    sure = {i for i in group.members if given[i] is not None}
-    group, elsewhere = leave_out_doubtful(scans, group, sure if len(sure) > 1 else set(), progress)
+    group, elsewhere = leave_out_doubtful(scans, group, _sure(scans, group, started), progress)
     doubtful |= elsewhere
     if 2 * len(group.members) <= len(scans):
         raise InputError(_why_not(scans, names, groups, doubtful))
@@ -186,6 +186,13 @@ def _start(scans: list[Scan], given: list[np.ndarray | None], first: int, second
         pose = align(scans[first].coarse, scans[second].coarse, pose, turn, (3.0 * spacing, spacing), 800)
         found += closer(scans[first], scans[second], first, second, pose, turn)
     return sorted(found, key=lambda pair: -pair.fit.score)[:1]
+
+
+def _sure(scans: list[Scan], group: Group, started: list[Pair]) -> set[int]:
+    """Return the scans of a group that lie as given poses say; where the features placed a scan its pose tells nothing."""
+    members = set(group.members)
+    held = [p for p in started if {p.first, p.second} <= members and says_the_same(p, group, scans)]
+    return {i for pair in held for i in (pair.first, pair.second)}
 
 
 def _as_given(scans: list[Scan], poses: list[np.ndarray]) -> Group:

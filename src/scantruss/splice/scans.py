@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..scan.apart import bulk_of
 from ..scan.cloud import PointCloud
 from .views import View, make_view
 
@@ -39,7 +40,7 @@ def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
     """Return the median over the scans of the diagonal of the box that holds all but a few stray points [scan unit]."""
     sizes = []
     for cloud in clouds:
-        lower, upper = np.percentile(cloud.points[:: max(len(cloud.points) // 100_000, 1)], (2.0, 98.0), axis=0)
+        lower, upper = bulk_of(cloud.points)
         sizes.append(float(np.linalg.norm(upper - lower)))
     return float(np.median(sizes))
 
