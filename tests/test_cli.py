@@ -518,3 +518,12 @@ def test_the_second_file_of_a_table_overwrites_nothing(tmp_path, monkeypatch, ca
     assert scan.read_bytes() == before and sorted(p.name for p in tmp_path.iterdir()) == ["shell_nodes.csv"]
     assert main(["grid", "shell_nodes.csv", "a.csv", "a_nodes.csv", "--length", "1"]) == 2
     assert "would overwrite the table of nodes" in capsys.readouterr().err
+
+
+def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised():
+    points = plate() + [450_000.0, 5_400_000.0, 300.0]
+    odd = points.copy()
+    odd[np.random.default_rng(0).random(len(odd)) < 0.01] = 0.0
+    as_it_is, with_zeros = PointCloud.from_array(points), PointCloud.from_array(odd)
+    assert pipeline.suggest_length(with_zeros) == pytest.approx(pipeline.suggest_length(as_it_is), rel=0.05)
+    assert pipeline.length_range(with_zeros)[1] == pytest.approx(pipeline.length_range(as_it_is)[1], rel=0.05)

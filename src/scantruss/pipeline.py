@@ -268,13 +268,21 @@ def _check_field(settings: Settings, extent: float, spacing: float) -> None:
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
     low = max(SPACINGS * cloud.spacing, GAPS * cloud.gap)
-    return round_length(low, "up"), round_length(cloud.extent / LARGEST, "down")
+    return round_length(low, "up"), round_length(_usual_extent(cloud) / LARGEST, "down")
+
+
+def _usual_extent(cloud: PointCloud) -> float:
+    """Return the longest side of a scan; of its bulk where a few points lie so far away that they are none of it [scan unit]."""
+    from .scan.apart import usual_extent
+
+    usual = float(np.ptp(usual_extent(cloud.points), axis=0).max())
+    return usual if 0.0 < usual < 0.5 * cloud.extent else cloud.extent
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
     low, high = length_range(cloud)
-    wished = max(cloud.extent / USUAL, USUAL_GAPS * cloud.gap)
+    wished = max(_usual_extent(cloud) / USUAL, USUAL_GAPS * cloud.gap)
     return max(round_length(min(wished, high), "nearest"), low)
 
 

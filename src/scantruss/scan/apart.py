@@ -9,6 +9,7 @@ import numpy as np
 
 SAMPLE = 10_000  # points that tell where a file lies
 BULK = 100_000  # points that tell where most of them lie
+FAR = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is none of it
 STRAY = (2.0, 98.0)  # percentiles of each coordinate between which they do
 
 
@@ -22,6 +23,18 @@ def extent_of(points: np.ndarray) -> np.ndarray:
 def bulk_of(points: np.ndarray) -> np.ndarray:
     """Return the lowest and highest coordinates of points (N, 3) but for a few stray ones at each end, (2, 3)."""
     return np.percentile(points[:: max(len(points) // BULK, 1)], STRAY, axis=0)
+
+
+def usual_extent(points: np.ndarray) -> np.ndarray:
+    """Return about the lowest and highest coordinates of points (N, 3) but for those far from most others, (2, 3).
+
+    As (0, 0, 0) for no echo in a scan with national coordinates. Sparse far ends count.
+    """
+    some = points[:: max(len(points) // BULK, 1)]
+    lower, upper = bulk_of(some)
+    away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
+    near = some[away <= FAR * np.linalg.norm(upper - lower)]
+    return np.stack([near.min(axis=0), near.max(axis=0)])
 
 
 def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:

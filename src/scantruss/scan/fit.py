@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..machine import available_memory
-from .apart import BULK, bulk_of
+from .apart import BULK, usual_extent
 from .chunks import Reading, read_chunks
 from .cloud import LARGEST, PointCloud
 from .kinds import read_head
@@ -28,7 +28,6 @@ FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into mem
 BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
 PACKED_POINT = 8  # bytes; a point of a packed text has about as many
 FEWEST = 100_000  # points that are never too many
-FAR = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is none of it
 LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
 SHARE = 0.5  # of the memory at hand that a scan may take
 
@@ -59,16 +58,13 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
 def spacing_to_look(names: Names, settings: Settings, progress: Progress | None = None) -> float:
     """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit].
 
-    Points far from most others, as (0, 0, 0) for no echo in a scan with national coordinates, have no say.
+    Points far from most others have no say.
     """
     sources, reading, _ = open_scan(names, settings.unit, settings.selection)
     some = _sample(sources, reading, Share(progress, "look", sources))
     if not len(some):
         return 1.0  # who thins it says why
-    lower, upper = bulk_of(some)
-    away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
-    size = float(np.linalg.norm(np.ptp(some[away <= FAR * np.linalg.norm(upper - lower)], axis=0)))
-    return size / LOOK or 1.0
+    return float(np.linalg.norm(np.ptp(usual_extent(some), axis=0))) / LOOK or 1.0
 
 
 def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.ndarray:
