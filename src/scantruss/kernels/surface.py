@@ -8,6 +8,7 @@ Nodes are kept on it while they move. Each node caches one quadric patch, a row 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -40,21 +41,33 @@ class Surface(NamedTuple):
 @kernel
 def walk(surface: Surface, site: int, place: Vector) -> int:
     """Site nearest to a place, reached by going downhill over the links: never leaves the sheet."""
-    d = subtract(row(surface.mean, site), place)
-    best = dot(d, d)
+    return descend(surface, site, place, place, math.inf)
+
+
+@kernel
+def descend(surface: Surface, site: int, target: Vector, place: Vector, reach: float) -> int:
+    """Site reached over links by steps that each come nearer to a target, to sites within `reach` of a place only."""
+    best = _square(row(surface.mean, site), target)
     while True:
         to = -1
         for k in range(surface.neighbors.shape[1]):
             n = surface.neighbors[site, k]
             if n < 0:
                 break
-            d = subtract(row(surface.mean, n), place)
-            dd = dot(d, d)
-            if dd < best:
-                best, to = dd, n
+            at = row(surface.mean, n)
+            square = _square(at, target)
+            if square < best and _square(at, place) <= reach * reach:
+                best, to = square, n
         if to < 0:
             return site
         site = to
+
+
+@kernel
+def _square(a: Vector, b: Vector) -> float:
+    """Squared distance of two places."""
+    d = subtract(a, b)
+    return dot(d, d)
 
 
 @kernel
@@ -84,42 +97,15 @@ def flood(surface: Surface, site: int, place: Vector, reach: float) -> int:
 @kernel
 def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> bool:
     """Whether site b can be reached from site a over links within `reach` of a place."""
+    target = row(surface.mean, b)
     if a == b:
         return True
-    target = row(surface.mean, b)
     if _square(target, place) > reach * reach:
         return False
-    if _walks_to(surface, a, b, place, reach):
+    if descend(surface, a, target, place, reach) == b:  # most that are linked are so
         return True
     count = flood(surface, a, place, reach)
     return surface.stamp[b] == surface.counter[0] and _queued(surface, b, count)
-
-
-@kernel
-def _square(a: Vector, b: Vector) -> float:
-    """Squared distance of two places."""
-    d = subtract(a, b)
-    return dot(d, d)
-
-
-@kernel
-def _walks_to(surface: Surface, a: int, b: int, place: Vector, reach: float) -> bool:
-    """Whether steps that each come nearer to site b lead from site a to it, all within `reach` of a place: most that are linked are so."""
-    target = row(surface.mean, b)
-    site, best = a, _square(row(surface.mean, a), target)
-    while True:
-        to = -1
-        for k in range(surface.neighbors.shape[1]):
-            n = surface.neighbors[site, k]
-            if n < 0:
-                break
-            at = row(surface.mean, n)
-            square = _square(at, target)
-            if square < best and _square(at, place) <= reach * reach:
-                best, to = square, n
-        if to < 0:
-            return site == b
-        site = to
 
 
 @kernel
