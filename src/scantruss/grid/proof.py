@@ -46,10 +46,10 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     Certificate
         Nothing is raised where it does not pass; see `Certificate.faults`.
     """
-    if len(grid.triangles) == 0:
-        return replace(_topology(grid, boundary, settings), faults=(Fault("empty", "has no triangles"),))
-    if not np.isfinite(grid.nodes).all():
-        return replace(_topology(grid, boundary, settings), faults=(Fault("empty", "has nodes that are nowhere"),))
+    empty = "has no triangles" if len(grid.triangles) == 0 else ""
+    if empty or not np.isfinite(grid.nodes).all():
+        fault = Fault("empty", empty or "has nodes that are nowhere")
+        return replace(_topology(grid, boundary, settings), faults=(fault,))
     sites, length = boundary.sites, settings.length
     places = scan_places(sites)
     boxes = boxes_of(places, 0.5 * length)

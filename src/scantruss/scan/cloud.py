@@ -87,7 +87,7 @@ class PointCloud:
 
 
 def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
-    """Return the points as an (N, 3) float64 array, without a copy where they are one already."""
+    """Return the points as an ordered (N, 3) float64 array, without a copy where they are one already."""
     try:
         array = np.asarray(points)
     except ValueError:
@@ -97,7 +97,7 @@ def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
     if array.dtype.kind not in "fiu":
         raise InputError(f"{said}points must be real numbers, got {array.dtype}")
     with np.errstate(over="ignore"):
-        return array.astype(np.float64, copy=False)
+        return np.ascontiguousarray(array, np.float64)
 
 
 def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -160,7 +160,6 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     blocks = -(-len(points) // BLOCK)
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
-    points = np.ascontiguousarray(points)
     in_parts(blocks, PART // BLOCK, lambda _, begin, end: move_points(points, origin, moved, sums, begin, end))
     return moved, sums.sum(axis=0)
 
