@@ -13,6 +13,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from rough import compiled_only
 
 from scantruss.kernels import compile as compiling
 from scantruss.kernels import linking
@@ -180,6 +181,8 @@ def add(a: float, b: float) -> float:
 
 @compiling.kernel
 def share(values: np.ndarray, i: int, among: float) -> float:
+    if among < 0.0:
+        raise ValueError("fewer than none")
     return float(values[i]) / among
 
 
@@ -196,8 +199,13 @@ def test_a_kernel_serves_python_and_other_kernels():
     values = np.array([1.0, 2.0, 6.0])
     assert add_shares(values, 3.0) == 3.0
     assert add(1.0, 2.0) == 3.0 and share(values, 2, 3.0) == 2.0
-    with pytest.raises(ZeroDivisionError):  # what goes wrong in a part comes out of the whole
-        add_shares(values, 0.0)
+    with pytest.raises(ValueError, match="fewer than none"):  # what goes wrong in a part comes out of the whole
+        add_shares(values, -1.0)
+
+
+@compiled_only
+def test_a_kernel_divides_by_zero_as_numpy_does():
+    assert add_shares(np.array([1.0, 2.0]), 0.0) == np.inf and np.isnan(add_shares(np.array([0.0, 2.0]), 0.0))
 
 
 @pytest.mark.skipif(not linking.HANDS_OVER or bool(numba.config.DISABLE_JIT), reason="every kernel compiles by itself")

@@ -13,7 +13,7 @@ from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
 from .trial import MARK, Scratch, gather, local_energy
-from .vectors import norm, row, subtract
+from .vectors import fill_row, norm, row, subtract
 
 WIDE, SEARCHED, KICKED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
 MOST = 400  # nodes of an area
@@ -74,12 +74,9 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> bool:
         for c in range(3):
             area.nodes[k, c] = net.nodes[u, c]
         area.nodes[k, 3], area.nodes[k, 4] = net.arc[u], net.desired[u]
-        for c in range(net.ring.shape[1]):
-            area.ring[k, c] = net.ring[u, c]
-        for c in range(net.state.shape[1]):
-            area.state[k, c] = net.state[u, c]
-        for c in range(patches.shape[1]):
-            area.patches[k, c] = patches[u, c]
+        fill_row(area.ring[k], net.ring[u])
+        fill_row(area.state[k], net.state[u])
+        fill_row(area.patches[k], patches[u])
     free = net.free[-2]
     area.free[-2], area.free[-1] = free, min(free, KEPT)
     for k in range(area.free[-1]):
@@ -100,12 +97,9 @@ def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
         for c in range(3):
             net.nodes[u, c] = area.nodes[k, c]
         net.arc[u], net.desired[u] = area.nodes[k, 3], area.nodes[k, 4]
-        for c in range(net.ring.shape[1]):
-            net.ring[u, c] = area.ring[k, c]
-        for c in range(net.state.shape[1]):
-            net.state[u, c] = area.state[k, c]
-        for c in range(patches.shape[1]):
-            patches[u, c] = area.patches[k, c]
+        fill_row(net.ring[u], area.ring[k])
+        fill_row(net.state[u], area.state[k])
+        fill_row(patches[u], area.patches[k])
 
 
 @kernel

@@ -7,7 +7,7 @@ import numpy as np
 from .compile import kernel
 from .grid import DEGREE, INTERIOR, KIND, Net
 from .surface import Surface, fit_patch, onto_patch, patch_normal
-from .vectors import Vector, along, dot, norm, row, subtract
+from .vectors import Vector, along, dot, fill_row, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
@@ -24,7 +24,7 @@ def _fit_widest(
     Points along one scan line tell nothing of the surface beside it: such a patch is too narrow, however near they lie.
     """
     taken = fit_patch(fine, patch, site, place)
-    narrow[:] = patch
+    fill_row(narrow, patch)
     least = patch[17]
     kept = patch.copy()
     for turn in range(2):
@@ -33,12 +33,12 @@ def _fit_widest(
         more = fit_patch(middle if turn == 0 else broad, patch, site, place)
         lined = kept[18] < LINED
         if more < 4 or (patch[17] > LIKE * least and not lined):
-            patch[:] = kept
+            fill_row(patch, kept)
             break
         if lined:
             least = patch[17]
         taken = more
-        kept[:] = patch
+        fill_row(kept, patch)
     return taken
 
 

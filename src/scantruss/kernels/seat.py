@@ -9,7 +9,7 @@ from .field import length_at
 from .grid import CURVE, DEGREE, INTERIOR, KIND, LINE, OPEN, REST, RIM, Net
 from .rim import Rim, nearest_on_rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
-from .vectors import norm, row, subtract
+from .vectors import fill_row, norm, row, subtract
 
 ASTRAY = 0.5  # a patch that passes a node at this distance is none of its sheet, in lengths
 
@@ -88,11 +88,11 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
         if net.state[v, DEGREE] > 0:
             place = row(net.nodes, v)
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
-                before[:] = patches[v]
+                fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
                 local = surface.scale[0] * net.desired[v]
                 if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > ASTRAY * local:
-                    patches[v] = before
+                    fill_row(patches[v], before)
                 count += 1
     return count
 
