@@ -1,7 +1,7 @@
 """The part of a COPC file that touches a part of space: COPC is LAZ whose chunks are the boxes of an octree, listed in a table.
 
-Not by laspy's reader of COPC, which follows a damaged table for ever or leaves points out without a word, holds all points
-before it cuts, and finds none where a box reaches far beyond the file.
+Not by laspy's reader of COPC, which follows a damaged table for ever or leaves points out without a word, and holds all points
+before it cuts.
 """
 
 from __future__ import annotations
