@@ -39,3 +39,10 @@ def leave_once(job, folder):
 
 def die_always(job, shared):
     os._exit(1)
+
+
+class Deadly:
+    """What ends the process that is told of it."""
+
+    def __reduce__(self):
+        return os._exit, (1,)

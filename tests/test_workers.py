@@ -2,17 +2,21 @@
 
 import builtins
 import os
+import shutil
 import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 import warnings
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from jobs import add, die_always, die_once, leave_once, refuse
+from jobs import Deadly, add, die_always, die_once, leave_once, refuse
 
 from scantruss import cli
 from scantruss import workers as module
@@ -59,6 +63,12 @@ def test_processes_that_die_again_and_again_are_given_up(monkeypatch):
     monkeypatch.setattr(module, "DEATHS", 0)
     with pytest.raises(ScanTrussError, match="die again and again"):
         list(Processes(1).run(die_always, range(2)))
+
+
+def test_processes_that_die_while_they_are_told_what_all_need_are_given_up(monkeypatch):
+    monkeypatch.setattr(module, "DEATHS", 0)
+    with pytest.raises(ScanTrussError, match="die again and again"):
+        list(Processes(1).run(add, range(2), [Deadly(), bytes(1 << 20)]))  # more than a pipe holds
 
 
 def test_what_a_job_refuses_comes_out():
@@ -146,6 +156,78 @@ def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch, numbe
     finally:
         signal.signal(number, before)
     assert held == [True] and closed == [True]  # held, so that no worker dies of it with a traceback
+
+
+RUN = "import sys; sys.modules['distributed'] = None; from scantruss.cli import main; sys.exit(main(sys.argv[1:]))"
+
+
+@pytest.fixture(scope="module")
+def long_runs(tmp_path_factory):
+    """Words of commands that take several processes some seconds."""
+    folder = tmp_path_factory.mktemp("long")
+    x, y = np.meshgrid(np.linspace(0, 10, 200), np.linspace(0, 10, 200))
+    scan, out = str(folder / "scan.npy"), str(folder / "out.ply")
+    np.save(scan, np.column_stack([x.ravel(), y.ravel(), np.sin(x.ravel() / 3)]))
+    for number in range(4):
+        np.save(folder / f"{number}.npy", np.random.default_rng(number).uniform(0, 10, (500_000, 3)))
+    return {
+        "thin": [
+            "thin",
+            str(folder / "?.npy"),
+            "-o",
+            out,
+            "--spacing",
+            "0.01",
+            "--keep",
+            "nearest",
+            "--rim",
+            "--workers",
+            "2",
+        ],
+        "sweep": ["sweep", scan, "--length", "0.1,0.11", "-o", out, "--workers", "2"],
+    }
+
+
+def processes_of(group):
+    """Return the command lines of all living processes of a group."""
+    said = subprocess.run(
+        ["ps", "-A", "-ww", "-o", "pgid=,stat=,args="], capture_output=True, text=True, check=True
+    ).stdout
+    rows = [line.split(None, 2) for line in said.splitlines()]
+    return [row[2] for row in rows if row[0] == str(group) and row[1][0] != "Z" and len(row) > 2]
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg") or not shutil.which("ps"), reason="no groups of processes here")
+@pytest.mark.parametrize("command", ["thin", "sweep"])
+@pytest.mark.parametrize(
+    ("number", "wait", "status", "line"),
+    [
+        *((signal.SIGINT, wait, 130, "interrupted; nothing was written") for wait in (0.0, 0.1, 0.3, 0.8)),
+        (signal.SIGTERM, 0.1, 143, "stopped; nothing was written"),
+    ],
+)
+def test_processes_stopped_while_they_start_leave_one_line_and_nothing_else(
+    long_runs, command, number, wait, status, line
+):
+    words = long_runs[command]
+    with subprocess.Popen(
+        [sys.executable, "-c", RUN, *words], stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        try:
+            while run.poll() is None and not any("spawn_main" in told for told in processes_of(run.pid)):
+                time.sleep(0.01)
+            time.sleep(wait)
+            os.killpg(run.pid, number)  # to all of them, as a terminal does
+            said = run.communicate(timeout=60)[1]
+            assert said == f"scantruss: {line}\n" and run.returncode == status
+            assert not Path(words[words.index("-o") + 1]).exists()
+            patience = time.monotonic() + 10
+            while left := processes_of(run.pid):
+                assert time.monotonic() < patience, left
+                time.sleep(0.05)
+        finally:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(run.pid, signal.SIGKILL)
 
 
 def test_without_dask_processes_of_our_own_serve(monkeypatch):

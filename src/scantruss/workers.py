@@ -9,14 +9,17 @@ from __future__ import annotations
 import gc
 import logging
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext, SpawnProcess
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -92,6 +95,7 @@ class Processes(Workers):
     def __init__(self, count: int) -> None:
         self.count = count
         self.words = f"on {count} processes of this machine"
+        self._begun: list[_Process] = []
 
     def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
         """Yield the number of each job and its result, in the order in which they are done."""
@@ -99,7 +103,9 @@ class Processes(Workers):
         waiting: dict[int, Job] = {}
         deaths = 0
         while True:
-            with ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _keep_shared, (shared,)) as pool:
+            with _undisturbed():
+                pool = ProcessPoolExecutor(self.count, _Spawn(shared, self._begun))
+            with pool:
                 try:
                     for number, result in _in_pool(pool, work, coming, waiting, AHEAD * self.count):
                         deaths = 0
@@ -110,8 +116,76 @@ class Processes(Workers):
                     if deaths > DEATHS:
                         raise _keeps_dying() from None
                 except BaseException:
-                    pool.shutdown(wait=False, cancel_futures=True)
+                    self._end()  # or leaving the pool waits for jobs that nobody wants
                     raise
+
+    def _end(self) -> None:
+        """End all processes, whatever they do."""
+        with _undisturbed():
+            while self._begun:
+                self._begun.pop().kill()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the processes, also where who took their results was interrupted between two of them."""
+        self._end()
+
+
+class _Spawn(SpawnContext):
+    """How processes of a pool begin: afresh, and noted in a list."""
+
+    def __init__(self, shared: Any, begun: list[_Process]) -> None:
+        super().__init__()
+        self._shared, self._begun = shared, begun
+
+    def Process(self, *words: Any, **options: Any) -> _Process:  # type: ignore[override]  # noqa: N802
+        return _Process(self._shared, self._begun, *words, **options)
+
+
+class _Process(SpawnProcess):
+    """A process that is told what all jobs need when it has begun, and ends with who began it, not by ctrl-C.
+
+    Told while it begins, as by the initializer of a pool, one that dies would leave its parent waiting for ever.
+    """
+
+    def __init__(self, shared: Any, begun: list[_Process], *words: Any, **options: Any) -> None:
+        super().__init__(*words, **options)
+        self._common, self._teller = multiprocessing.Pipe(duplex=False)
+        self._shared, self._begun = shared, begun
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what the process gets while it begins."""
+        return {name: value for name, value in vars(self).items() if name not in ("_teller", "_shared", "_begun")}
+
+    def start(self) -> None:
+        """Begin."""
+        super().start()
+        self._begun.append(self)
+        self._common.close()  # so that telling ends when the process does
+        threading.Thread(target=_tell, args=(self._teller, self._shared), daemon=True).start()
+        self._shared = None  # it may be large
+
+    def run(self) -> None:
+        """Work; this is the other process."""
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # on Windows nobody has held it
+        threading.Thread(target=_leave_with_parent, daemon=True).start()
+        with self._common:
+            _SHARED[0] = self._common.recv()
+        super().run()
+
+
+def _tell(teller: Connection, shared: Any) -> None:
+    """Send to a process what all jobs need, unless it dies."""
+    with teller, suppress(OSError):
+        teller.send(shared)
+
+
+def _leave_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _in_pool(
@@ -124,11 +198,11 @@ def _in_pool(
     """Run jobs in a pool; `waiting` holds those that are begun and not done, also when the pool breaks."""
     running: dict[Future[Result], int] = {}
     for number, job in waiting.items():
-        running[pool.submit(_with_shared, work, job)] = number
+        running[_submit(pool, work, job)] = number
     while True:
         while len(running) < ahead and (new := next(coming, None)) is not None:
             waiting[new[0]] = new[1]
-            running[pool.submit(_with_shared, work, new[1])] = new[0]
+            running[_submit(pool, work, new[1])] = new[0]
         if not running:
             return
         done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -139,11 +213,13 @@ def _in_pool(
             yield number, result
 
 
+def _submit(pool: ProcessPoolExecutor, work: Work[Job, Result], job: Job) -> Future[Result]:
+    """Give a job to a pool, which may start a process for it."""
+    with _undisturbed():
+        return pool.submit(_with_shared, work, job)
+
+
 _SHARED: list[Any] = [None]  # of this process
-
-
-def _keep_shared(shared: Any) -> None:
-    _SHARED[0] = shared
 
 
 def _with_shared(work: Callable[[Any, Any], Any], job: Any) -> Any:
@@ -243,38 +319,43 @@ def _local_cluster(count: int) -> Any:
     from distributed import LocalCluster
 
     made: list[Any] = []
-    faults: list[Exception] = []
-    done = threading.Event()
-
-    def start() -> None:
-        _hold_interrupts()
-        options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-        try:
-            made.append(LocalCluster(n_workers=count, **options))
-        except Exception as error:
-            faults.append(error)
-        finally:
-            done.set()
-
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
     try:
-        threading.Thread(target=start).start()
-        done.wait()  # `join` that was interrupted does not wait again
+        with _undisturbed():
+            made.append(LocalCluster(n_workers=count, **options))
     except BaseException:  # ctrl-C, or the command line's word for a polite end
-        done.wait()
         for cluster in made:
             with suppress(Exception):
                 cluster.close()
         raise
-    if faults:
-        raise faults[0]
     return made[0]
 
 
-def _hold_interrupts() -> None:
-    """Keep ctrl-C from this thread, and from the threads and processes it starts: who started them ends them."""
-    if hasattr(signal, "pthread_sigmask"):
-        resource_tracker.ensure_running()  # would lift it again
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put off ctrl-C and a polite end until a block is done, as what is started by half can neither be used nor ended.
+
+    Threads and processes that it starts do not get ctrl-C at all, or they would die of it with a traceback: who started them ends them.
+    """
+    came: list[int] = []
+    with ExitStack() as stack:
+        stack.callback(_send_on, came)
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):  # any other thread may take what is held here
+                if callable(kept := signal.getsignal(number)):
+                    signal.signal(number, lambda number, frame: came.append(number))
+                    stack.callback(signal.signal, number, kept)
+        if hasattr(signal, "pthread_sigmask"):
+            resource_tracker.ensure_running()  # would lift it again
+            stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, signal.pthread_sigmask(signal.SIG_BLOCK, []))
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        yield
+
+
+def _send_on(came: list[int]) -> None:
+    """Let signals have the effect that was put off."""
+    for number in came:
+        signal.raise_signal(number)
 
 
 def _no_cluster(scheduler: str, error: Exception) -> InputError:

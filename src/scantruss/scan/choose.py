@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
 from ..selection import Selection, parts_of
+from .copc import Place
 
 WORDS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
 PART = 1 << 17  # points tested against a polygon in one go
@@ -66,6 +67,29 @@ def choose(
     return kept, left_out
 
 
+def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
+    """Return the boxes around parts of space in the unit of a file, whose axes are `scale` (3,) units of the scan long."""
+    places = []
+    for crop in crops:
+        kind, rings = parts_of(crop)
+        numbers = rings[0]
+        lower, upper = np.full(3, -np.inf), np.full(3, np.inf)
+        if kind == "box":
+            half = len(numbers) // 2
+            lower[:half], upper[:half] = numbers[:half], numbers[half:]
+        elif kind == "sphere":
+            lower, upper = np.array(numbers[:3]) - numbers[3], np.array(numbers[:3]) + numbers[3]
+        else:
+            corners = np.concatenate([np.array(ring).reshape(-1, 2) for ring in rings])
+            lower[:2], upper[:2] = corners.min(axis=0), corners.max(axis=0)
+        places.append(Place(_outside(kind), lower / scale, upper / scale))
+    return places
+
+
+def _outside(kind: str) -> str:
+    return f"outside the {kind}"
+
+
 Test = Callable[[np.ndarray], np.ndarray]  # numbers of points -> which of them are taken
 
 
@@ -86,7 +110,7 @@ def _tests(
         least, values = selection.confidence, attributes["confidence"]
         yield "of less confidence", lambda rows: values[rows] >= least
     for crop in selection.crop:
-        yield f"outside the {crop.partition(':')[0]}", _crop_test(points, crop)
+        yield _outside(crop.partition(":")[0]), _crop_test(points, crop)
 
 
 def _crop_test(points: np.ndarray, crop: str) -> Test:

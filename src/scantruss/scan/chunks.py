@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..errors import FormatError
+from ..errors import FormatError, ScanTrussError
 from ..selection import Selection
 from .content import Content, find_attributes
+from .copc import Place
 from .kinds import unreadable
-from .las import check_count, fields_of, take
+from .las import check_count, fields_for, fields_of, records_near, take
 from .layout import Layout, is_number, number_of, split_line
 from .lines import LARGE, read_block
-from .readers import read_content, select
+from .readers import places_in_file, read_content, select
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from .tiles import Tile
+    from .tiles import Source, Tile
 
 CHUNK = 1_000_000  # points
 SAMPLE = 10_000  # points that are described where none is taken
@@ -76,7 +77,7 @@ def read_chunks(
     kind, wanted = tile.source.kind, reading.selection.needs
     counts: list[int] = []
     if kind == "las":
-        contents = _las(tile, wanted, size, alone)
+        contents = _las(tile, reading, size, alone)
     elif kind == "rows":
         contents = _fixed_rows(tile, wanted, size)
     else:
@@ -102,20 +103,18 @@ def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
             yield chunk
 
 
-def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[Content]:
+def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Content]:
     import laspy
 
     path = tile.source.path
-    names = fields_of(wanted)
+    names = fields_of(reading.selection.needs)
     backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
     begin, short = tile.begin, False
     try:
-        fields = (
-            laspy.DecompressionSelection.base() | laspy.DecompressionSelection.Z | laspy.DecompressionSelection.FLAGS
-        )
-        if "class" in names:
-            fields |= laspy.DecompressionSelection.CLASSIFICATION
-        with laspy.open(path, laz_backend=backend, decompression_selection=fields) as file:
+        with laspy.open(path, laz_backend=backend, decompression_selection=fields_for(names)) as file:
+            if near := records_near(path, file.header, _places_of(tile.source, reading), names, size):
+                yield from _near(tile.source, names, *near)
+                return
             if begin:
                 file.seek(begin)
             while begin < tile.end and not short:
@@ -124,12 +123,37 @@ def _las(tile: Tile, wanted: Sequence[str], size: int, alone: bool) -> Iterator[
                 short = len(record) < expected
                 begin += len(record)
                 yield tile.source.said_of(take(record, names))
-    except GeneratorExit:
+    except (GeneratorExit, ScanTrussError):
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
     if short:
         check_count(path, tile.source.points, begin)
+
+
+def _near(source: Source, names: Sequence[str], records: Iterator[Any], unread: dict[str, int]) -> Iterator[Content]:
+    for record in records:
+        yield replace(source.said_of(take(record, names)), unread=unread)
+        unread = {}
+
+
+def _places_of(source: Source, reading: Reading) -> list[Place]:
+    """Return the boxes around what is cropped in the unit of a file that may be COPC; none of others."""
+    if not (source.in_one and reading.selection.crop):
+        return []
+    said = source.said_of(Content(np.empty((0, 3))))
+    return places_in_file(source.path, said, reading.unit, reading.selection, reading.common)
+
+
+def count_unread(source: Source, reading: Reading) -> int:
+    """Return how many points of a file are never read, as they lie in parts of it that are far from what is cropped."""
+    if not (places := _places_of(source, reading)):
+        return 0
+    import laspy
+
+    with laspy.open(source.path) as file:
+        near = records_near(source.path, file.header, places, ())
+    return sum(near[1].values()) if near else 0
 
 
 def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Content]:

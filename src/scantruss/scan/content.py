@@ -24,6 +24,9 @@ class Content:
     left_out: dict[str, int] = field(
         default_factory=dict
     )  #: points that the file itself says are none, by words for them
+    unread: dict[str, int] = field(
+        default_factory=dict
+    )  #: points that a reader passed over as they lie outside a part of the selection, by words for them
     feet: str = ""  #: ... unless heights are in feet, or their unit is said
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..machine import available_memory
 from .apart import BULK, usual_extent
-from .chunks import Reading, read_chunks
+from .chunks import Reading, count_unread, read_chunks
 from .cloud import LARGEST, PointCloud
 from .kinds import read_head
 from .opened import open_scan
@@ -35,7 +35,7 @@ SHARE = 0.5  # of the memory at hand that a scan may take
 def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None) -> float:
     """Return the spacing to which a scan must be thinned while it is read, 0 where it need not be [scan unit].
 
-    All points count, as all of them are in memory when some are selected.
+    All points that are read count, as all of them are in memory when some are selected.
 
     Parameters
     ----------
@@ -52,6 +52,9 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
     if points <= FEWEST:
         return 0.0
     memory = SHARE * available_memory() if memory is None else memory
+    if points * BYTES > memory and settings.selection.crop:
+        sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+        points -= sum(count_unread(source, reading) for source in sources)
     return settings.length / FINENESS if points * BYTES > memory else 0.0
 
 

@@ -2,53 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import FormatError
+from ..errors import FormatError, ScanTrussError
 from .content import Content
+from .copc import Place, find_boxes, read_boxes, touching
 from .heights import SAMPLE, look_like_feet
 from .kinds import read_head, unreadable, wrong_kind
 from .las_header import check_header
-from .systems import System, system_of
+from .systems import system_of
 
 CHUNK = 1_000_000  # points
 FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
 WITHHELD = "marked as withheld"  # the format's word for deleted
 
+Places = Callable[[Content], list[Place]]  # by what a file says of its units
 
-def read_las(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the points of a LAS or LAZ file and the wanted attributes."""
+
+def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
+    """Return the points of a LAS or LAZ file and the wanted attributes; of a COPC file those near some places, where they are told."""
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
     names = fields_of((*wanted, "return_count"))
     try:
         check_header(path)
-        promised, system, chunks = _read(path, names)
-    except FormatError:
+        promised, said, chunks = _read(path, names, places_of)
+    except ScanTrussError:
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
     withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
+    unread = sum(said.unread.values())
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
-    check_count(path, promised, len(points) + withheld)
+    check_count(path, promised, len(points) + withheld + unread)
     none = np.empty(0, dtype=np.uint8)
     attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in names}
-    feet = look_like_feet(points, attributes["return_count"]) if system.z_metres is None else ""
-    return Content(
-        points,
-        attributes,
-        system.metres,
-        system.z_metres,
-        system.name,
-        system.degrees,
-        left_out={WITHHELD: withheld} if withheld else {},
-        feet=feet,
-    )
+    feet = look_like_feet(points, attributes["return_count"]) if said.z_metres is None else ""
+    left_out = {WITHHELD: withheld} if withheld else {}
+    return replace(said, points=points, attributes=attributes, left_out=left_out, feet=feet)
 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:
@@ -88,12 +85,34 @@ def note_on_heights(path: Path) -> str:
         raise unreadable(path, "LAS or LAZ", error) from None
 
 
-def _read(path: Path, names: Sequence[str]) -> tuple[int, System, list[Content]]:
-    """Return how many points the header promises, the reference system, and the points in chunks with their attributes."""
+def fields_for(names: Sequence[str]) -> Any:
+    """Return what must be unpacked for points and some attributes, as laspy says it."""
+    from laspy import DecompressionSelection as Fields
+
+    fields = Fields.base() | Fields.Z | Fields.FLAGS
+    return fields | Fields.CLASSIFICATION if "class" in names else fields
+
+
+def records_near(
+    path: Path, header: Any, places: Sequence[Place], names: Sequence[str], most: int = CHUNK
+) -> tuple[Iterator[Any], dict[str, int]] | None:
+    """Return the records of a COPC file near all places, and how many others there are by the words of these; None of other files."""
+    boxes = find_boxes(path, header) if places else None
+    if boxes is None:
+        return None
+    rows, unread = touching(boxes, places)
+    return read_boxes(path, header, boxes, rows, most, fields_for(names).to_lazrs()), unread
+
+
+def _read(path: Path, names: Sequence[str], places_of: Places | None) -> tuple[int, Content, list[Content]]:
+    """Return how many points the header promises, what it says of them, and the points in chunks with their attributes."""
     import laspy
 
     with laspy.open(path) as file:
         header: Any = file.header
         system = system_of([*header.vlrs, *(header.evlrs or [])])
-        chunks = [take(record, names) for record in file.chunk_iterator(CHUNK)]
-    return header.point_count, system, chunks
+        said = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
+        near = records_near(path, header, places_of(said), names) if places_of else None
+        records, unread = near or (file.chunk_iterator(CHUNK), {})
+        chunks = [take(record, names) for record in records]
+    return header.point_count, replace(said, unread=unread), chunks

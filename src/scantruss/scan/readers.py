@@ -13,12 +13,13 @@ from ..errors import FormatError, InputError
 from ..selection import Selection
 from .apart import extent_of, said_of_apart
 from .arrays import read_npy, read_npz
-from .choose import check_attributes, choose, describe
+from .choose import check_attributes, choose, describe, places_in
 from .cloud import PointCloud
 from .content import Content
+from .copc import Place
 from .e57 import read_e57
 from .kinds import read_head
-from .las import read_las
+from .las import Places, read_las
 from .packed import unpacked
 from .parquet import read_parquet
 from .paths import Source, files_of, name_of_files
@@ -103,7 +104,18 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
-    return select(path, read_content(path, selection.needs), unit, selection, common)
+
+    def places_of(said: Content) -> list[Place]:
+        return places_in_file(path, said, unit, selection, common)
+
+    content = read_content(path, selection.needs, places_of if selection.crop else None)
+    return select(path, content, unit, selection, common)
+
+
+def places_in_file(path: Path, said: Content, unit: str, selection: Selection, common: str) -> list[Place]:
+    """Return the boxes around what is cropped in the unit of a file, by what it says."""
+    scale, _, _ = to_common_unit(path, replace(said, points=np.ones((1, 3))), unit, selection.z_unit, common)
+    return places_in(selection.crop, scale[0])
 
 
 def select(
@@ -116,8 +128,9 @@ def select(
     held = "" if kept.any() else _describe(points, content, described)
     if not kept.all():
         points = points[kept]
-    count = len(kept) + sum(content.left_out.values())
-    return Part(points, unit, content.system, count, content.left_out | chosen, held, notes)
+    left_out = add_counts([content.left_out, chosen, content.unread])
+    count = len(points) + sum(left_out.values())
+    return Part(points, unit, content.system, count, left_out, held, notes)
 
 
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
@@ -126,8 +139,11 @@ def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
     return describe(points[some], {name: values[some] for name, values in content.attributes.items()})
 
 
-def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return what a file holds, as it stands in it: all points and the wanted attributes."""
+def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
+    """Return what a file holds, as it stands in it: all points and the wanted attributes.
+
+    Where the file has a table of places only the points near `places_of` what it says of its units are read.
+    """
     read_head(path)
     with ExitStack() as stack:
         inner = path
@@ -140,7 +156,7 @@ def read_content(path: Path, wanted: Sequence[str] = ()) -> Content:
             raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
         try:
             with np.errstate(all="ignore"):  # what is not finite is counted and left out later
-                return reader(inner, wanted)
+                return read_las(inner, wanted, places_of) if reader is read_las else reader(inner, wanted)
         except OSError as error:
             raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
         except MemoryError:

@@ -1,7 +1,7 @@
 """Tiles: files, or ranges of files, that can be read by themselves and by anybody.
 
 A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole;
-a COPC file is one tile too, but read a million points at a time.
+a COPC file is one tile too, but read a million points at a time, and only near what is cropped.
 """
 
 from __future__ import annotations
