@@ -245,6 +245,11 @@ def test_one_worker_is_this_process_and_none_is_refused():
         open_workers(0)
 
 
+def test_more_workers_than_a_machine_can_feed_are_refused_before_one_starts():
+    with pytest.raises(InputError, match=r"1,000,000 workers are too many for this machine; use at most \d+"):
+        open_workers(1_000_000)
+
+
 @pytest.mark.parametrize("keep", ["mean", "nearest"])
 def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(keep, address, tmp_path, monkeypatch):
     monkeypatch.setattr(streaming, "SMALLEST", 70)

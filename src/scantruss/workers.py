@@ -32,6 +32,7 @@ Result = TypeVar("Result")
 Work = Callable[[Job, Any], Result]
 
 AHEAD = 2  # jobs that wait for each worker: results must not pile up faster than they are taken
+EACH = 4  # most workers for each processor: more only take memory
 DEATHS = 3  # times that a worker may die before anything else is done
 PATIENCE = 10.0  # for a scheduler to answer [s]
 NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[cluster]"'
@@ -77,6 +78,8 @@ def open_workers(count: int | None = None, scheduler: str = "") -> Workers:
     count = processors() if count is None else count
     if count < 1:
         raise InputError(f"workers must be 1 or more, got {count}")
+    if count > (most := EACH * max(processors(), 2)):
+        raise InputError(f"{count:,} workers are too many for this machine; use at most {most}")
     if count == 1:
         return Workers()
     return Cluster(count) if has_dask() else Processes(count)
