@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 from .machine import processors
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from .settings import Settings
 
 PATIENCE = 120.0  # most that we wait for the second process [s]; then we compile what it has not
@@ -60,6 +62,8 @@ class CompileAhead(AbstractContextManager["CompileAhead"]):
         """Pass on how far a stage is."""
         self._progress(stage, share)
         if stage == "optimize" and self._process is not None:
+            if self._process.poll() is None:
+                compile_last()
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(PATIENCE)
             self._end()
@@ -137,16 +141,34 @@ def compile_optimization(settings: Settings) -> None:
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.4, count, count)
     put_all(boxes, places, np.arange(count))
     sites = Sites(surface, boxes, scratch.copy(), np.zeros(count), 0.2, 5.76, 5.76, (0,), measured=count)
-    angle = np.arange(6) * np.pi / 3.0
-    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
-    loop = Loop(rim, np.zeros(1, np.int64), True, 6.0, 0)
+    nodes, triangles = six_triangles()
+    loop = Loop(nodes[1:], np.zeros(1, np.int64), True, 6.0, 0)
     boundary = Boundary((loop,), sites)
-    fan = np.array([[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)])
-    grid = Grid(np.concatenate([np.zeros((1, 3)), rim]), fan, np.zeros(7, np.bool_), np.zeros(3))
+    grid = Grid(nodes, triangles, np.zeros(7, np.bool_), np.zeros(3))
     relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
     relief.to_grid(grid)
     improve(relief, sites, np.zeros((0, 3)), settings)
     certify(relief.to_grid(grid), boundary, settings)
+
+
+def six_triangles() -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes (7, 3) and triangles (6, 3) of a hexagon around the origin with sides of 1."""
+    import numpy as np
+
+    angle = np.arange(6) * np.pi / 3.0
+    rim = np.stack([np.cos(angle), np.sin(angle), np.zeros(6)], axis=1)
+    fan = np.array([[0, 1 + i, 1 + (i + 1) % 6] for i in range(6)])
+    return np.concatenate([np.zeros((1, 3)), rim]), fan
+
+
+def compile_last() -> None:
+    """Do what the second process comes to last, while it is at the rest: it finds this stored."""
+    from .grid.cover import boxes_of, distances_to_scan
+    from .grid.crossings import find_crossings
+
+    nodes, triangles = six_triangles()
+    find_crossings(nodes, triangles)
+    distances_to_scan(nodes, nodes, boxes_of(nodes, 0.5), 1.0)
 
 
 def main(method: str) -> None:
