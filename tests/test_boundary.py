@@ -179,6 +179,12 @@ def test_debris_beside_the_scan_has_no_boundary():
     assert len(found(points)[0].loops) == 1
 
 
+def test_pieces_that_are_all_smaller_than_a_member_are_refused():
+    dome = cap(8.0, 1.0, 0.5)
+    with pytest.raises(st.InputError, match="each piece of the scan is smaller than length 4000; use a shorter one"):
+        found(np.concatenate([dome, dome + np.array([1e5, 0.0, 0.0])]), 4000.0)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.03])
 def test_the_rim_of_a_dome_is_a_circle(noise):
     points = cap(8.0, 1.0, 0.15)

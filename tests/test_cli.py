@@ -391,6 +391,15 @@ def test_a_few_bad_points_are_left_out_and_counted(place, capsys):
     assert json.loads((place / "r.json").read_text())["points"] == 7998
 
 
+def test_pieces_that_are_too_small_are_counted(place, capsys):
+    patch = 0.1 * plate() + np.array([200.0, 0.0, 0.0])
+    np.savetxt("scan.xyz", np.concatenate([plate(), patch]))
+    assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH]) == 0
+    assert (
+        "1 of the pieces, " in (said := capsys.readouterr().out) and " % of the scanned surface, are left out" in said
+    )
+
+
 def test_info_says_what_a_length_can_be(place, capsys):
     assert main(["info", "scan.xyz", "--unit", "mm"]) == 0
     said = capsys.readouterr().out

@@ -275,6 +275,9 @@ def test_pieces_are_numbered_by_size_and_debris_is_no_piece():
     assert np.ptp(sites.surface.mean[sites.piece == 0], axis=0)[0] == pytest.approx(6, abs=0.3)
     assert np.ptp(sites.surface.mean[sites.piece == 1], axis=0)[0] == pytest.approx(4, abs=0.3)
     assert set(sites.piece) == {0, 1, 2}
+    pieces, share = sites.left_out
+    assert pieces == 1 and 0.25 / 42.25 < share < 3.0 * 0.25 / 42.25  # a small piece is all rim, where sites lie closer
+    assert sites_of(large).left_out == (0, 0.0)
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.12])

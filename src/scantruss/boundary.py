@@ -9,6 +9,7 @@ import numpy as np
 
 from .corners import STEP, find_corners
 from .curves import cut_spikes, length_around, resample, smooth_between, smooth_turns
+from .errors import InputError
 from .fill import fill_holes
 from .kernels import boundary as kernels
 from .kernels.field import lengths_along
@@ -125,8 +126,15 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     -------
     Boundary
         External loops first, each piece's longest loop being external; empty for a closed surface.
+
+    Raises
+    ------
+    InputError
+        The scan falls apart into pieces that are all smaller than a member.
     """
     sites = prepare_sites(cloud, settings)
+    if sites.area == 0.0:
+        raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
     check_two_sided(sites.surface, sites.thickness)
     if progress:
         progress("boundary", 0.4)

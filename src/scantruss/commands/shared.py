@@ -92,7 +92,7 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 
 def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Say so where stray points were left out."""
+    """Say so where points of the scan were left out."""
     from ..scan.sites import prepare_sites
 
     sites = prepare_sites(cloud, settings)
@@ -100,6 +100,12 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
     if sites.strays:
         bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
+    pieces, share = sites.left_out
+    if pieces:
+        bars.note(
+            f"{pieces:,} of the pieces, {100 * share:.2g} % of the scanned surface, are left out:"
+            " too small beside the others or for this length"
+        )
 
 
 @contextmanager

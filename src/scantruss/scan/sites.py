@@ -42,6 +42,13 @@ class Sites:
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
 
     @property
+    def left_out(self) -> tuple[int, float]:
+        """How many pieces are too small for a grid, and the share of the sites, which lie evenly, that is theirs."""
+        sites = np.bincount(self.piece)
+        small = np.delete(sites, self.pieces)
+        return len(small), float(small.sum() / sites.sum())
+
+    @property
     def graded(self) -> bool:
         """Whether the desired member length differs from place to place."""
         return is_graded(self.surface)
