@@ -136,6 +136,28 @@ def test_two_layers_become_one():
     assert np.array_equal(kept.points + kept.origin, both[kept.kept])
 
 
+@pytest.mark.parametrize("gap", [0.6, 1.0, 1.5])
+def test_layers_up_to_their_distance_become_one(gap):
+    """A patch no wider than they are apart sees its own layer, and half of the other: it would only smear both."""
+    first, second = make("sphere", 6_000), make("sphere", 6_000, seed=1)
+    spacing = spacing_of(first, 12_000)
+    outwards = second.points / np.linalg.norm(second.points, axis=1)[:, None]
+    both = np.concatenate([first.points, second.points + gap * spacing * outwards])
+    clean = clean_points(both)
+    assert count_of(clean, "layers") > 0.9 * len(both)
+    away = first.distance(clean.points + clean.origin)
+    assert np.median(abs(away - np.median(away))) < 0.15 * gap * spacing
+
+
+def test_a_corrugated_surface_is_no_pair_of_layers():
+    """Crests and troughs lie at two distances from a wide patch, as layers do, but neighbours on the same side of it."""
+    rng = np.random.default_rng(0)
+    points = np.zeros((12_000, 3))
+    points[:, :2] = rng.uniform(0.0, 100.0, (12_000, 2))
+    points[:, 2] = 0.7 * np.sin(points[:, 0] * 2.0 * np.pi / 5.0)
+    assert count_of(clean_points(points), "layers") == 0
+
+
 def test_one_point_stays_in_each_box_and_none_is_made_up():
     shape = make("cloth", 20_000)
     stays = thin_to(shape.points, 2.0)

@@ -18,6 +18,8 @@ WORSE = 1.1  # how much worse than the narrowest a wider patch may fit
 SPARSE = 8  # of so many nearest one has a patch
 SOME = 0.02  # part of the points that must lie in layers, as a few seem to by chance
 FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
+BROAD = 3.0  # radius of a patch that holds as much of two layers, in the distance up to which they are looked for
+FOLLOWED = 0.5  # a narrower patch that fits so much better shows that the surface is one
 PART = 200  # least patches of a part that a thread fits
 
 
@@ -80,14 +82,43 @@ def onto_surfaces(near: Nearby, surfaces: Surfaces) -> tuple[np.ndarray, np.ndar
     return moved, normals
 
 
-def find_layers(near: Nearby, surfaces: Surfaces, distance: float) -> np.ndarray:
-    """Return which points lie in two layers no farther apart than `distance` [scan unit], (N,) bool, rows of the tree.
+def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points lie in two layers no farther apart than `distance` [scan unit], and where these would be one.
 
-    Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly at none.
+    Those that are `known` (N,) to have done so, which are on their way, are among them.
+
+    Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly at none. A patch
+    that holds as much of both is several times wider than they are apart. A corrugated surface lies at two distances from it
+    too, but a narrower patch follows that.
+
+    Returns
+    -------
+    layers : ndarray
+        (N,) bool, rows of the tree.
+    between : ndarray
+        (N, 3) rows of the tree; other points where they are [scan unit].
     """
-    flatness, thick = surfaces.patches[:, 13], surfaces.patches[:, 12]
-    two = np.where(2.0 * thick <= distance, flatness, 3.0)
-    calm = _around(near, surfaces.number, two)
+    broad = _broad(near, surfaces, distance)
+    between, _ = onto_surfaces(near, broad)
+    layers = known | _two(near, surfaces, broad, distance)
+    close = _two(near, surfaces, surfaces, distance) & ~layers
+    between[close] = onto_surfaces(near, surfaces)[0][close]
+    layers |= close
+    return layers, np.where(layers[:, None], between, near.tree.points)
+
+
+def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:
+    """Return patches at the same points, wide enough for two layers."""
+    centres = surfaces.centres
+    radii = np.maximum(BROAD * distance, surfaces.patches[:, 15])
+    return surfaces._replace(patches=_fit(near, centres, radii, 1.0, np.full(len(centres), np.inf)))
+
+
+def _two(near: Nearby, narrow: Surfaces, surfaces: Surfaces, distance: float) -> np.ndarray:
+    """Return which points lie at two distances from the patches around them (N,), rows of the tree; none where only a few do."""
+    thick, flatness = surfaces.patches[:, 12], surfaces.patches[:, 13]
+    apart = (2.0 * thick <= distance) & (narrow.patches[:, 12] >= FOLLOWED * thick)
+    calm = _around(near, surfaces.number, np.where(apart, flatness, 3.0))
     own = np.where(near.neighbors >= 0, calm[near.neighbors], 3.0)
     layers = np.median(own, axis=1) < FLATNESS
     return layers if layers.mean() > SOME else np.zeros(len(layers), np.bool_)

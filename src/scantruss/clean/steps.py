@@ -18,6 +18,7 @@ from .strays import find_strays
 from .thinning import thin_to
 
 FEWEST = 24  # points of a surface
+LAYERS = 3  # rounds of merging layers: what lies farther apart comes together step by step
 Progress = Callable[[str, float], None]
 
 
@@ -169,16 +170,19 @@ class _Work:
         self.check_enough()
         near = self.nearby()
         surfaces = fit_surfaces(near)
-        moved, normals = onto_surfaces(near, surfaces)
         if layer_distance is not None:
-            spacing = float(np.median(near.reach)) * np.sqrt(np.pi / AROUND)
-            layers = find_layers(near, surfaces, layer_distance * spacing)
-            self.add("layers", int(layers.sum()), "points of doubled layers merged into one")
-            if layers.any():
-                between = np.where(layers[:, None], moved, near.tree.points)
+            distance = layer_distance * float(np.median(near.reach)) * np.sqrt(np.pi / AROUND)
+            merged = np.zeros(len(self.points), np.bool_)
+            for _ in range(LAYERS):
+                layers, between = find_layers(near, surfaces, distance, merged[near.tree.ids])
+                if not layers.any():
+                    break
+                merged = near.in_order(layers)
                 self.points = near.in_order(between)
                 near = self.nearby()
-                moved, normals = onto_surfaces(near, fit_surfaces(near))
+                surfaces = fit_surfaces(near)
+            self.add("layers", int(merged.sum()), "points of doubled layers merged into one")
+        moved, normals = onto_surfaces(near, surfaces)
         if smooth:
             way = np.linalg.norm(moved - near.tree.points, axis=1)
             self.add("noise", len(way), f"points moved onto the surface, by {np.sqrt((way**2).mean()):.3g} (rms)")
