@@ -202,6 +202,18 @@ def test_poses_to_start_from_and_poses_as_they_are(scanned):
         splice_scans(clouds_of(scans), NAMES, poses=dict(zip(NAMES[:3], poses, strict=False)), use_poses=True)
 
 
+def test_wrong_poses_taken_as_they_are_are_told(scanned):
+    scans, _, result = scanned
+    assert result.contradicting == () and result.alone == ()
+    for shift in (1.5, 50.0):  # spacings: over the others but off them, and nowhere near
+        pose = result.poses[NAMES[0]].copy()
+        pose[:3, 3] += shift * result.spacing
+        wrong = splice_scans(clouds_of(scans), NAMES, poses=result.poses | {NAMES[0]: pose}, use_poses=True)
+        assert NAMES[0] in wrong.alone and set(NAMES[1:]).isdisjoint(wrong.alone)
+        assert all(NAMES[0] in (pair.first, pair.second) for pair in wrong.contradicting)
+        assert bool(wrong.contradicting) == (shift < 10.0)
+
+
 def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(scanned):
     scans, _, result = scanned
     again = splice_scans(clouds_of(scans), NAMES, poses=result.poses, use_poses=True)

@@ -126,6 +126,13 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
         raise InputError(f"{'; '.join(reasons)}; leave it out, or give its pose with --poses")
     for reason in reasons:
         bars.note(f"{reason} among the others and is left out; --poses can say where it lies")
+    for pair in result.contradicting:
+        bars.note(
+            f"{pair.first} and {pair.second} contradict each other in the poses given: of what lies over the other"
+            f" {100.0 * pair.agreement:.0f} % lies on it"
+        )
+    for name in result.alone:
+        bars.note(f"{name} agrees with no other scan in the poses given")
     return result
 
 

@@ -176,10 +176,14 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
     return judge(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
 
 
-def links_of(scans: list[Scan], group: Group) -> dict[tuple[int, int], Fit]:
-    """Return how the scans of a group agree that overlap, two by two."""
-    pairs = pairs_as_they_lie(scans, group)
-    return {(pair.first, pair.second): pair.fit for pair in pairs if pair.fit.share >= LINKED}
+def links_of(scans: list[Scan], group: Group, *, against: bool = False) -> dict[tuple[int, int], Fit]:
+    """Return how the scans of a group agree that overlap, two by two; with `against` also those that overlap and do not agree."""
+    links = {}
+    for pair in pairs_as_they_lie(scans, group):
+        share = pair.fit.share / pair.fit.agreement if against and pair.fit.agreeing else pair.fit.share
+        if share >= LINKED:
+            links[pair.first, pair.second] = pair.fit
+    return links
 
 
 def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:

@@ -13,7 +13,17 @@ from ..scan.cloud import PointCloud
 from .doubt import leave_out_doubtful
 from .features import find_features
 from .fine import Fit, align
-from .graph import Group, assemble, fine_fit_of, fit_of, links_of, pairs_as_they_lie, says_the_same, settle
+from .graph import (
+    CONTRADICTION,
+    Group,
+    assemble,
+    fine_fit_of,
+    fit_of,
+    links_of,
+    pairs_as_they_lie,
+    says_the_same,
+    settle,
+)
 from .merge import merge_scans
 from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
 from .pose_file import poses_for
@@ -46,6 +56,19 @@ class Splice:
     kept: dict[str, int]  #: points that each scan gives to the whole
     spacing: float  #: typical spacing of the scans [scan unit]
     unit: str
+
+    @property
+    def contradicting(self) -> tuple[PairFit, ...]:
+        """Pairs that lie over each other but do not agree; only poses used as given have any."""
+        return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTION)
+
+    @property
+    def alone(self) -> tuple[str, ...]:
+        """Scans that agree with no other; only poses used as given leave any."""
+        agreeing = {
+            name for pair in self.pairs if pair.agreement >= CONTRADICTION for name in (pair.first, pair.second)
+        }
+        return tuple(name for name in self.poses if name not in agreeing)
 
     @property
     def frame(self) -> str:
@@ -228,7 +251,7 @@ def _result(
     if not as_given:
         poses[scans[first].name] = np.eye(4)
     scans = _judged_as_they_lie(scans, group)
-    links = {pair: fine_fit_of(scans, group, *pair) for pair in links_of(scans, group)}
+    links = {pair: fine_fit_of(scans, group, *pair) for pair in links_of(scans, group, against=as_given)}
     points, kept = merge_scans(scans, group, progress)
     whole = PointCloud.from_array(points, unit=scans[first].cloud.unit)
     whole = replace(whole, origin=whole.origin + origin)
