@@ -199,6 +199,13 @@ def test_the_gap_is_the_median_distance_to_the_sixth_neighbour(count: int) -> No
     assert PointCloud.from_array(points).gap == pytest.approx(float(np.median(sixth**2)) ** 0.5, rel=close)
 
 
+@pytest.mark.parametrize("times", [2, 4])
+def test_points_that_are_stored_again_and_again_do_not_narrow_the_gap(times: int) -> None:
+    points = bowl(16)
+    repeated = np.repeat(points, times, axis=0)
+    assert clouds.measure_gap(repeated) == pytest.approx(clouds.measure_gap(points), rel=1e-12)
+
+
 def test_the_gap_of_a_triangular_pattern_is_its_spacing_and_is_measured_once(monkeypatch: pytest.MonkeyPatch) -> None:
     rows, columns = np.divmod(np.arange(3600), 60)
     cloud = PointCloud.from_array(np.column_stack([columns + 0.5 * (rows % 2), rows * 0.75**0.5, 0 * rows]))

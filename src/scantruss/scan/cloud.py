@@ -13,6 +13,7 @@ from ..machine import in_parts, processors
 from .units import check_unit
 
 LARGEST = 1e100  # coordinates beyond this overflow when squared
+COPIES = 5  # times that a place may be repeated in a scan that is stored so often
 SAMPLE = 600  # points at which the spacing is measured
 ROUGHLY = 60  # of them at which it is guessed first
 FEW = 200  # points at which the gap is measured
@@ -212,7 +213,7 @@ def measure_spacing(points: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | 
 
 
 def measure_gap(points: np.ndarray) -> float:
-    """Return the median distance to the sixth neighbour, which tells the density however evenly the points lie.
+    """Return the median distance to the sixth neighbour that does not coincide with another one: it tells the density of any pattern.
 
     Parameters
     ----------
@@ -223,13 +224,16 @@ def measure_gap(points: np.ndarray) -> float:
     float
         About one spacing for points in a triangular pattern, 2.7 times the distance to the nearest for random ones.
     """
-    sixth = min(6, len(points) - 1)
+    most = min(6 * COPIES, len(points) - 1)
     gaps = []
     for place in points[np.linspace(0, len(points) - 1, min(len(points), FEW)).astype(np.int64)]:
         squared = np.zeros(len(points))
         for axis in range(3):
             squared += (points[:, axis] - place[axis]) ** 2
-        gaps.append(np.partition(squared, sixth)[sixth])
+        near = np.argpartition(squared, most)[: most + 1]
+        _, places = np.unique(points[near], axis=0, return_index=True)
+        apart = np.sort(squared[near[places]])
+        gaps.append(apart[min(6, len(apart) - 1)])
     return float(np.sqrt(np.median(gaps)))
 
 
