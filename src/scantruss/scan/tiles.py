@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
-from .arrays import metres_of_npz, read_array_header
+from .arrays import is_turned, metres_of_npz, read_array_header
 from .content import NAMES, Content, find_attributes
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 from .las_header import LASZIP, check_header
@@ -208,7 +208,7 @@ def _npy(path: Path) -> Source | None:
         if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
             return _rows(path, shape[0], start, kind)
         return None
-    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or by_columns or kind.kind not in "fiu":
+    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or is_turned(shape) or by_columns or kind.kind not in "fiu":
         return None
     names = ["x", "y", "z", *(f"other {c}" for c in range(3, shape[1]))]
     return _rows(path, shape[0], start, np.dtype([(name, kind) for name in names]))
