@@ -237,6 +237,14 @@ def test_arrays_of_any_numbers(tmp_path: Path, kind: str) -> None:
     assert np.array_equal(coordinates(tmp_path / "a.npy"), whole)
 
 
+def test_what_no_scan_has_is_told_with_the_other_notes(tmp_path: Path) -> None:
+    wild = roof(1000)
+    wild[5, 2] = -3.4e38
+    np.savez(tmp_path / "a.npz", wild, roof(1000))
+    first, second = read_points(tmp_path / "a.npz").notes
+    assert "arr_0" in first and second.startswith("1 points with coordinates up to 3.4e+38")
+
+
 @pytest.mark.parametrize("name", ["points", "xyz", "Positions", "vertices", "coords", "pts", "arr_0", "anything"])
 def test_the_points_of_an_archive_are_found_by_name_wherever_they_stand(tmp_path: Path, name: str) -> None:
     first = {"normals": np.ones((60, 3)), "K": np.eye(3), "pose": np.eye(4)}

@@ -203,7 +203,7 @@ def test_a_place_in_any_of_several_polygons_is_inside(tmp_path: Path, name: str)
     crop = read_crop(str(tmp_path / name))
     assert crop == polygon_text([RING, HOLE], [BESIDE]) == read_crop(crop)
     expected = np.array(
-        [inside(x, y, BESIDE) or inside(x, y, RING) and not inside(x, y, HOLE) for x, y in P[:, :2].tolist()]
+        [inside(x, y, BESIDE) or (inside(x, y, RING) and not inside(x, y, HOLE)) for x, y in P[:, :2].tolist()]
     )
     (tmp_path / "a.las").write_bytes(FILES["a.las"])
     cloud = read_points(tmp_path / "a.las", selection=Selection(crop=(crop,)))
@@ -222,7 +222,8 @@ def test_what_is_no_polygon_is_refused(tmp_path: Path, content: str) -> None:
     [
         {"classes": "six"}, {"classes": 300}, {"classes": (-1,)}, {"returns": "0"}, {"returns": "middle"}, {"confidence": "high"},
         {"confidence": float("nan")}, {"crop": "box:1,2,3"}, {"crop": "box:9,9,0,0"}, {"crop": "sphere:0,0,0,0"},
-        {"crop": "sphere:0,0,0,nan"}, {"crop": "cube:1,2,3,4"}, {"crop": "box:1,2,3,4|1,2,3,4"}, {"crop": "polygon:1,2,3,4"}, {"crop": "box:a,b,c,d"},
+        {"crop": "sphere:0,0,0,nan"}, {"crop": "cube:1,2,3,4"}, {"crop": "box:1,2,3,4|1,2,3,4"},
+        {"crop": "polygon:1,2,3,4"}, {"crop": "box:a,b,c,d"},
     ],
 )  # fmt: skip
 def test_values_that_select_nothing_sensible_are_refused(values: dict) -> None:

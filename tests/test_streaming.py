@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import pickle
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -285,3 +286,10 @@ def test_files_that_do_not_lie_together_are_named():
         assert said in thin_scan([*all_files, "4.npy"], S, workers=workers).notes
     (said,) = thin_scan(["3.npy", *row], S).notes
     assert said.startswith("0.npy and 2 more files lie about 8.3e+02")
+
+
+def test_a_wrong_byte_order_is_told_in_one_line(tmp_path):
+    np.save(tmp_path / "a.npy", np.random.default_rng(0).random((2000, 3)).astype(">f4").view("<f4"))
+    with warnings.catch_warnings(), pytest.raises(InputError, match="its byte order wrong"):
+        warnings.simplefilter("error")
+        thin_scan(tmp_path / "a.npy", 1.0)

@@ -108,7 +108,7 @@ def read_thinned(names: Names, settings: Settings, progress: Progress | None = N
         progress=progress,
     )
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
-    return replace(cloud, dropped=thinned.dropped, notes=thinned.notes), thinned.read
+    return replace(cloud, dropped=thinned.dropped, notes=(*thinned.notes, *cloud.notes)), thinned.read
 
 
 def read_to_fit(

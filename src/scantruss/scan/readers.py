@@ -99,7 +99,7 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     if not len(points):
         raise _nothing_left(files, parts)
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
-    return replace(cloud, notes=notes)
+    return replace(cloud, notes=(*notes, *cloud.notes))
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
