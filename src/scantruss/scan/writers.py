@@ -13,7 +13,6 @@ from ..settings import UNITS
 from .las_writer import write_las
 from .units import check_unit
 
-
 CUT_SHORT = "only a part of it could be written; the disk may be full"
 
 
