@@ -224,7 +224,7 @@ def test_info_names_the_command_whose_options_keep_what_is_left_out(tmp_path, ca
     shape = make("scallop", 10_000, outliers=0.1, duplicates=0.2)
     np.save(tmp_path / "a.npy", shape.points)
     assert main(["info", str(tmp_path / "a.npy"), "--length", str(shape.length)]) == 0
-    said = capsys.readouterr().err
+    said = "".join(capsys.readouterr())
     assert "points are left out; scantruss grid --stray-distance 0 keeps them" in said
     assert "points are left out; scantruss grid --no-drop-repeated keeps them" in said
 
