@@ -52,6 +52,7 @@ class Source:
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
     in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
+    notes: tuple[str, ...] = ()  #: what a user should know
 
     @property
     def whole(self) -> bool:
@@ -60,7 +61,8 @@ class Source:
 
     def said_of(self, content: Content) -> Content:
         """Return some of its points with what the header says of their units."""
-        return replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
+        said = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
+        return replace(said, notes=(*content.notes, *self.notes)) if self.notes else said
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,7 @@ def _las(path: Path, head: bytes) -> Source:
     import laspy
 
     try:
-        check_header(path)
+        notes = check_header(path)
         with laspy.open(path) as file:
             header = file.header
             system = system_of([*header.vlrs, *(header.evlrs or [])])
@@ -160,6 +162,7 @@ def _las(path: Path, head: bytes) -> Source:
                 system=system.name,
                 degrees=system.degrees,
                 in_one=_has_uneven_chunks(header),
+                notes=notes,
             )
     except FormatError:
         raise
