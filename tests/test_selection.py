@@ -287,7 +287,7 @@ def test_packed_text_and_several_files_select_too(tmp_path: Path) -> None:
     expected = P[CLASS == 5]
     assert np.allclose(cloud.points + cloud.origin, np.concatenate([expected, expected]), rtol=0, atol=1e-9)
     assert f"{2 * (CLASS != 5).sum()} points of other classes are left out" in " ".join(cloud.notes).replace(",", "")
-    assert written(".csv", P[:5]).startswith(b"x,y,z\n")
+    assert written(".csv", P[:5]).startswith(b"x [m],y [m],z [m]\n")
 
 
 def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch) -> None:
