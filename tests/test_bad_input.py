@@ -23,6 +23,7 @@ from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.scan.cloud import PointCloud
 from scantruss.scan.e57_pages import DATA, to_pages
 from scantruss.scan.readers import READERS, read_points
+from scantruss.scan.streaming import thin_scan
 
 FILES = whole_files()
 HUGE = 10**12
@@ -198,6 +199,25 @@ def test_a_whole_file_is_read_and_a_part_of_it_is_not(name: str, tmp_path: Path)
             assert "\n" not in str(caught.value)
         else:
             read_or_refuse(path)
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.e57"])
+def test_a_header_that_promises_less_than_there_is_is_told_once(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_bytes(FILES[name])
+    whole = read_points(path)
+    assert whole.notes == ()
+    words = re.search(rb'recordCount="(\d+)"', pages(FILES["a.e57"]))
+    assert words
+    count = len(whole.points) if name == "a.las" else int(words[1])
+    less = in_e57(words[0], b'recordCount="%0*d"' % (len(words[1]), count - 20))
+    path.write_bytes(las_with(247, "<Q", count - 20) if name == "a.las" else less)
+    cloud = read_points(path)
+    scans = len(whole.points) // count
+    assert len(cloud.points) == len(whole.points) - 20 * scans
+    said = f"the header of {name} promises {count - 20:,} points.*, the file has {count:,}; the others are left out"
+    for notes in (cloud.notes, thin_scan(path, 1e-3).notes):
+        assert len(notes) == scans and all(re.fullmatch(said, note) for note in notes)
 
 
 @pytest.mark.parametrize("name", ["huge.npy", "huge-product.npy", "huge.npz"])

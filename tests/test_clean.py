@@ -236,6 +236,21 @@ def test_switched_off_all_points_come_back():
     assert np.array_equal(clean.points + clean.origin, points) and clean.normals is None and clean.steps == ()
 
 
+def test_a_stray_distance_of_0_keeps_all_as_for_a_grid():
+    points = make("scallop", 5000, outliers=0.1).points
+    clean = clean_points(points, stray_distance=0, duplicates=None, loose_pieces=0, smooth=False, normals=False)
+    assert len(clean.points) == len(points)
+
+
+def test_info_names_the_command_whose_options_keep_what_is_left_out(tmp_path, capsys):
+    shape = make("scallop", 10_000, outliers=0.1, duplicates=0.2)
+    np.save(tmp_path / "a.npy", shape.points)
+    assert main(["info", str(tmp_path / "a.npy"), "--length", str(shape.length)]) == 0
+    said = "".join(capsys.readouterr())
+    assert "points are left out; scantruss grid --stray-distance 0 keeps them" in said
+    assert "points are left out; scantruss grid --no-drop-repeated keeps them" in said
+
+
 def test_the_same_scan_gives_the_same_bytes():
     points = make("scallop", 20_000, outliers=0.05, duplicates=0.05).points
     one, other = clean_points(points), clean_points(points.copy())

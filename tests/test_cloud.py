@@ -107,6 +107,14 @@ def plane(count: int) -> np.ndarray:
         (np.full((5, 3), np.nan), "5 of 5 points have NaN or infinite"),
         (plane(5) * 1e150, "smaller than"),
         (plane(5) * 1e-150, "same place"),
+        (plane(5) * 1e-40, "as no scan does; .* its byte order wrong"),
+        (plane(5) * 1e40, "as no scan does; .* its byte order wrong"),
+        (bowl(1000).astype(">f4").view("<f4"), "farther away than half of the scan is wide, .* byte order"),
+        (bowl(1000).astype(">f8").view("<f8"), "byte order"),
+        (
+            np.where(np.arange(1000)[:, None] < 11, -3.4e38, bowl(1000)),
+            r"11 of 1,000 points .* up to 3.4e\+38; .* no-data",
+        ),
     ],
 )
 def test_refusals_say_what_is_needed_in_one_line(points: np.ndarray, words: str) -> None:
@@ -114,6 +122,25 @@ def test_refusals_say_what_is_needed_in_one_line(points: np.ndarray, words: str)
         PointCloud.from_array(points, name="a.xyz")
     assert str(caught.value).startswith("a.xyz: ")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [-3.4028235e38, 1e10, 1e300])
+@pytest.mark.parametrize("shift", [0.0, 5e6])
+def test_a_few_values_that_no_scan_has_are_left_out_and_said(value: float, shift: float) -> None:
+    points = bowl(1000) + shift
+    wild = points.copy()
+    wild[[3, 500], 2] = value
+    wild[999] = value * np.array([1.0, -0.5, 0.3])
+    cloud = PointCloud.from_array(wild)
+    assert np.array_equal(cloud.points + cloud.origin, np.delete(points, [3, 500, 999], axis=0))
+    assert cloud.dropped == 0 and cloud.notes[0].startswith("3 points with coordinates up to")
+    assert PointCloud.from_array(points).notes == ()
+
+
+def test_far_points_that_a_scan_may_have_are_kept() -> None:
+    points = bowl(1000)
+    points[7] = [0.0, 1e6, 0.0]
+    assert len(PointCloud.from_array(points).points) == 1000
 
 
 def test_an_unknown_unit_is_refused() -> None:

@@ -16,6 +16,7 @@ from scan_files import plate, text
 
 from scantruss.errors import FormatError, InputError
 from scantruss.scan.readers import READERS, read_points
+from scantruss.scan.tiles import find_source
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 UTM = np.array([500_000.0, 4_500_000.0, 100.0])
@@ -218,13 +219,48 @@ def test_npy_and_npz(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", odd=odd, names=np.array(["a"]), flat=np.ones(9), scan=wide, other=np.ones((5, 3)))
     assert np.array_equal(coordinates(tmp_path / "a.npz"), roof())
     np.savez_compressed(tmp_path / "b.npz", flat=np.ones(9))
-    with pytest.raises(FormatError, match=r"an array of shape \(N, 3\) or wider, got flat \(9,\)"):
+    with pytest.raises(FormatError, match=r"an array of shape \(N, 3\) or wider that may be points, got flat \(9,\)"):
         read_points(tmp_path / "b.npz")
     np.save(tmp_path / "a.npy", roof().T)
-    assert len(np.load(tmp_path / "a.npy")) == 3  # 3 rows of 60 columns cannot be told from points, so are read
+    with pytest.raises(FormatError, match=r"points in columns, shape \(3, 60\); transpose it to \(N, 3\)"):
+        read_points(tmp_path / "a.npy")
+    assert find_source(tmp_path / "a.npy").whole  # who thins it says the same
     np.save(tmp_path / "a.npy", np.ones((60, 2)))
     with pytest.raises(FormatError, match=r"got float64 \(60, 2\)"):
         read_points(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize("kind", ["i1", "u2", "<i4", "i8", "f2"])
+def test_arrays_of_any_numbers(tmp_path: Path, kind: str) -> None:
+    whole = np.round(np.random.default_rng(5).random((60, 3)) * 90).astype(kind)
+    np.save(tmp_path / "a.npy", whole)
+    assert np.array_equal(coordinates(tmp_path / "a.npy"), whole)
+
+
+def test_what_no_scan_has_is_told_with_the_other_notes(tmp_path: Path) -> None:
+    wild = roof(1000)
+    wild[5, 2] = -3.4e38
+    np.savez(tmp_path / "a.npz", wild, roof(1000))
+    first, second = read_points(tmp_path / "a.npz").notes
+    assert "arr_0" in first and second.startswith("1 points with coordinates up to 3.4e+38")
+
+
+@pytest.mark.parametrize("name", ["points", "xyz", "Positions", "vertices", "coords", "pts", "arr_0", "anything"])
+def test_the_points_of_an_archive_are_found_by_name_wherever_they_stand(tmp_path: Path, name: str) -> None:
+    first = {"normals": np.ones((60, 3)), "K": np.eye(3), "pose": np.eye(4)}
+    np.savez(tmp_path / "a.npz", **first, **{name: roof()}, rgb=np.ones((60, 3)))
+    assert np.array_equal(coordinates(tmp_path / "a.npz"), roof())
+
+
+def test_an_archive_that_may_mean_several_arrays_is_refused_or_says_which(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", before=roof(), after=roof(), K=np.eye(3))
+    with pytest.raises(FormatError, match="several arrays that may be the points, before, after; name the one"):
+        read_points(tmp_path / "a.npz")
+    np.savez(tmp_path / "a.npz", roof(), roof())
+    assert read_points(tmp_path / "a.npz").notes == ("the points of a.npz are taken from arr_0, and not arr_1",)
+    np.savez(tmp_path / "a.npz", normals=roof())
+    with pytest.raises(FormatError, match="may be points, got normals"):
+        read_points(tmp_path / "a.npz")
 
 
 def test_points_that_are_not_finite_are_counted(tmp_path: Path) -> None:

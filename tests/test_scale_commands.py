@@ -313,3 +313,19 @@ def test_several_workers_are_announced(capsys, monkeypatch):
     with Bars() as bars:
         scaling._workers(Namespace(workers=3, scheduler=""), bars, None)
     assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out
+
+
+def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(place, capsys):
+    words = ["sweep", "scan.npy", "--effort", "quick", "-o", "out", "--workers", "1"]
+    assert main([*words, "--length", "6,7"]) == 0
+    assert main([*words, "--length", "6,7"]) == 0  # the same once more
+    capsys.readouterr()
+    assert "holds grids of another sweep, length-6; name another folder" in refused(capsys, *words, "--length", "7,8")
+    for path in (place / "out").glob("length-6.*"):
+        path.unlink()
+    (place / "out" / "length-0.1.json").write_text("{}")
+    assert main([*words, "--length", "7,0.1"]) == 0
+    assert sorted(entry.name for entry in os.scandir("out") if entry.name.startswith("length")) == [
+        "length-7.json",
+        "length-7.png",
+    ]

@@ -12,12 +12,15 @@ from scan_files import e57, las, plate, text, written
 
 from scantruss.cli import main
 from scantruss.errors import FormatError, InputError
+from scantruss.scan.fit import read_thinned
 from scantruss.scan.heights import look_like_feet
 from scantruss.scan.paths import files_of
 from scantruss.scan.readers import read_points
 from scantruss.scan.streaming import thin_scan
 from scantruss.scan.systems import from_wkt
+from scantruss.scan.writers import write_points
 from scantruss.selection import Selection
+from scantruss.settings import Settings
 
 P = plate()
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -294,3 +297,22 @@ def test_files_of_different_reference_systems_are_refused(tmp_path: Path) -> Non
     scan(tmp_path, wkt(plane(METRE, "32633")), name="c.las")
     with pytest.raises(InputError, match=r"c.las is in EPSG:32633 and .*a.las in EPSG:32632"):
         read_points(f"{tmp_path}/*.las")
+
+
+@pytest.mark.parametrize("suffix", [".las", ".csv", ".npy", ".ply"])
+def test_what_looks_like_degrees_is_said_where_nothing_tells(tmp_path: Path, suffix: str) -> None:
+    plan = np.random.default_rng(2).random((400, 3))
+    degrees = plan * [0.01, 0.008, 30.0] + [11.5, 48.1, 500.0]
+    path = tmp_path / f"a{suffix}"
+    write_points(path, degrees)
+    said = "x and y look like longitude and latitude"
+    assert [said in note for note in read_points(path).notes] == [True]
+    assert read_points(path, unit="m").notes == ()
+    thinned, _ = read_thinned(path, Settings(length=1.0, thin_spacing=1e-4))
+    assert [said in note for note in thinned.notes] == [True]
+
+
+@pytest.mark.parametrize("sides", [(0.9, 0.4, 3.0), (30.0, 20.0, 9.0), (0.01, 0.01, 0.01), (500.0, 400.0, 9.0)])
+def test_small_scans_do_not_look_like_degrees(tmp_path: Path, sides: tuple[float, float, float]) -> None:
+    np.save(tmp_path / "a.npy", np.random.default_rng(2).random((400, 3)) * sides)
+    assert read_points(tmp_path / "a.npy").notes == ()

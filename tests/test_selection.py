@@ -179,6 +179,37 @@ def test_a_polygon_of_any_file_with_its_hole(tmp_path: Path, name: str) -> None:
     assert np.allclose(cloud.points + cloud.origin, P[expected], rtol=0, atol=1e-9)
 
 
+BESIDE = [(10.0, 4.0), (40.0, 1.0), (38.0, 27.0)]
+
+
+def several() -> dict[str, str]:
+    """Files of a polygon with a hole and another one that overlaps both."""
+    polygons = [[[*RING, RING[0]], [*HOLE, HOLE[0]]], [[*BESIDE, BESIDE[0]]]]
+    words = [f"(({'), ('.join(', '.join(f'{x} {y}' for x, y in ring) for ring in rings)}))" for rings in polygons]
+    geometries = [None, *({"type": "Polygon", "coordinates": rings} for rings in polygons)]
+    features = [{"type": "Feature", "properties": {}, "geometry": geometry} for geometry in geometries]
+    return {
+        "a.geojson": json.dumps({"type": "FeatureCollection", "features": features}),
+        "b.geojson": json.dumps({"type": "MultiPolygon", "coordinates": polygons}),
+        "c.geojson": json.dumps({"type": "GeometryCollection", "geometries": geometries[1:]}),
+        "a.wkt": f"MULTIPOLYGON ({words[0]} , {words[1]})",
+        "b.wkt": f"POLYGON {words[0]}\npolygon {words[1]}\n",
+    }
+
+
+@pytest.mark.parametrize("name", sorted(several()))
+def test_a_place_in_any_of_several_polygons_is_inside(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text(several()[name])
+    crop = read_crop(str(tmp_path / name))
+    assert crop == polygon_text([RING, HOLE], [BESIDE]) == read_crop(crop)
+    expected = np.array(
+        [inside(x, y, BESIDE) or (inside(x, y, RING) and not inside(x, y, HOLE)) for x, y in P[:, :2].tolist()]
+    )
+    (tmp_path / "a.las").write_bytes(FILES["a.las"])
+    cloud = read_points(tmp_path / "a.las", selection=Selection(crop=(crop,)))
+    assert np.allclose(cloud.points + cloud.origin, P[expected], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("content", ["", "1,2\n3,4\n", "{", '{"type": "Point"}', "POLYGON ((1 2))", "a b\nc d\n", "\0"])
 def test_what_is_no_polygon_is_refused(tmp_path: Path, content: str) -> None:
     (tmp_path / "a.txt").write_text(content)
@@ -191,7 +222,8 @@ def test_what_is_no_polygon_is_refused(tmp_path: Path, content: str) -> None:
     [
         {"classes": "six"}, {"classes": 300}, {"classes": (-1,)}, {"returns": "0"}, {"returns": "middle"}, {"confidence": "high"},
         {"confidence": float("nan")}, {"crop": "box:1,2,3"}, {"crop": "box:9,9,0,0"}, {"crop": "sphere:0,0,0,0"},
-        {"crop": "sphere:0,0,0,nan"}, {"crop": "cube:1,2,3,4"}, {"crop": "polygon:1,2,3,4"}, {"crop": "box:a,b,c,d"},
+        {"crop": "sphere:0,0,0,nan"}, {"crop": "cube:1,2,3,4"}, {"crop": "box:1,2,3,4|1,2,3,4"},
+        {"crop": "polygon:1,2,3,4"}, {"crop": "box:a,b,c,d"},
     ],
 )  # fmt: skip
 def test_values_that_select_nothing_sensible_are_refused(values: dict) -> None:
@@ -255,7 +287,7 @@ def test_packed_text_and_several_files_select_too(tmp_path: Path) -> None:
     expected = P[CLASS == 5]
     assert np.allclose(cloud.points + cloud.origin, np.concatenate([expected, expected]), rtol=0, atol=1e-9)
     assert f"{2 * (CLASS != 5).sum()} points of other classes are left out" in " ".join(cloud.notes).replace(",", "")
-    assert written(".csv", P[:5]).startswith(b"x,y,z\n")
+    assert written(".csv", P[:5]).startswith(b"x [m],y [m],z [m]\n")
 
 
 def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch) -> None:

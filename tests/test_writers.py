@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import laspy
@@ -34,7 +36,7 @@ def test_points_come_back_with_their_unit(tmp_path: Path, suffix: str, unit: str
         scale = METRES[unit] if suffix == ".e57" else 1.0
         loss = 0.5e-3 * measure_spacing(POINTS) if suffix in (".las", ".laz") else 1e-15 * 4.5e6 * (scale != 1.0)
         assert np.abs(cloud.points + cloud.origin - scale * POINTS).max() <= 1.01 * loss
-        says = {".e57": "m"}.get(suffix, unit if suffix not in (".xyz", ".txt", ".csv", ".npy") else "")
+        says = {".e57": "m"}.get(suffix, unit if suffix != ".npy" else "")
         assert cloud.unit == says and cloud.dropped == 0 and cloud.notes == ()
         before = path.read_bytes()
         write_points(path, POINTS, normals=normals, unit=unit)
@@ -53,6 +55,38 @@ def test_other_readers_find_the_same(tmp_path: Path) -> None:
     las = laspy.read(tmp_path / "a.laz")
     assert np.abs(las.xyz - POINTS).max() < 1e-3 * measure_spacing(POINTS)
     assert np.allclose(np.column_stack([las[f"Normal{axis}"] for axis in "XYZ"]), NORMALS)
+
+
+def test_the_unit_of_a_text_does_not_keep_others_from_its_numbers(tmp_path: Path) -> None:
+    for suffix, options in ((".xyz", {}), (".txt", {}), (".csv", {"delimiter": ",", "skiprows": 1})):
+        write_points(tmp_path / f"a{suffix}", POINTS, normals=NORMALS, unit="mm")
+        assert np.array_equal(np.loadtxt(tmp_path / f"a{suffix}", **options), np.hstack([POINTS, NORMALS]))
+    assert (tmp_path / "a.csv").read_text().startswith("x [mm],y [mm],z [mm],nx,ny,nz\n")
+
+
+CUT = """
+import resource, signal, sys
+import numpy as np
+from scantruss.errors import FormatError
+from scantruss.scan.writers import WRITERS, write_points
+points = np.random.default_rng(0).random((60_000, 3))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+for suffix in sorted(WRITERS):
+    try:
+        write_points("a" + suffix, points)
+    except FormatError as error:
+        print(suffix, error)
+"""
+
+
+def test_a_disk_that_is_full_is_told_in_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("resource")
+    done = subprocess.run([sys.executable, "-c", CUT], cwd=tmp_path, capture_output=True, text=True)
+    assert not done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == sorted(WRITERS)
+    assert all(" cannot write a." in line and ("disk may be full" in line or "too large" in line) for line in lines)
 
 
 def test_what_las_cannot_hold_is_refused_or_given_a_coarser_step() -> None:

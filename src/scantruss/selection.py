@@ -20,6 +20,7 @@ FORMS = "box:X0,Y0,Z0,X1,Y1,Z1, box:X0,Y0,X1,Y1, sphere:X,Y,Z,RADIUS or a file o
 LARGEST_FILE = 1 << 26  # bytes of a polygon
 
 Ring = list[tuple[float, float]]
+_WKT_BETWEEN = re.compile(r"POLYGON|(?<=\))\s*\)\s*,\s*\(\s*(?=\()", re.IGNORECASE)  # what stands between two polygons
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +82,8 @@ def check_crop(given: Any) -> tuple[str, ...]:
 
 def _check_part(text: str) -> str:
     kind, _, rest = text.partition(":")
-    rings = [_numbers(ring, text) for ring in rest.split(";")]
+    polygons = [[_numbers(ring, text) for ring in polygon.split(";")] for polygon in rest.split("|")]
+    rings = [ring for polygon in polygons for ring in polygon]
     numbers = rings[0]
     if kind == "box" and len(rings) == 1 and len(numbers) in (4, 6):
         half = len(numbers) // 2
@@ -95,7 +97,7 @@ def _check_part(text: str) -> str:
             raise InputError("crop: a polygon needs rings of at least three corners x,y")
     else:
         raise InputError(f"crop must be {FORMS}, got {text[:80]!r}")
-    return f"{kind}:{';'.join(','.join(map(repr, ring)) for ring in rings)}"
+    return f"{kind}:{'|'.join(';'.join(','.join(map(repr, ring)) for ring in polygon) for polygon in polygons)}"
 
 
 def _numbers(text: str, whole: str) -> list[float]:
@@ -108,10 +110,11 @@ def _numbers(text: str, whole: str) -> list[float]:
     return numbers
 
 
-def parts_of(crop: str) -> tuple[str, list[list[float]]]:
-    """Return the kind of a part of space and its numbers, one list a ring."""
+def parts_of(crop: str) -> tuple[str, list[list[list[float]]]]:
+    """Return the kind of a part of space and its numbers, one list a ring, in a list for each polygon."""
     kind, _, rest = crop.partition(":")
-    return kind, [[float(word) for word in ring.split(",")] for ring in rest.split(";")]
+    polygons = [polygon.split(";") for polygon in rest.split("|")]
+    return kind, [[[float(word) for word in ring.split(",")] for ring in rings] for rings in polygons]
 
 
 def read_crop(text: str) -> str:
@@ -121,17 +124,21 @@ def read_crop(text: str) -> str:
     path = Path(text)
     if not path.is_file():
         raise InputError(f"crop must be {FORMS}, got {text[:80]!r}, which is no file")
-    return polygon_text(read_polygon(path))
+    return polygon_text(*read_polygons(path))
 
 
-def polygon_text(rings: Iterable[Ring]) -> str:
-    """Return rings as one crop; a point is inside where an odd number of them hold it."""
-    open_rings = [ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring for ring in rings]
-    return _check_part("polygon:" + ";".join(",".join(f"{x!r},{y!r}" for x, y in ring) for ring in open_rings))
+def polygon_text(*polygons: Iterable[Ring]) -> str:
+    """Return polygons as one crop; a point is inside where, of any of them, an odd number of rings hold it."""
+    return _check_part("polygon:" + "|".join(";".join(map(_ring_text, rings)) for rings in polygons))
 
 
-def read_polygon(path: Path) -> list[Ring]:
-    """Return the rings of a polygon in plan: a GeoJSON or WKT file, or a text file with x, y a line.
+def _ring_text(ring: Ring) -> str:
+    corners = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
+    return ",".join(f"{x!r},{y!r}" for x, y in corners)
+
+
+def read_polygons(path: Path) -> list[list[Ring]]:
+    """Return the rings of each polygon in plan: of a GeoJSON or WKT file, or a text file with x, y a line, which is one polygon.
 
     Raises
     ------
@@ -147,15 +154,16 @@ def read_polygon(path: Path) -> list[Ring]:
     except UnicodeDecodeError:
         raise FormatError(f"{path} is not a text file; a polygon is GeoJSON, WKT or x, y a line") from None
     if text.startswith("{"):
-        rings = _geojson_rings(path, text)
+        polygons = _geojson_polygons(path, text)
     elif re.match(r"(SRID=\d+;\s*)?(MULTI)?POLYGON\b", text, re.IGNORECASE):
-        rings = [_ring(path, re.split(r"\s*,\s*", part)) for part in re.findall(r"\(([^()]+)\)", text)]
+        parts = [part for words in _WKT_BETWEEN.split(text) if (part := re.findall(r"\(([^()]+)\)", words))]
+        polygons = [[_ring(path, re.split(r"\s*,\s*", ring)) for ring in part] for part in parts]
     else:
         blocks = re.split(r"\n\s*\n", "\n".join(_without_header(text.splitlines())))
-        rings = [_ring(path, block.strip().splitlines()) for block in blocks if block.strip()]
-    if not rings or any(len(set(ring)) < 3 for ring in rings):
+        polygons = [[_ring(path, block.strip().splitlines()) for block in blocks if block.strip()]]
+    if not any(polygons) or any(len(set(ring)) < 3 for rings in polygons for ring in rings):
         raise FormatError(f"{path} holds no polygon; a ring of at least three corners x, y is needed")
-    return rings
+    return polygons
 
 
 def _without_header(lines: list[str]) -> list[str]:
@@ -176,9 +184,9 @@ def _ring(path: Path, lines: Iterable[str]) -> Ring:
     return ring
 
 
-def _geojson_rings(path: Path, text: str) -> list[Ring]:
-    """Return the rings of all polygons in a GeoJSON file."""
-    found: list[Ring] = []
+def _geojson_polygons(path: Path, text: str) -> list[list[Ring]]:
+    """Return the rings of each polygon in a GeoJSON file; a feature may have no place."""
+    found: list[list[Ring]] = []
     try:
         stack = [json.loads(text)]
         while stack:
@@ -187,12 +195,12 @@ def _geojson_rings(path: Path, text: str) -> list[Ring]:
             if kind == "FeatureCollection":
                 stack.extend(reversed(value["features"]))
             elif kind == "Feature":
-                stack.append(value["geometry"])
+                stack.extend([value["geometry"]] if value["geometry"] is not None else [])
             elif kind == "GeometryCollection":
                 stack.extend(reversed(value["geometries"]))
             elif kind in ("Polygon", "MultiPolygon"):
                 polygons = [value["coordinates"]] if kind == "Polygon" else value["coordinates"]
-                found += [[(float(c[0]), float(c[1])) for c in ring] for polygon in polygons for ring in polygon]
+                found += [[[(float(c[0]), float(c[1])) for c in ring] for ring in rings] for rings in polygons if rings]
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
         raise FormatError(f"{path} is not GeoJSON with a polygon") from None
     return found

@@ -64,7 +64,8 @@ def clean_points(
     duplicates : float
         Points nearer to an earlier one than this share of the spacing where the scan is densest are left out, and all repeats.
     stray_distance : float
-        Points so many times farther from others than their neighbours are left out, and what stands off the surface.
+        Points so many times farther from others than their neighbours are left out, and what stands off the surface; 0 keeps
+        all, as `Settings.stray_distance` does.
     loose_pieces : float
         Pieces with fewer than this share of the points, away from all others, are left out; clouds of points that form no surface
         with up to four times as many, or with any number where they are narrow beside the largest piece; 0 leaves out none.
@@ -92,7 +93,7 @@ def clean_points(
     if duplicates is not None:
         work.leave_out("duplicates", find_repeated(work.points), "repeated points left out")
         work.leave_out("near_duplicates", find_near_duplicates(work.points, duplicates), "near duplicates left out")
-    if stray_distance is not None:
+    if stray_distance:
         work.say("strays")
         work.leave_out("strays", find_strays(work.points, stray_distance), "stray points left out")
     work.check_enough()

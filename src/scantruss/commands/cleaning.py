@@ -16,7 +16,11 @@ if TYPE_CHECKING:
 
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
-    "stray-distance": ("NUMBER", 3.0, "points so many times farther from others than their neighbours are left out"),
+    "stray-distance": (
+        "NUMBER",
+        3.0,
+        "points so many times farther from others than their neighbours are left out; 0: none",
+    ),
     "loose-pieces": (
         "SHARE",
         0.005,

@@ -47,7 +47,7 @@ def info(values: Namespace) -> None:
             from ..boundary import find_boundary
 
             boundary = find_boundary(cloud, settings, progress=bars)
-        note_strays(bars, cloud, settings)
+        note_strays(bars, cloud, settings, "scantruss grid")
     field = boundary.sites.surface.field
     longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])

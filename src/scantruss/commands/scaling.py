@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import FormatError, InputError
 from .outputs import Taken, claim, cloud_output, inputs_of, result_folder
 from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, say_of_cloud, thin_to_fit
 
@@ -180,6 +180,19 @@ def claim_results(folder: Path, trials: list[Trial], taken: Taken) -> None:
         claim(folder / name, "result", taken)
         if folder.exists():
             check_place(folder / name, (Path(name).suffix,))
+    _refuse_earlier_sweep(folder, {trial.name for trial in trials})
+
+
+def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
+    """Refuse a folder with grids that the new table would not know, though they stand beside it."""
+    if not (folder / TABLES[0]).exists():
+        return
+    grids = (path.stem for path in sorted(folder.glob("*.json")) if path.with_suffix(".png").exists())
+    if others := [name for name in grids if name not in names]:
+        more = f" and {len(others) - 1:,} more" if len(others) > 1 else ""
+        raise FormatError(
+            f"{folder} holds grids of another sweep, {others[0]}{more}; name another folder, or remove these first"
+        )
 
 
 def _method_to_compile(trials: list[Trial], usual: str) -> str:
@@ -237,3 +250,7 @@ def _save(
         tables = (encode_table_csv(head, rows), encode_table_markdown(head, rows), page, encode_sheet(pictures))
         for name, content in zip(TABLES, tables, strict=True):
             save.beside(folder / name).write_bytes(content)
+    for trial, outcome in zip(trials, outcomes, strict=True):
+        if not outcome.grid:  # of an earlier sweep, which this table would say has none
+            for end in (".json", ".png"):
+                (folder / f"{trial.name}{end}").unlink(missing_ok=True)

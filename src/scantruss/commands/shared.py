@@ -91,15 +91,16 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def note_strays(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Say so where points of the scan were left out."""
+def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
+    """Say so where points of the scan were left out, and the option that keeps them, of another command where this one has none."""
     from ..scan.sites import prepare_sites
 
     sites = prepare_sites(cloud, settings)
+    say = f"{command} " if command else ""
     if sites.repeated:
-        bars.note(f"{sites.repeated:,} repeated points are left out; --no-drop-repeated keeps them")
+        bars.note(f"{sites.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")
     if sites.strays:
-        bars.note(f"{sites.strays:,} stray points are left out; --stray-distance 0 keeps them")
+        bars.note(f"{sites.strays:,} stray points are left out; {say}--stray-distance 0 keeps them")
     pieces, share = sites.left_out
     if pieces:
         bars.note(

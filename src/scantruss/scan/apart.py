@@ -16,7 +16,7 @@ STRAY = (2.0, 98.0)  # percentiles of each coordinate between which they do
 def extent_of(points: np.ndarray) -> np.ndarray:
     """Return about the lowest and highest coordinates of points (N, 3), (2, 3); inf and -inf where there are none."""
     some = points[:: max(len(points) // SAMPLE, 1)]
-    some = some[np.isfinite(some).all(axis=1)]
+    some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # whole numbers have no inf
     return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
 
 

@@ -71,8 +71,8 @@ def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
     """Return the boxes around parts of space in the unit of a file, whose axes are `scale` (3,) units of the scan long."""
     places = []
     for crop in crops:
-        kind, rings = parts_of(crop)
-        numbers = rings[0]
+        kind, polygons = parts_of(crop)
+        numbers = polygons[0][0]
         lower, upper = np.full(3, -np.inf), np.full(3, np.inf)
         if kind == "box":
             half = len(numbers) // 2
@@ -80,7 +80,7 @@ def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
         elif kind == "sphere":
             lower, upper = np.array(numbers[:3]) - numbers[3], np.array(numbers[:3]) + numbers[3]
         else:
-            corners = np.concatenate([np.array(ring).reshape(-1, 2) for ring in rings])
+            corners = np.concatenate([np.array(ring).reshape(-1, 2) for rings in polygons for ring in rings])
             lower[:2], upper[:2] = corners.min(axis=0), corners.max(axis=0)
         places.append(Place(_outside(kind), lower / scale, upper / scale))
     return places
@@ -114,8 +114,8 @@ def _tests(
 
 
 def _crop_test(points: np.ndarray, crop: str) -> Test:
-    kind, rings = parts_of(crop)
-    numbers = rings[0]
+    kind, polygons = parts_of(crop)
+    numbers = polygons[0][0]
     if kind == "box":
         half = len(numbers) // 2
         lower, upper = np.array(numbers[:half]), np.array(numbers[half:])
@@ -123,8 +123,8 @@ def _crop_test(points: np.ndarray, crop: str) -> Test:
     if kind == "sphere":
         center, radius = np.array(numbers[:3]), numbers[3]
         return lambda rows: ((points[rows] - center) ** 2).sum(axis=1) <= radius * radius
-    corners = [np.array(ring).reshape(-1, 2) for ring in rings]
-    return lambda rows: in_polygon(points[rows, :2], corners)
+    corners = [[np.array(ring).reshape(-1, 2) for ring in rings] for rings in polygons]
+    return lambda rows: np.any([in_polygon(points[rows, :2], rings) for rings in corners], axis=0)
 
 
 def in_polygon(places: np.ndarray, rings: list[np.ndarray]) -> np.ndarray:

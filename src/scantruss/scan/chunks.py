@@ -90,7 +90,8 @@ def read_chunks(
 def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
     """Return what is selected of some points, in the unit of the scan."""
     part = select(path, content, reading.unit, reading.selection, reading.common, SAMPLE)
-    points = np.ascontiguousarray(part.points, np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out later
+        points = np.ascontiguousarray(part.points, np.float64)
     return Chunk(points, part.count, part.left_out, content.notes, part.held)
 
 
@@ -168,7 +169,8 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
             rows = np.fromfile(file, kind, expected)
             if len(rows) < expected:
                 raise FormatError(f"{source.path} ends early: it has become shorter while it was read")
-            points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out later
+                points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
             yield source.said_of(Content(points, {attribute: rows[name] for attribute, name in found.items()}))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..machine import in_parts, processors
 from .units import check_unit
+from .wild import CAUSE, check_sensible, find_wild, said_of_wild
 
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
@@ -58,7 +59,8 @@ class PointCloud:
         Parameters
         ----------
         points : (N, 3) array of numbers [scan unit]
-            Points with a coordinate that is NaN or infinite are dropped and counted.
+            Points with a coordinate that is NaN or infinite are dropped and counted; a few that lie a million times farther
+            away than others too, in `notes`.
         unit : str
             Unit of the coordinates: mm, cm, m, inch, foot, or "" where it is not known.
         name : str
@@ -72,17 +74,22 @@ class PointCloud:
         Raises
         ------
         InputError
-            Wrong shape, no numbers, too few points, or all of them on a line.
+            Wrong shape, no numbers, too few points, all of them on a line, or values that no scan has.
         """
         check_unit(unit)
         said = f"{name}: " if name else ""
         array = _as_coordinates(points, said)
         clean, lower, upper = _drop_not_finite(array, said)
+        dropped, notes = len(array) - len(clean), tuple[str, ...]()
+        if (wild := find_wild(clean, lower, upper, said)) is not None:
+            notes = (said_of_wild(clean[wild]),)
+            clean = clean[~wild]
+            lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
         moved, sums = _moved(clean, origin)
         _check_not_on_a_line(len(moved), sums, extent, said)
-        cloud = cls(points=moved, origin=origin, unit=unit, dropped=len(array) - len(clean), name=name)
+        cloud = cls(points=moved, origin=origin, unit=unit, dropped=dropped, name=name, notes=notes)
         cloud.__dict__["bounds"] = lower - origin, upper - origin  # exact, as all points
         return cloud
 
@@ -97,7 +104,7 @@ def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
         raise InputError(f"{said}points must have shape (N, 3), got {array.shape}")
     if array.dtype.kind not in "fiu":
         raise InputError(f"{said}points must be real numbers, got {array.dtype}")
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(array, np.float64)
 
 
@@ -135,10 +142,11 @@ def _check_extent(lower: np.ndarray, upper: np.ndarray, said: str) -> float:
     """Return the longest side of the cloud; refuse points that coincide or overflow."""
     largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
     if largest > LARGEST:
-        raise InputError(f"{said}coordinates must be smaller than {LARGEST:g}, got {largest:.3g}")
+        raise InputError(f"{said}coordinates must be smaller than {LARGEST:g}, got {largest:.3g}; {CAUSE}")
     extent = float((upper - lower).max())
     if extent <= max(4 * np.finfo(float).eps * largest, 1 / LARGEST):
         raise InputError(f"{said}all points are at the same place; a grid needs points spread over a surface")
+    check_sensible(extent, said)
     return extent
 
 

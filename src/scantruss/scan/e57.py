@@ -18,7 +18,9 @@ from .content import Content, find_attributes
 from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
 from .e57_pages import logical
 from .kinds import read_head, wrong_kind
+from .las_header import said_of_room
 
+LEAST_SURPLUS = 64  # bits of a field behind those of its records that may only fill a word
 BLOCK = 1 << 18  # records taken out of their bits in one go
 
 
@@ -31,20 +33,22 @@ class ScanPoints(NamedTuple):
     translation: np.ndarray  #: (3,) [m]
     invalid: int  #: points that the scanner marked as invalid; they are left out
     attributes: dict[str, np.ndarray]  #: wanted ones that the scan has, (N,) each
+    notes: tuple[str, ...]  #: what a user should know
 
 
 def read_e57(path: Path, wanted: Sequence[str] = ()) -> Content:
     """Return the points of all scans of an E57 file in their common frame [m] and the wanted attributes that all of them have."""
-    parts, found, invalid = [], [], 0
+    parts, found, invalid, notes = [], [], 0, tuple[str, ...]()
     for scan in e57_scans(path, wanted):
         parts.append(_in_common_frame(scan))
         found.append(scan.attributes)
         invalid += scan.invalid
+        notes += scan.notes
     points = parts[0] if len(parts) == 1 else np.concatenate([np.empty((0, 3)), *parts])
     everywhere = [name for name in wanted if found and all(name in each for each in found)]
     attributes = {name: np.concatenate([each[name] for each in found]) for name in everywhere}
     left_out = {"that the scanner marked as invalid": invalid} if invalid else {}
-    return Content(points, attributes, metres=1.0, z_metres=1.0, left_out=left_out)
+    return Content(points, attributes, metres=1.0, z_metres=1.0, left_out=left_out, notes=notes)
 
 
 def _in_common_frame(scan: ScanPoints) -> np.ndarray:
@@ -72,7 +76,7 @@ def e57_scans(path: Path, wanted: Sequence[str] = ()) -> Iterator[ScanPoints]:
             raise FormatError(f"{path}: {scan.name} has neither cartesian nor spherical coordinates")
         state = "sphericalInvalidState" if axes == SPHERICAL else "cartesianInvalidState"
         named = _attribute_fields(scan, wanted)
-        columns = _read_columns(path, data, scan, (*axes, state, *named.values()))
+        columns, room = _read_columns(path, data, scan, (*axes, state, *named.values()))
         points = np.column_stack([columns[axis] for axis in axes])
         if axes == SPHERICAL:
             points = _to_cartesian(points)
@@ -82,7 +86,9 @@ def e57_scans(path: Path, wanted: Sequence[str] = ()) -> Iterator[ScanPoints]:
         kept = columns[state] == 0 if state in columns else np.ones(len(points), dtype=bool)
         if not kept.all():
             points, attributes = points[kept], {name: values[kept] for name, values in attributes.items()}
-        yield ScanPoints(scan.name, points, scan.rotation, scan.translation, len(kept) - int(kept.sum()), attributes)
+        invalid = len(kept) - int(kept.sum())
+        notes = said_of_room(path, scan.count, room, f" in {scan.name}")
+        yield ScanPoints(scan.name, points, scan.rotation, scan.translation, invalid, attributes, notes)
 
 
 def _attribute_fields(scan: Scan, wanted: Sequence[str]) -> dict[str, str]:
@@ -98,8 +104,13 @@ def _to_cartesian(places: np.ndarray) -> np.ndarray:
     return np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)])
 
 
-def _read_columns(path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Return the named fields of all records, float64 each; those that a scan does not have are left out."""
+def _read_columns(
+    path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]
+) -> tuple[dict[str, np.ndarray], int]:
+    """Return the named fields of all records, float64 each, and how many records there are, promised or not.
+
+    Fields that a scan does not have are left out.
+    """
     place = [field.name for field in scan.fields]
     wanted = [place.index(name) for name in dict.fromkeys(names) if name in place]
     width = sum(field.bits for field in scan.fields)
@@ -108,9 +119,13 @@ def _read_columns(path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ..
             f"{path} ends early: its header promises {scan.count:,} points, but it has {len(data):,} bytes; copy it again"
         )
     if not scan.count:
-        return {place[i]: np.empty(0) for i in wanted}
+        return {place[i]: np.empty(0) for i in wanted}, 0
     streams = _collect(path, data, scan, wanted)
-    return {place[i]: _decode(stream, scan.fields[i], scan.count) for stream, i in zip(streams, wanted, strict=True)}
+    stored = [(8 * len(s), bits) for s, i in zip(streams, wanted, strict=True) if (bits := scan.fields[i].bits)]
+    sure = all(held - bits * scan.count >= LEAST_SURPLUS for held, bits in stored)
+    room = min((held // bits for held, bits in stored), default=0) if sure else 0
+    found = {place[i]: _decode(stream, scan.fields[i], scan.count) for stream, i in zip(streams, wanted, strict=True)}
+    return found, room
 
 
 def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> list[np.ndarray]:

@@ -13,6 +13,7 @@ from ..machine import available_memory
 from .apart import BULK, usual_extent
 from .chunks import Reading, count_unread, read_chunks
 from .cloud import LARGEST, PointCloud
+from .degrees import said_of_degrees
 from .kinds import read_head
 from .opened import open_scan
 from .paths import Source as Names
@@ -108,7 +109,8 @@ def read_thinned(names: Names, settings: Settings, progress: Progress | None = N
         progress=progress,
     )
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
-    return replace(cloud, dropped=thinned.dropped, notes=thinned.notes), thinned.read
+    notes = (*thinned.notes, *cloud.notes, *said_of_degrees(cloud))
+    return replace(cloud, dropped=thinned.dropped, notes=notes), thinned.read
 
 
 def read_to_fit(

@@ -31,7 +31,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
         raise wrong_kind(path, head, "a LAS or LAZ file")
     names = fields_of((*wanted, "return_count"))
     try:
-        check_header(path)
+        notes = check_header(path)
         promised, said, chunks = _read(path, names, places_of)
     except ScanTrussError:
         raise
@@ -45,7 +45,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in names}
     feet = look_like_feet(points, attributes["return_count"]) if said.z_metres is None else ""
     left_out = {WITHHELD: withheld} if withheld else {}
-    return replace(said, points=points, attributes=attributes, left_out=left_out, feet=feet)
+    return replace(said, points=points, attributes=attributes, left_out=left_out, feet=feet, notes=notes)
 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:

@@ -12,14 +12,15 @@ from ..errors import FormatError
 
 LEAST_HEADER = 227  # bytes, of LAS 1.0 to 1.2
 HEADER_14 = 375
+WAVES = 227  # where a header from LAS 1.3 on says where packets of waves begin
 LASZIP = 22204  # number of the record that describes how points are packed
 MOST_IN_CHUNK = 1 << 20  # points of one chunk, where the file holds fewer; room is made for all of them
 ONES = (1 << 64) - 1
 RECORD, EXTENDED = 54, 60  # bytes of the header of a variable length record, and of an extended one
 
 
-def check_header(path: Path) -> None:
-    """Refuse a LAS or LAZ file whose header promises more than the file can hold."""
+def check_header(path: Path) -> tuple[str, ...]:
+    """Refuse a LAS or LAZ file whose header promises more than the file can hold; return a note where it promises less."""
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(HEADER_14)
@@ -34,9 +35,12 @@ def check_header(path: Path) -> None:
             raise FormatError(
                 f"{path} ends early: its LAS header promises records and points behind its end; copy it again"
             )
+        end, promised = size, count
         if head[25] >= 4 and len(head) == HEADER_14 and length >= HEADER_14:
-            count = max(count, struct.unpack_from("<Q", head, 247)[0])
+            promised = struct.unpack_from("<Q", head, 247)[0]
+            count = max(count, promised)
             place, extended = struct.unpack_from("<QI", head, 235)
+            end = min(place, size) if extended else size
             for _ in range(extended):
                 file.seek(min(place, size))
                 entry = file.read(EXTENDED)
@@ -45,15 +49,27 @@ def check_header(path: Path) -> None:
                     raise FormatError(
                         f"{path} ends early: its LAS header promises records behind its end; copy it again"
                     )
+        if head[25] >= 3 and length >= WAVES + 8 and (waves := struct.unpack_from("<Q", head, WAVES)[0]):
+            end = min(waves, end)
         if form & 0xC0:
-            _check_packed(path, size, length, records, start, width, count)
+            room = _check_packed(path, size, length, records, start, width, count)
+            return said_of_room(path, promised, room)
     held = (size - start) // max(width, 1)
     if form < 64 and count > held:
         raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
+    whole = form < 64 and width > 0 and (end - start) % width == 0
+    return said_of_room(path, promised, (end - start) // width if whole else 0)
 
 
-def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int, count: int) -> None:
-    """Refuse packed points whose chunks are more or larger than the file."""
+def said_of_room(path: Path, count: int, room: int, of: str = "") -> tuple[str, ...]:
+    """Return a note where a file surely holds more points than are promised."""
+    if room <= count:
+        return ()
+    return (f"the header of {path.name} promises {count:,} points{of}, the file has {room:,}; the others are left out",)
+
+
+def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int, count: int) -> int:
+    """Refuse packed points whose chunks are more or larger than the file; return how many there are at least."""
     import lazrs
 
     early = FormatError(f"{path} ends early: the table of its packed points is not whole; copy it again")
@@ -90,6 +106,9 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
             place += long
             if place > table or len(told) < layers or int(told.sum(dtype=np.int64)) > long:
                 raise early
+        if lazrs.LazVlr(described).uses_variable_size_chunks():
+            return sum(points for points, _ in entries)
+        return sum(points for points, _ in entries[:-1]) + 1 if entries else 0
 
 
 def _find_record(file: BinaryIO, place: int, records: int, number: int) -> bytes:

@@ -29,6 +29,7 @@ def write_las(path: Path, points: np.ndarray, normals: np.ndarray | None, unit: 
         The points lie so densely in so wide a box that whole numbers of 32 bits cannot tell them apart.
     """
     import laspy
+    import lazrs
 
     header = laspy.LasHeader(point_format=0, version="1.2")
     header.creation_date = date(2000, 1, 1)  # the same points, the same bytes
@@ -43,6 +44,15 @@ def write_las(path: Path, points: np.ndarray, normals: np.ndarray | None, unit: 
         header.add_extra_dims([laspy.ExtraBytesParams(f"Normal{axis}", "f4") for axis in "XYZ"])
     if unit:
         header.vlrs.extend(_unit_records(unit))
+    try:
+        _write_points(path, header, points, normals)
+    except lazrs.LazrsError as error:  # what it makes of a disk that is full
+        raise OSError(str(error)) from None
+
+
+def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarray | None) -> None:
+    import laspy
+
     with path.open("wb") as file, laspy.open(file, "w", header=header, do_compress=_is_laz(path), closefd=False) as out:
         for begin in range(0, len(points), CHUNK):
             part = slice(begin, begin + CHUNK)

@@ -17,6 +17,7 @@ from .choose import check_attributes, choose, describe, places_in
 from .cloud import PointCloud
 from .content import Content
 from .copc import Place
+from .degrees import said_of_degrees
 from .e57 import read_e57
 from .kinds import read_head
 from .las import Places, read_las
@@ -99,7 +100,7 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     if not len(points):
         raise _nothing_left(files, parts)
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
-    return replace(cloud, notes=notes)
+    return replace(cloud, notes=(*notes, *cloud.notes, *said_of_degrees(cloud)))
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:

@@ -26,6 +26,7 @@ from ..kernels.thinning import (
     take_nearest,
 )
 from ..machine import in_parts
+from .wild import CAUSE
 
 FIRST_ROWS = 4096  # room of a new table
 GROWTH = 1.5  # of a table that is full
@@ -83,7 +84,11 @@ class Thinning:
         while (begin := add_points(self._table, points, begin, self.spacing)) < len(points):
             self._grow()
         if self._table.counters[TOO_FAR]:
-            raise InputError(f"spacing {self.spacing:g} is too small for points so far from zero; use a larger one")
+            most = np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0)
+            raise InputError(
+                f"spacing {self.spacing:g} is too small for points so far from zero, up to {most:.3g}; use a larger one, or where"
+                f" no part of the scan lies there {CAUSE} (--crop leaves these out)"
+            )
         self.points += len(points)
 
     def add_rows(self, part: Rows) -> None:

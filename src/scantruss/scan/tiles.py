@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
-from .arrays import metres_of_npz, read_array_header
+from .arrays import is_turned, metres_of_npz, read_array_header
 from .content import NAMES, Content, find_attributes
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 from .las_header import LASZIP, check_header
@@ -52,6 +52,7 @@ class Source:
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
     in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
+    notes: tuple[str, ...] = ()  #: what a user should know
 
     @property
     def whole(self) -> bool:
@@ -60,7 +61,8 @@ class Source:
 
     def said_of(self, content: Content) -> Content:
         """Return some of its points with what the header says of their units."""
-        return replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
+        said = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
+        return replace(said, notes=(*content.notes, *self.notes)) if self.notes else said
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,7 @@ def _las(path: Path, head: bytes) -> Source:
     import laspy
 
     try:
-        check_header(path)
+        notes = check_header(path)
         with laspy.open(path) as file:
             header = file.header
             system = system_of([*header.vlrs, *(header.evlrs or [])])
@@ -160,6 +162,7 @@ def _las(path: Path, head: bytes) -> Source:
                 system=system.name,
                 degrees=system.degrees,
                 in_one=_has_uneven_chunks(header),
+                notes=notes,
             )
     except FormatError:
         raise
@@ -208,7 +211,7 @@ def _npy(path: Path) -> Source | None:
         if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
             return _rows(path, shape[0], start, kind)
         return None
-    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or by_columns or kind.kind not in "fiu":
+    if len(shape) != 2 or not 3 <= shape[1] <= MOST_COLUMNS or is_turned(shape) or by_columns or kind.kind not in "fiu":
         return None
     names = ["x", "y", "z", *(f"other {c}" for c in range(3, shape[1]))]
     return _rows(path, shape[0], start, np.dtype([(name, kind) for name in names]))

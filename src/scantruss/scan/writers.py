@@ -13,6 +13,8 @@ from ..settings import UNITS
 from .las_writer import write_las
 from .units import check_unit
 
+CUT_SHORT = "only a part of it could be written; the disk may be full"
+
 
 class Cloud(NamedTuple):
     """What a writer is given."""
@@ -52,7 +54,7 @@ def write_points(
     normals : (N, 3) array, optional
         Kept by all formats.
     unit : str
-        Written where the format can say it.
+        Written where the format can say it; text files say it in the names of their columns (CSV) or in a comment.
     origin : (3,) array, optional
         A place near the points, from which LAS counts.
 
@@ -72,7 +74,7 @@ def write_points(
     try:
         writer(path, cloud)
     except OSError as error:
-        raise FormatError(f"cannot write {path}: {error.strerror or error}") from None
+        raise FormatError(f"cannot write {path}: {error.strerror or CUT_SHORT}") from None
 
 
 def check_cloud_output(path: str | Path) -> Path:
@@ -134,7 +136,11 @@ def _write_text(path: Path, cloud: Cloud) -> None:
     sign = "," if path.suffix.lower() == ".csv" else " "
     with path.open("w", encoding="utf-8", newline="\n") as file:
         if sign == ",":
-            file.write(sign.join(cloud.names("nx", "ny", "nz")) + "\n")
+            unit = f" [{cloud.unit}]" if cloud.unit else ""
+            axes, normal = (cloud.names("nx", "ny", "nz")[part] for part in (slice(3), slice(3, None)))
+            file.write(sign.join([*(axis + unit for axis in axes), *normal]) + "\n")
+        elif cloud.unit:
+            file.write(f"# unit: {cloud.unit}\n")
         columns = cloud.columns
         for begin in range(0, len(columns), 1 << 16):
             rows = columns[begin : begin + (1 << 16)].tolist()
