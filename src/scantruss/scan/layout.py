@@ -91,16 +91,21 @@ def _split_quoted(text: str, separator: str) -> list[str]:
 
 def is_number(field: str, comma: bool) -> bool:
     """Return whether a field is a number, or a word for a missing one."""
-    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or field.lower() in MISSING
+    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or _is_missing(field)
 
 
 def number_of(field: str, comma: bool) -> float:
     """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
     if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
         return float(re.sub("[dD]", "e", field.replace(",", ".")))
-    if not field or field.lower() in MISSING:
+    if not field or _is_missing(field):
         return math.nan
     raise ValueError(field)
+
+
+def _is_missing(field: str) -> bool:
+    """Whether a field is a word for a missing number, or the stars for one that a program had no room for."""
+    return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
 
 
 def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
@@ -125,6 +130,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     if len(data) * 2 < behind or len(columns) < 3:
         raise wrong_kind(path, head, "a text file of points")
     layout = _finish(start, data, columns, encoding, separator, comma)
+    _check_no_points(path, start[: layout.skip], separator, comma)
     lines = list(_header_names(start[: layout.skip], separator))
     if not layout.named:
         for names in lines:
@@ -176,6 +182,19 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
             grouped = [field for field in fields if GROUPED.fullmatch(field)]
             if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
                 raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
+
+
+def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:
+    """Refuse points above the first line that is split as most are: with another separator they would pass for a header."""
+    for number, line in enumerate(header, start=1):
+        fields = split_line(line, ANY)
+        if len(fields) >= 3 > _count_numbers(split_line(line, separator), comma) and all(
+            is_number(field, False) for field in fields
+        ):
+            raise FormatError(
+                f"{path}: line {number} ({line.strip()[:60]!r}) holds numbers with another separator than most lines;"
+                " mend or delete it"
+            )
 
 
 def _count_numbers(row: Sequence[str], comma: bool) -> int:

@@ -237,7 +237,7 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     points = min(points, (size - start) // LEAST_LINE + 1)
     columns = layout.columns
     if len(columns) == 4:
-        columns = columns[1:] if _counts(path, layout, size) else columns[:3]
+        columns = columns[1:] if _counts(path, layout, start, size) else columns[:3]
     return Source(
         path,
         "text",
@@ -251,16 +251,18 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     )
 
 
-def _counts(path: Path, layout: Layout, size: int) -> bool:
+def _counts(path: Path, layout: Layout, start: int, size: int) -> bool:
     """Whether the first of four columns is a running number at the start, in the middle and at the end of a text."""
     from .chunks import text_rows
 
-    for begin in {0, size // 2, max(size - (1 << 14), 0)}:
+    for place in {start, size // 2, max(size - (1 << 14), start)}:
         with path.open("rb") as file:
-            file.seek(begin)
-            lines = file.read(1 << 14).split(b"\n")
-        lines = lines[layout.skip if begin == 0 else 1 : -1 if begin + (1 << 14) < size else None]
-        rows = text_rows(path, b"\n".join(lines), layout, layout.columns)
+            file.seek(place)
+            if place > start:
+                file.readline()
+            begin = file.tell()
+            lines = file.read(1 << 14) + file.readline()
+        rows = text_rows(path, lines, layout, layout.columns, begin).rows
         if len(rows) > 1 and not (np.diff(rows[:, 0]) == 1).all():
             return False
     return True

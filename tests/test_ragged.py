@@ -1,0 +1,102 @@
+"""Text files that change part way: no line is lost without a word, and every way of reading says the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scantruss.errors import FormatError
+from scantruss.scan import chunks, text
+from scantruss.scan.chunks import read_chunks
+from scantruss.scan.readers import add_counts, read_points
+from scantruss.scan.tiles import find_source, tiles_of
+
+P = np.round(np.random.default_rng(5).random((60, 3)) * [90, 70, 20] - 10, 3)
+
+
+def lines(sign: str = ",", first: int = 0, stop: int = 60) -> list[str]:
+    return [sign.join(f"{c:.3f}" for c in p) for p in P[first:stop]]
+
+
+def in_memory(path: Path) -> tuple[np.ndarray, tuple[str, ...]]:
+    cloud = read_points(path)
+    return cloud.points + cloud.origin, tuple(note for note in cloud.notes if "left out" in note)
+
+
+def in_tiles(path: Path) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Read as `thin` does: in four tiles."""
+    source = find_source(path)
+    got = [chunk for tile in tiles_of([source], max(source.points // 4, 1)) for chunk in read_chunks(tile)]
+    left_out = add_counts([chunk.left_out for chunk in got])
+    return np.concatenate([chunk.points for chunk in got]), tuple(
+        f"{n:,} points {w} are left out" for w, n in left_out.items() if n
+    )
+
+
+def every_way(path: Path, rows: list[str]) -> list:
+    """Return points and what was left out, or the refusal, by each way of reading."""
+    path.write_text("\n".join(rows) + "\n")
+    told = []
+    for large in (1 << 23, 0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(text, "LARGE", large)
+            patch.setattr(chunks, "LARGE", large)
+            for read in (in_memory, in_tiles):
+                try:
+                    told.append(read(path))
+                except FormatError as error:
+                    told.append(str(error))
+    return told
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("rows", "number"),
+    [
+        (["x,y,z", *lines(",", 0, 30), *lines(";", 30)], 2),
+        (["x,y,z", *lines(",", 0, 40), *lines(";", 40)], 42),
+        ([*lines(",", 0, 30), *lines(" ", 30)], 31),
+        ([*lines(" ", 0, 50), *lines(",", 50)], 51),
+        ([*lines(",", 0, 40), "1;2;3", *lines(",", 40)], 41),
+        ([*lines(",", 0, 40), "1|2|3", *lines(",", 40)], 41),
+        ([*lines("\t", 0, 40), "1 2;3", *lines("\t", 40)], 41),
+        ([*lines(" ", 0, 40), "1,5 2,5 3,5", *lines(" ", 40), "1,,2"], 62),
+        ([*lines(";", 0, 40), "1,5 2,5 3,5", *lines(";", 40)], 41),
+        ([*lines(" ", 0, 59), "1.0 and words", *lines(" ", 59)], 60),
+    ],
+)
+def test_a_line_of_numbers_that_is_no_point_is_refused_by_its_number(
+    rows: list[str], number: int, tmp_path: Path
+) -> None:
+    told = every_way(tmp_path / "a.txt", rows)
+    assert all(isinstance(said, str) and f"line {number} (" in said for said in told) and len(set(told)) == 1
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("odd", "left"),
+    [
+        ([",,", ",,,", ","], ("3 points without coordinates are left out",)),
+        (["Page B of the roof", "x,y,z", "# 1;2;3"], ()),
+    ],
+)
+def test_lines_without_numbers_are_counted_where_they_are_points(
+    odd: list[str], left: tuple[str, ...], tmp_path: Path
+) -> None:
+    for points, said in every_way(tmp_path / "a.csv", ["x,y,z", *lines(stop=40), *odd, *lines(first=40)]):
+        assert np.array_equal(points, P) and said == left
+
+
+def test_stars_for_numbers_too_long_are_missing_values(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([*lines(stop=40), "***,***,***", "1.0,****,2.0", *lines(first=40)]))
+    cloud = read_points(path)
+    assert (len(cloud.points), cloud.dropped) == (60, 2)
+
+
+def test_a_count_line_is_held_against_empty_lines_too(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("\n".join(["62", *lines(), ",,"]))
+    with pytest.raises(FormatError, match="promises 62 points, got 61"):
+        read_points(tmp_path / "a.csv")
