@@ -12,6 +12,7 @@ from scantruss.scan import chunks, text
 from scantruss.scan.chunks import read_chunks
 from scantruss.scan.readers import add_counts, read_points
 from scantruss.scan.tiles import find_source, tiles_of
+from scantruss.selection import Selection
 
 P = np.round(np.random.default_rng(5).random((60, 3)) * [90, 70, 20] - 10, 3)
 
@@ -100,3 +101,54 @@ def test_a_count_line_is_held_against_empty_lines_too(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("\n".join(["62", *lines(), ",,"]))
     with pytest.raises(FormatError, match="promises 62 points, got 61"):
         read_points(tmp_path / "a.csv")
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("head", "again", "number"),
+    [
+        ("x,y,z", "y,x,z", 32),
+        ("x,y,z", "id,x,y,z", 32),
+        ("x,y,z", "# y,x,z", 32),
+        ("x,y,z", "//Z,Y,X", 32),
+        ("x,y,z", "Easting,Northing,Height,x,y,z", 32),
+        ("x [mm],y [mm],z [mm]", "x [m],y [m],z [m]", 32),
+        ("# a scan", "z,y,x", 32),
+    ],
+)
+def test_a_second_header_of_other_columns_is_refused(head: str, again: str, number: int, tmp_path: Path) -> None:
+    width = len(again.split(","))
+    rows = [head, *lines(stop=30), again, *(",".join([*["7"] * (width - 3), row]) for row in lines(first=30))]
+    told = every_way(tmp_path / "a.csv", rows)
+    assert all(isinstance(said, str) and f"line {number} (" in said for said in told) and len(set(told)) == 1
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("head", "again"),
+    [
+        ("x,y,z", "x,y,z"),
+        ("x,y,z", "X, Y, Z"),
+        ("# x y z", "# x y z"),
+        ("x,y,z", "# part 2: x y z"),
+        ("x,y,z", "# of max, and such"),
+        ("# a scan", "x,y,z"),
+        ("y,x,z", "y,x,z"),
+    ],
+)
+def test_a_second_header_that_says_the_same_is_harmless(head: str, again: str, tmp_path: Path) -> None:
+    order = [1, 0, 2] if head[0] == "y" else [0, 1, 2]
+    for points, left in every_way(tmp_path / "a.csv", [head, *lines(stop=30), again, *lines(first=30)]):
+        assert np.array_equal(points, P[:, order]) and left == ()
+
+
+def test_a_second_header_with_the_classes_elsewhere_is_refused(tmp_path: Path) -> None:
+    rows = [
+        "x,y,z,class,i",
+        *(f"{row},2,6" for row in lines(stop=30)),
+        "x,y,z,i,class",
+        *(f"{row},6,2" for row in lines(first=30)),
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    with pytest.raises(FormatError, match=r"line 32 .* names the columns again"):
+        read_points(tmp_path / "a.csv", selection=Selection(classes=(2,)))

@@ -17,7 +17,7 @@ from .copc import Place
 from .kinds import unreadable
 from .las import check_count, fields_for, fields_of, records_near, take
 from .lines import LARGE, read_block
-from .ragged import EMPTY, Ragged, read_ragged
+from .ragged import EMPTY, Ragged, is_plain, read_ragged
 from .readers import places_in_file, read_content, select
 
 if TYPE_CHECKING:
@@ -207,7 +207,7 @@ def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], 
     if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
         return Ragged(rows, 0, 0)
     try:
-        if b".#" in block:
+        if not is_plain(block, layout):
             raise ValueError
         lines = block.replace(b",", b".") if layout.comma else block
         rows = np.loadtxt(

@@ -58,6 +58,7 @@ class Layout:
     attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
     metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
     z_metres: float | None = None  #: ... of z
+    header: tuple[str, ...] = ()  #: the lines before the first point
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -131,7 +132,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
         raise wrong_kind(path, head, "a text file of points")
     layout = _finish(start, data, columns, encoding, separator, comma)
     _check_no_points(path, start[: layout.skip], separator, comma)
-    lines = list(_header_names(start[: layout.skip], separator))
+    lines = list(header_names(start[: layout.skip], separator))
     if not layout.named:
         for names in lines:
             check_not_degrees(path, names)
@@ -142,7 +143,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
         by_name = metres_of_columns([names[column] for column in layout.columns])
         metres, z_metres = by_name if by_name[0] else (metres, z_metres)
     attributes = tuple(max(found, key=len, default={}).items())
-    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres)
+    header = tuple(line.strip() for line in start[: layout.skip])
+    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=header)
 
 
 def _encoding(head: bytes) -> str:
@@ -262,7 +264,7 @@ def _named_columns(
 ) -> tuple[int, int, int] | None:
     """Return the columns of x, y, z from the header line that names them, the one nearest to the points first."""
     for exact in (True, False):
-        for names in _header_names(header, separator):
+        for names in header_names(header, separator):
             if len(names) >= 3 and (len(names) == width or not exact):
                 columns = fit_columns(names, width, has_row_names)
                 if columns:
@@ -270,7 +272,7 @@ def _named_columns(
     return None
 
 
-def _header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
+def header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
     """Yield the header lines split by every separator in turn, the line nearest to the points first."""
     for line in reversed(header):
         text = line.strip().lstrip("#/%!;* \t").strip()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Callable, Iterable, Sequence
+from mmap import mmap
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..errors import FormatError
 from .layout import NUMBER, NUMBER_COMMA, Layout, is_number, number_of, split_line
+from .renamed import Names, check_names, find_names, has_names_in_comments
 
 EMPTY = "without coordinates"  # what is said of lines whose fields are empty
 _BREAKS = re.compile(r"[,;|\s]+")
@@ -23,6 +25,13 @@ class Ragged(NamedTuple):
     rows: np.ndarray  #: (N, columns) float64
     promised: int  #: points that count lines among them promise
     empty: int  #: lines of separators alone
+
+
+def is_plain(data: bytes | mmap, layout: Layout) -> bool:
+    """Whether a reader that skips what follows a # misses nothing."""
+    if data.find(b"#") < 0:
+        return True
+    return layout.encoding != "utf-16" and data.find(b".#") < 0 and not has_names_in_comments(data, layout)
 
 
 def read_ragged(
@@ -46,9 +55,10 @@ def read_ragged(
     Raises
     ------
     FormatError
-        A line holds numbers, but not those that are wanted.
+        A line holds numbers, but not those that are wanted; or it names other columns than the header.
     """
     values, promised, empty = array("d"), 0, 0
+    names: Names | None = None
     needed = columns[: len(columns) - len(layout.attributes)]
     for number, line in enumerate(lines, start=1):
         row = split_line(line.rstrip("\n"), layout.separator)
@@ -61,11 +71,18 @@ def read_ragged(
                 raise _no_point(path, layout, count_before() + number, row) from None
             elif row and not any(row):
                 empty += 1
+            else:
+                names = find_names(number, line, layout) or names
             continue
+        if names:
+            check_names(path, names, row, layout, count_before())
+            names = None
         if any(row[column] for column in needed):
             values.extend(point)
         else:
             empty += 1
+    if names and not names.in_comment:  # its points are in the next block
+        check_names(path, names, names.names, layout, count_before())
     return Ragged(np.array(values).reshape(-1, len(columns)), promised, empty)
 
 

@@ -14,7 +14,7 @@ from ..errors import FormatError
 from .content import Content
 from .layout import ANY, Layout, find_layout
 from .lines import LARGE, read_regular
-from .ragged import EMPTY, Ragged, read_ragged
+from .ragged import EMPTY, Ragged, is_plain, read_ragged
 
 
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -46,7 +46,7 @@ def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray
         raise ValueError
     if path.stat().st_size > LARGE and (rows := read_regular(path, layout, columns)) is not None:
         return rows
-    if _holds(path, b".#"):
+    if not _is_plain(path, layout):
         raise ValueError
     source: Path | StringIO = path
     if layout.comma:
@@ -62,9 +62,9 @@ def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray
     )
 
 
-def _holds(path: Path, sign: bytes) -> bool:
+def _is_plain(path: Path, layout: Layout) -> bool:
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        return data.find(sign) >= 0
+        return is_plain(data, layout)
 
 
 def _read_lines(path: Path, layout: Layout, columns: Sequence[int]) -> Ragged:
