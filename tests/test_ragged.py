@@ -152,3 +152,33 @@ def test_a_second_header_with_the_classes_elsewhere_is_refused(tmp_path: Path) -
     (tmp_path / "a.csv").write_text("\n".join(rows))
     with pytest.raises(FormatError, match=r"line 32 .* names the columns again"):
         read_points(tmp_path / "a.csv", selection=Selection(classes=(2,)))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("head", [[], ["x,y,z"], ['"x","y","z"']])
+@pytest.mark.parametrize("odd", [[], ["# a comment", '"","",""']])
+def test_quoted_decimal_commas_between_commas(head: list[str], odd: list[str], tmp_path: Path) -> None:
+    rows = [",".join(f'"{c:.3f}"'.replace(".", ",") for c in p) for p in P]
+    for points, _ in every_way(tmp_path / "a.csv", [*head, *rows[:40], *odd, *rows[40:]]):
+        assert np.array_equal(points, P)
+
+
+def test_whole_numbers_beside_quoted_decimal_commas(tmp_path: Path) -> None:
+    points = np.round(P * 2) / 2
+    rows = [",".join(f'"{c:g}"'.replace(".", ",") if c % 1 else f"{c:g}" for c in p) + ",7,8,9" for p in points]
+    for got, _ in every_way(tmp_path / "a.csv", rows):
+        assert np.array_equal(got, points)
+
+
+def test_quoted_commas_that_may_stand_between_thousands_are_refused(tmp_path: Path) -> None:
+    for odd in ("789", "789.25"):
+        told = every_way(tmp_path / "a.csv", [f'"1,234","23,456",{odd}', '"2,234","3,456","9,789"'] * 9)
+        assert all("decimal sign or stand between thousands" in said for said in told) and len(set(told)) == 1
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("sign", [";", " ", "\t", "|"])
+def test_colours_do_not_hide_decimal_commas(sign: str, tmp_path: Path) -> None:
+    rows = [line.replace(".", ",") + sign + sign.join("234") for line in lines(sign)]
+    for points, _ in every_way(tmp_path / "a.csv", rows):
+        assert np.array_equal(points, P)

@@ -24,6 +24,7 @@ ANY = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)")
 MISSING = frozenset(
     [
@@ -38,6 +39,7 @@ GRAMMARS: tuple[tuple[str | None, bool], ...] = (
     (",", False),
     (None, False),
     (None, True),
+    (",", True),  # "1,5","2,5","3,5"
     (ANY, False),
 )
 _REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
@@ -59,6 +61,11 @@ class Layout:
     metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
     z_metres: float | None = None  #: ... of z
     header: tuple[str, ...] = ()  #: the lines before the first point
+
+    @property
+    def plain(self) -> bool:
+        """Whether one sign, which is no decimal sign too, stands between two numbers."""
+        return self.separator != ANY and not (self.separator == "," and self.comma)
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -122,6 +129,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     separator, comma = _find_grammar(rows)
     if separator == ANY:
         _check_not_grouped(path, rows)
+    if (separator, comma) == (",", True):
+        _check_not_thousands(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
     data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
@@ -173,7 +182,14 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
         return GRAMMARS[-1]
-    return GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+    separator, comma = GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+    return separator, comma or _has_decimal_commas(lines, separator)
+
+
+def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
+    """Whether one line of ten holds more numbers with decimal commas: 1,5;2,5;3,5;200;100;50 has three without."""
+    split = [split_line(line, separator) for line in lines]
+    return 10 * sum(_count_numbers(row, True) > _count_numbers(row, False) for row in split) > len(split)
 
 
 def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
@@ -184,6 +200,16 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
             grouped = [field for field in fields if GROUPED.fullmatch(field)]
             if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
                 raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
+
+
+def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
+    """Refuse "1,234","2,345" where nothing tells that the commas within the quotes are decimal signs."""
+    fields = [field for row in rows for field in split_line(row, ",") if NUMBER_COMMA.fullmatch(field)]
+    if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
+        said = next(field for field in fields if "," in field)
+        raise FormatError(
+            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with points'
+        )
 
 
 def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:

@@ -28,7 +28,9 @@ class Ragged(NamedTuple):
 
 
 def is_plain(data: bytes | mmap, layout: Layout) -> bool:
-    """Whether a reader that skips what follows a # misses nothing."""
+    """Whether a reader that knows one separator and skips what follows a # misses nothing."""
+    if not layout.plain:
+        return False
     if data.find(b"#") < 0:
         return True
     return layout.encoding != "utf-16" and data.find(b".#") < 0 and not has_names_in_comments(data, layout)

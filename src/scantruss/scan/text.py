@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FormatError
 from .content import Content
-from .layout import ANY, Layout, find_layout
+from .layout import Layout, find_layout
 from .lines import LARGE, read_regular
 from .ragged import EMPTY, Ragged, is_plain, read_ragged
 
@@ -42,7 +42,7 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
     """Return the columns of a regular file; ValueError where it is not."""
-    if layout.separator == ANY:
+    if not layout.plain:
         raise ValueError
     if path.stat().st_size > LARGE and (rows := read_regular(path, layout, columns)) is not None:
         return rows
