@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scantruss.errors import FormatError
+from scantruss.errors import FormatError, InputError
 from scantruss.scan import chunks, text
 from scantruss.scan.chunks import read_chunks
 from scantruss.scan.readers import add_counts, read_points
@@ -182,3 +182,24 @@ def test_colours_do_not_hide_decimal_commas(sign: str, tmp_path: Path) -> None:
     rows = [line.replace(".", ",") + sign + sign.join("234") for line in lines(sign)]
     for points, _ in every_way(tmp_path / "a.csv", rows):
         assert np.array_equal(points, P)
+
+
+def test_x_and_y_in_different_units_are_refused_and_heights_are_brought_to_theirs(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    for names in ("X (mm),Y (m),Z (mm)", "x_ft,y_m,z_m"):
+        path.write_text("\n".join([names, *lines()]))
+        for read in (in_memory, in_tiles):
+            with pytest.raises(InputError, match=r"has x in (mm|foot) and y in m by the names"):
+                read(path)
+    path.write_text("\n".join(["X (m),Y (m),Z (mm)", *lines()]))
+    assert np.allclose(in_memory(path)[0], P / [1, 1, 1000])
+
+
+def test_parquet_with_x_and_y_in_different_units_is_refused(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(
+        pyarrow.table(dict(zip(["x [mm]", "y [m]", "z [m]"], P.T, strict=True))), tmp_path / "a.parquet"
+    )
+    with pytest.raises(InputError, match="has x in mm and y in m"):
+        read_points(tmp_path / "a.parquet")

@@ -149,7 +149,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     found = [find_attributes(names, wanted) for names in fitting]
     metres, z_metres = metres_of_comments(start[: layout.skip]), None
     for names in fitting if layout.named else ():
-        by_name = metres_of_columns([names[column] for column in layout.columns])
+        by_name = metres_of_columns(path, [names[column] for column in layout.columns])
         metres, z_metres = by_name if by_name[0] else (metres, z_metres)
     attributes = tuple(max(found, key=len, default={}).items())
     header = tuple(line.strip() for line in start[: layout.skip])
