@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scan_files import pcd
 
 from scantruss.errors import FormatError, InputError
 from scantruss.scan import chunks, text
 from scantruss.scan.chunks import read_chunks
 from scantruss.scan.readers import add_counts, read_points
+from scantruss.scan.streaming import thin_scan
 from scantruss.scan.tiles import find_source, tiles_of
 from scantruss.selection import Selection
 
@@ -203,3 +205,28 @@ def test_parquet_with_x_and_y_in_different_units_is_refused(tmp_path: Path) -> N
     )
     with pytest.raises(InputError, match="has x in mm and y in m"):
         read_points(tmp_path / "a.parquet")
+
+
+def test_more_points_than_a_count_line_promises_are_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.pts"
+    for rows, promised in (
+        (["50", *lines(" ")], 50),
+        (["30", *lines(" ", stop=40), "15", *lines(" ", first=40)], 45),
+    ):
+        path.write_text("\n".join(rows))
+        note = f"a.pts promises {promised} points and holds 60; all of them are read"
+        cloud = read_points(path)
+        assert len(cloud.points) == 60 and note in cloud.notes and note in thin_scan(path, 5.0).notes
+    path.write_text("\n".join(["60", *lines(" ")]))
+    assert read_points(path).notes == thin_scan(path, 5.0).notes == ()
+
+
+@pytest.mark.parametrize("data", ["ascii", "binary"])
+def test_a_pcd_file_that_holds_more_than_it_promises_is_said(data: str, tmp_path: Path) -> None:
+    whole = pcd(list(zip("xyz", ["f8"] * 3, P.T, strict=True)), data)
+    (tmp_path / "a.pcd").write_bytes(whole.replace(b"60", b"55", 2))
+    cloud = read_points(tmp_path / "a.pcd")
+    assert len(cloud.points) == (60 if data == "ascii" else 55) and len(cloud.notes) == 1
+    assert ("promises 55 points and holds 60" if data == "ascii" else "120 bytes behind") in cloud.notes[0]
+    (tmp_path / "a.pcd").write_bytes(whole)
+    assert read_points(tmp_path / "a.pcd").notes == ()

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FormatError
-from .content import Content
+from .content import Content, said_of_more
 from .layout import Layout, find_layout
 from .lines import LARGE, read_regular
 from .ragged import EMPTY, Ragged, is_plain, read_ragged
@@ -36,8 +36,9 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
         running = bool((np.diff(points[:, 0]) == 1).all())
         points = points[:, 1:] if running else points[:, :3]
     attributes = {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)}
+    notes = [said_of_more(path.name, held, promised)] if layout.promised is not None and held > promised else []
     left_out = {EMPTY: empty} if empty else {}
-    return Content(points, attributes, layout.metres, layout.z_metres, left_out=left_out)
+    return Content(points, attributes, layout.metres, layout.z_metres, notes=tuple(notes), left_out=left_out)
 
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
