@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -230,3 +231,60 @@ def test_a_pcd_file_that_holds_more_than_it_promises_is_said(data: str, tmp_path
     assert ("promises 55 points and holds 60" if data == "ascii" else "120 bytes behind") in cloud.notes[0]
     (tmp_path / "a.pcd").write_bytes(whole)
     assert read_points(tmp_path / "a.pcd").notes == ()
+
+
+def numbered(numbers: Iterable[object]) -> list[str]:
+    return [f"{number} {line}" for number, line in zip(numbers, lines(" "), strict=True)]
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [
+        (range(60), None),
+        ([*range(7, 30), *range(31, 68)], "is taken as the number of a point"),
+        (range(1_600_000_000, 1_600_000_600, 10), "is taken as the number of a point"),
+    ],
+)
+def test_a_first_column_of_whole_numbers_that_only_rise_is_no_coordinate(
+    numbers: Iterable[int], words: str | None, tmp_path: Path
+) -> None:
+    for points, _ in every_way(tmp_path / "a.txt", numbered(numbers)):
+        assert np.array_equal(points, P)
+    for notes in (read_points(tmp_path / "a.txt").notes, thin_scan(tmp_path / "a.txt", 5.0).notes):
+        assert any(words in note for note in notes) if words else not notes
+
+
+def test_a_first_column_that_only_rises_otherwise_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(numbered(1_600_000_000 + np.arange(60) / 4)))
+    for notes in (read_points(path).notes, thin_scan(path, 5.0).notes):
+        assert any("only rises, as times do" in note for note in notes)
+
+
+def test_three_columns_sorted_by_x_are_as_they_were(tmp_path: Path) -> None:
+    points = np.column_stack([np.arange(60.0) * 2, P[:, 1:]])
+    for head in ([], ["x y z i"]):
+        more = " 5" if head else ""
+        rows = [*head, *(" ".join(f"{c:g}" for c in p) + more for p in points)]
+        for got, _ in every_way(tmp_path / "a.txt", rows):
+            assert np.allclose(got, points)
+        assert not read_points(tmp_path / "a.txt").notes and not thin_scan(tmp_path / "a.txt", 5.0).notes
+
+
+def test_plain_numbers_of_a_long_file_need_no_word(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(f"{n} {P[n % 60][0]} {P[n % 60][1]} {P[n % 60][2]}" for n in range(40_000)))
+    assert read_points(path).notes == thin_scan(path, 5.0).notes == ()
+
+
+def test_numbers_that_start_again_are_said_or_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    many = [*range(40_000), *range(40_000)]
+    path.write_text("\n".join(f"{n} {P[n % 60][0]} {P[n % 60][1]} {P[n % 60][2]}" for n in many))
+    assert any("counts up at the start, but not all through" in note for note in read_points(path).notes)
+    try:
+        notes = thin_scan(path, 5.0).notes
+    except FormatError as error:
+        notes = (str(error),)
+    assert any("counts up at the start, but not all through" in note for note in notes)

@@ -19,6 +19,7 @@ from .las import check_count, fields_for, fields_of, records_near, take
 from .lines import LARGE, read_block
 from .ragged import EMPTY, Ragged, is_plain, read_ragged
 from .readers import places_in_file, read_content, select
+from .rising import NAME_IT, is_number_of_point
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -198,8 +199,15 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             if block.strip():
                 rows, promised, empty = text_rows(source.path, block, layout, columns, at)
                 counts.append(promised)
+                if len(source.columns) == 4:
+                    if not is_number_of_point(rows[:, 0]):
+                        raise FormatError(
+                            f"{source.path}: its first column counts up at the start, but not all through; {NAME_IT}"
+                        )
+                    rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
-                yield source.said_of(Content(rows[:, :3], more, left_out={EMPTY: empty} if empty else {}))
+                left_out = {EMPTY: empty} if empty else {}
+                yield source.said_of(Content(rows[:, :3], more, notes=source.notes, left_out=left_out))
 
 
 def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Ragged:

@@ -258,10 +258,10 @@ def _finish(
         skip, columns = data[1][0], (first, first + 1, first + 2)
         return Layout(encoding, separator, comma, skip, columns, None, width)
     skip = data[0][0]
-    running = _is_running([row[0] for _, row in data])
+    running, rising = _is_running([row[0] for _, row in data])
     named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
     counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
-    four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
+    four = rising and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
     chosen = named or tuple(numeric[: 4 if four else 3])
     promised = int(counts[-1]) if counts else None
     return Layout(encoding, separator, comma, skip, chosen, promised, width, named is not None)
@@ -278,11 +278,12 @@ def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
     return names == counted and any("." in field or "," in field for field in data[1][1][:3])
 
 
-def _is_running(fields: Sequence[str]) -> bool:
-    """Return whether the fields are whole numbers, each one more than the one before."""
+def _is_running(fields: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the fields are whole numbers, each one more than the one before, and whether each is larger."""
     if len(fields) < 3 or not all(re.fullmatch(r"\d{1,15}", field) for field in fields):
-        return False
-    return bool((np.diff([int(field) for field in fields]) == 1).all())
+        return False, False
+    steps = np.diff([int(field) for field in fields])
+    return bool((steps == 1).all()), bool((steps > 0).all())
 
 
 def _named_columns(

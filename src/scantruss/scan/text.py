@@ -15,6 +15,7 @@ from .content import Content, said_of_more
 from .layout import Layout, find_layout
 from .lines import LARGE, read_regular
 from .ragged import EMPTY, Ragged, is_plain, read_ragged
+from .rising import is_number_of_point, said_of_first
 
 
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -33,12 +34,13 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
         )
     points, more = rows[:, :width], rows[:, width:]
     if width == 4:  # the first column may be a running number
-        running = bool((np.diff(points[:, 0]) == 1).all())
-        points = points[:, 1:] if running else points[:, :3]
+        points = points[:, 1:] if is_number_of_point(rows[:, 0]) else points[:, :3]
     attributes = {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)}
-    notes = [said_of_more(path.name, held, promised)] if layout.promised is not None and held > promised else []
+    notes = said_of_first(path.name, layout, rows[:, 0])
+    if layout.promised is not None and held > promised:
+        notes = (*notes, said_of_more(path.name, held, promised))
     left_out = {EMPTY: empty} if empty else {}
-    return Content(points, attributes, layout.metres, layout.z_metres, notes=tuple(notes), left_out=left_out)
+    return Content(points, attributes, layout.metres, layout.z_metres, notes=notes, left_out=left_out)
 
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
