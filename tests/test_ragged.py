@@ -288,3 +288,9 @@ def test_numbers_that_start_again_are_said_or_refused(tmp_path: Path) -> None:
     except FormatError as error:
         notes = (str(error),)
     assert any("counts up at the start, but not all through" in note for note in notes)
+
+
+def test_the_header_itself_leaves_a_file_to_the_fast_ways(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.txt").write_text("\n".join(["# x y z", *lines(" "), "# x y z", "# the end"]))
+    monkeypatch.setattr(text, "read_ragged", lambda *_: pytest.fail("line by line"))
+    assert np.array_equal(in_memory(tmp_path / "a.txt")[0], P)

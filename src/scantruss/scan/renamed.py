@@ -14,7 +14,7 @@ from .content import find_attributes
 from .layout import COMMENT, Layout, header_names
 from .units import metres_of_columns
 
-_WORDS = re.compile(rb"^[ \t]*#([^\r\n]*[A-Za-z][^\r\n]*)", re.MULTILINE)
+_WORDS = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
 
 
 class Names(NamedTuple):
@@ -42,7 +42,7 @@ def find_names(number: int, line: str, layout: Layout) -> Names | None:
 
 def has_names_in_comments(data: bytes | mmap, layout: Layout) -> bool:
     """Whether a comment with # may name columns, which who skips comments would not see."""
-    return any(find_names(0, match[1].decode("latin-1"), layout) for match in _WORDS.finditer(data))
+    return any(find_names(0, match[0].decode("latin-1"), layout) for match in _WORDS.finditer(data))
 
 
 def check_names(path: Path, names: Names, row: Sequence[str], layout: Layout, before: int) -> None:
