@@ -173,10 +173,10 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_
     layout = find_layout(path, ("class",))
     columns = (*layout.columns, layout.attributes[0][1])
     block = FILES["a.csv"].split(b"\n", 1)[1]
-    wanted = text_rows(path, block, layout, columns)
+    wanted = text_rows(path, block, layout, columns, 0).rows
     monkeypatch.setattr(chunks, "LARGE", 100)
     monkeypatch.setattr(np, "loadtxt", None)
-    found = text_rows(path, block, layout, columns)
+    found = text_rows(path, block, layout, columns, 0).rows
     assert found.tobytes() == wanted.tobytes() and np.array_equal(found[:, 3], CLASS)
 
 

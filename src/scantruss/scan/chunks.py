@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from io import BytesIO
+from io import BytesIO, StringIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,13 +16,15 @@ from .content import Content, find_attributes
 from .copc import Place
 from .kinds import unreadable
 from .las import check_count, fields_for, fields_of, records_near, take
-from .layout import Layout, is_number, number_of, split_line
 from .lines import LARGE, read_block
+from .ragged import EMPTY, Ragged, is_plain, read_ragged
 from .readers import places_in_file, read_content, select
+from .rising import NAME_IT, is_number_of_point
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from .layout import Layout
     from .tiles import Source, Tile
 
 CHUNK = 1_000_000  # points
@@ -197,48 +199,41 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
-                rows = text_rows(source.path, block, layout, columns, f", after byte {at:,}", counts)
+                rows, promised, empty = text_rows(source.path, block, layout, columns, at)
+                counts.append(promised)
+                if len(source.columns) == 4:
+                    if not is_number_of_point(rows[:, 0]):
+                        raise FormatError(
+                            f"{source.path}: its first column counts up at the start, but not all through; {NAME_IT}"
+                        )
+                    rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
-                yield source.said_of(Content(rows[:, :3], more))
+                left_out = {EMPTY: empty} if empty else {}
+                yield source.said_of(Content(rows[:, :3], more, notes=source.notes, left_out=left_out))
 
 
-def text_rows(
-    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str = "", counts: list[int] | None = None
-) -> np.ndarray:
-    """Return the columns of the lines of a block of text, (K, columns) float64."""
+def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Ragged:
+    """Return the columns of the whole lines of a block of text that begins at a byte of its file."""
     if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
-        return rows
+        return Ragged(rows, 0, 0)
     try:
-        if b".#" in block:
+        if not is_plain(block, layout):
             raise ValueError
         lines = block.replace(b",", b".") if layout.comma else block
-        return np.loadtxt(
+        rows = np.loadtxt(
             BytesIO(lines), comments="#", delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2
         )
+        return Ragged(rows, 0, 0)
     except ValueError:
-        return _line_by_line(path, block, layout, columns, at, [] if counts is None else counts)
+        encoding = "utf-8" if layout.encoding.startswith("utf-8") else layout.encoding
+        text = StringIO(block.decode(encoding, errors="replace"), newline=None)
+        return read_ragged(path, text, layout, columns, lambda: _count_lines(path, begin))
 
 
-def _line_by_line(
-    path: Path, block: bytes, layout: Layout, columns: Sequence[int], at: str, counts: list[int]
-) -> np.ndarray:
-    """Return the columns of lines that numpy cannot read: missing values, other comments, lines that count."""
-    rows = []
-    encoding = "utf-8" if layout.encoding.startswith("utf-8") else layout.encoding
-    for line in block.decode(encoding, errors="replace").splitlines():
-        fields = split_line(line, layout.separator)
-        if not fields:
-            continue
-        if layout.promised is not None and len(fields) == 1 and fields[0].isdecimal():
-            counts.append(int(fields[0]))
-            continue
-        try:
-            row = [number_of(fields[column], layout.comma) for column in columns]
-        except (ValueError, IndexError):
-            if not any(is_number(field, layout.comma) for field in fields):
-                continue
-            said = " ".join(fields)[:60]
-            raise FormatError(f"{path}{at}: {said!r} has no numbers x, y, z; mend or delete the line") from None
-        if any(fields[column] for column in columns[:3]):
-            rows.append(row)
-    return np.array(rows).reshape(-1, len(columns))
+def _count_lines(path: Path, end: int) -> int:
+    """Return how many lines of a file end before a byte."""
+    count = 0
+    with path.open("rb") as file:
+        while raw := file.read(min(BLOCK, end - file.tell())):
+            count += raw.count(b"\n")
+    return count

@@ -47,3 +47,8 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
         for attribute in wanted
         if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
     }
+
+
+def said_of_more(name: str, held: int, promised: int) -> str:
+    """Return what should be said of a file with more points than it promises."""
+    return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

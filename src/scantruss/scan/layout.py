@@ -24,6 +24,7 @@ ANY = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)")
 MISSING = frozenset(
     [
@@ -38,6 +39,7 @@ GRAMMARS: tuple[tuple[str | None, bool], ...] = (
     (",", False),
     (None, False),
     (None, True),
+    (",", True),  # "1,5","2,5","3,5"
     (ANY, False),
 )
 _REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
@@ -58,6 +60,12 @@ class Layout:
     attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
     metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
     z_metres: float | None = None  #: ... of z
+    header: tuple[str, ...] = ()  #: the lines before the first point
+
+    @property
+    def plain(self) -> bool:
+        """Whether one sign, which is no decimal sign too, stands between two numbers."""
+        return self.separator != ANY and not (self.separator == "," and self.comma)
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -91,16 +99,21 @@ def _split_quoted(text: str, separator: str) -> list[str]:
 
 def is_number(field: str, comma: bool) -> bool:
     """Return whether a field is a number, or a word for a missing one."""
-    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or field.lower() in MISSING
+    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or _is_missing(field)
 
 
 def number_of(field: str, comma: bool) -> float:
     """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
     if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
         return float(re.sub("[dD]", "e", field.replace(",", ".")))
-    if not field or field.lower() in MISSING:
+    if not field or _is_missing(field):
         return math.nan
     raise ValueError(field)
+
+
+def _is_missing(field: str) -> bool:
+    """Whether a field is a word for a missing number, or the stars for one that a program had no room for."""
+    return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
 
 
 def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
@@ -116,6 +129,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     separator, comma = _find_grammar(rows)
     if separator == ANY:
         _check_not_grouped(path, rows)
+    if (separator, comma) == (",", True):
+        _check_not_thousands(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
     data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
@@ -125,7 +140,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     if len(data) * 2 < behind or len(columns) < 3:
         raise wrong_kind(path, head, "a text file of points")
     layout = _finish(start, data, columns, encoding, separator, comma)
-    lines = list(_header_names(start[: layout.skip], separator))
+    _check_no_points(path, start[: layout.skip], separator, comma)
+    lines = list(header_names(start[: layout.skip], separator))
     if not layout.named:
         for names in lines:
             check_not_degrees(path, names)
@@ -133,10 +149,11 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     found = [find_attributes(names, wanted) for names in fitting]
     metres, z_metres = metres_of_comments(start[: layout.skip]), None
     for names in fitting if layout.named else ():
-        by_name = metres_of_columns([names[column] for column in layout.columns])
+        by_name = metres_of_columns(path, [names[column] for column in layout.columns])
         metres, z_metres = by_name if by_name[0] else (metres, z_metres)
     attributes = tuple(max(found, key=len, default={}).items())
-    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres)
+    header = tuple(line.strip() for line in start[: layout.skip])
+    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=header)
 
 
 def _encoding(head: bytes) -> str:
@@ -165,7 +182,14 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
         return GRAMMARS[-1]
-    return GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+    separator, comma = GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+    return separator, comma or _has_decimal_commas(lines, separator)
+
+
+def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
+    """Whether one line of ten holds more numbers with decimal commas: 1,5;2,5;3,5;200;100;50 has three without."""
+    split = [split_line(line, separator) for line in lines]
+    return 10 * sum(_count_numbers(row, True) > _count_numbers(row, False) for row in split) > len(split)
 
 
 def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
@@ -176,6 +200,29 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
             grouped = [field for field in fields if GROUPED.fullmatch(field)]
             if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
                 raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
+
+
+def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
+    """Refuse "1,234","2,345" where nothing tells that the commas within the quotes are decimal signs."""
+    fields = [field for row in rows for field in split_line(row, ",") if NUMBER_COMMA.fullmatch(field)]
+    if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
+        said = next(field for field in fields if "," in field)
+        raise FormatError(
+            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with points'
+        )
+
+
+def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:
+    """Refuse points above the first line that is split as most are: with another separator they would pass for a header."""
+    for number, line in enumerate(header, start=1):
+        fields = split_line(line, ANY)
+        if len(fields) >= 3 > _count_numbers(split_line(line, separator), comma) and all(
+            is_number(field, False) for field in fields
+        ):
+            raise FormatError(
+                f"{path}: line {number} ({line.strip()[:60]!r}) holds numbers with another separator than most lines;"
+                " mend or delete it"
+            )
 
 
 def _count_numbers(row: Sequence[str], comma: bool) -> int:
@@ -211,10 +258,10 @@ def _finish(
         skip, columns = data[1][0], (first, first + 1, first + 2)
         return Layout(encoding, separator, comma, skip, columns, None, width)
     skip = data[0][0]
-    running = _is_running([row[0] for _, row in data])
+    running, rising = _is_running([row[0] for _, row in data])
     named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
     counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
-    four = running and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
+    four = rising and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
     chosen = named or tuple(numeric[: 4 if four else 3])
     promised = int(counts[-1]) if counts else None
     return Layout(encoding, separator, comma, skip, chosen, promised, width, named is not None)
@@ -231,11 +278,12 @@ def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
     return names == counted and any("." in field or "," in field for field in data[1][1][:3])
 
 
-def _is_running(fields: Sequence[str]) -> bool:
-    """Return whether the fields are whole numbers, each one more than the one before."""
+def _is_running(fields: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the fields are whole numbers, each one more than the one before, and whether each is larger."""
     if len(fields) < 3 or not all(re.fullmatch(r"\d{1,15}", field) for field in fields):
-        return False
-    return bool((np.diff([int(field) for field in fields]) == 1).all())
+        return False, False
+    steps = np.diff([int(field) for field in fields])
+    return bool((steps == 1).all()), bool((steps > 0).all())
 
 
 def _named_columns(
@@ -243,7 +291,7 @@ def _named_columns(
 ) -> tuple[int, int, int] | None:
     """Return the columns of x, y, z from the header line that names them, the one nearest to the points first."""
     for exact in (True, False):
-        for names in _header_names(header, separator):
+        for names in header_names(header, separator):
             if len(names) >= 3 and (len(names) == width or not exact):
                 columns = fit_columns(names, width, has_row_names)
                 if columns:
@@ -251,7 +299,7 @@ def _named_columns(
     return None
 
 
-def _header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
+def header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
     """Yield the header lines split by every separator in turn, the line nearest to the points first."""
     for line in reversed(header):
         text = line.strip().lstrip("#/%!;* \t").strip()

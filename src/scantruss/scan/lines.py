@@ -46,7 +46,7 @@ def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int 
 
 def read_block(raw: bytearray, layout: Layout, columns: Sequence[int]) -> np.ndarray | None:
     """Return some columns of whole lines of a text file; None where a line is not of plain numbers."""
-    if layout.encoding == "utf-16" or layout.separator not in (None, *",;|\t") or len(set(columns)) < len(columns):
+    if layout.encoding == "utf-16" or not layout.plain or len(set(columns)) < len(columns):
         return None
     from ..kernels.decimals import read_rows
 

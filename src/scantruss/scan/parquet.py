@@ -45,7 +45,7 @@ def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:
 
         names = parquet.read_schema(path).names
         if columns := find_columns(names):
-            return metres_of_columns([names[c] for c in columns])
+            return metres_of_columns(path, [names[c] for c in columns])
     return None, None
 
 
@@ -63,7 +63,9 @@ def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:
         parts.append(np.column_stack([_numbers(path, batch, names[place]) for place in places]))
     table = np.concatenate(parts) if parts else np.empty((0, len(places)))
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
-    return Content(np.ascontiguousarray(table[:, :3]), attributes, *metres_of_columns([names[c] for c in columns]))
+    return Content(
+        np.ascontiguousarray(table[:, :3]), attributes, *metres_of_columns(path, [names[c] for c in columns])
+    )
 
 
 def _numbers(path: Path, batch: Any, name: str) -> np.ndarray:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FormatError
-from .content import Content, find_attributes
+from .content import Content, find_attributes, said_of_more
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 from .units import PATTERN, metres_of
 
@@ -58,10 +58,14 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     read = {"ascii": _read_ascii, "binary": _read_binary, "binary_compressed": _read_compressed}[header.data]
     table = read(path, header, columns) if header.points else np.empty((0, len(columns)))
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
-    notes = (f"the viewpoint of {path.name} is where the scanner stood; the points are not moved by it",)
-    return Content(
-        np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=notes if header.moved else ()
-    )
+    notes = []
+    if header.moved:
+        notes.append(f"the viewpoint of {path.name} is where the scanner stood; the points are not moved by it")
+    if len(table) > header.points:
+        notes.append(said_of_more(path.name, len(table), header.points))
+    if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
+        notes.append(f"{path.name} goes on for {more:,} bytes behind the points that it promises; they are left aside")
+    return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
 
 def read_pcd_header(path: Path) -> Header:
@@ -112,12 +116,16 @@ def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarra
             file.seek(header.start)
             lines = (line for line in file if not line.isspace())
             usecols = [int(place[column]) for column in columns]
-            table = np.loadtxt(lines, usecols=usecols, max_rows=header.points, ndmin=2, comments=None)
+            table = np.loadtxt(lines, usecols=usecols, ndmin=2, comments=None)
     except ValueError as error:
         raise unreadable(path, "PCD", error) from None
     if len(table) < header.points:
         raise _ends_early(path, header, f"{len(table):,}")
     return table
+
+
+def _bytes_behind(path: Path, header: Header) -> int:
+    return path.stat().st_size - header.start - header.points * header.row.itemsize
 
 
 def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:

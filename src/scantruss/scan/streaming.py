@@ -13,6 +13,7 @@ from ..selection import Selection
 from ..workers import Workers
 from .apart import extent_of, joined, said_of_apart
 from .chunks import Chunk, Reading, read_ahead, read_chunks
+from .content import said_of_more
 from .opened import OpenScan, open_scan
 from .paths import Source as Names
 from .paths import name_of_files
@@ -177,13 +178,15 @@ def _all_rows(
 
 
 def _check_counts(source: Source, told: Told) -> None:
-    """Refuse a text with fewer points than its count lines promise."""
+    """Refuse a text with fewer points than its count lines promise; say of one with more that they are read."""
     if source.kind == "text" and source.layout and source.layout.promised is not None:
         promised = source.layout.promised + told.promised
         if told.read < promised:
             raise FormatError(
                 f"{source.path} ends early: its count lines promise {promised:,} points, got {told.read:,}; copy it again"
             )
+        if told.read > promised:
+            told.notes = (*told.notes, said_of_more(source.path.name, told.read, promised))
 
 
 class _Tiles:

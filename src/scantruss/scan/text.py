@@ -3,47 +3,53 @@
 from __future__ import annotations
 
 import mmap
-from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from io import StringIO
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import FormatError
-from .content import Content
-from .layout import ANY, Layout, find_layout, is_number, number_of, split_line
+from .content import Content, said_of_more
+from .layout import Layout, find_layout
 from .lines import LARGE, read_regular
+from .ragged import EMPTY, Ragged, is_plain, read_ragged
+from .rising import is_number_of_point, said_of_first
 
 
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
     """Return the points of a text file and the wanted attributes that its header names."""
     layout = find_layout(path, wanted)
-    width, promised = len(layout.columns), layout.promised
+    width = len(layout.columns)
     columns = (*layout.columns, *(column for _, column in layout.attributes))
     try:
-        rows = _read_fast(path, layout, columns)
+        rows, promised, empty = Ragged(_read_fast(path, layout, columns), 0, 0)
     except ValueError:
-        rows, promised = _read_lines(path, layout, columns)
-    if promised is not None and len(rows) < promised:
+        rows, promised, empty = _read_lines(path, layout, columns)
+    held, promised = len(rows) + empty, promised + (layout.promised or 0)
+    if held < promised:
         raise FormatError(
-            f"{path} ends early: its count line promises {promised:,} points, got {len(rows):,}; copy it again"
+            f"{path} ends early: its count line promises {promised:,} points, got {held:,}; copy it again"
         )
     points, more = rows[:, :width], rows[:, width:]
     if width == 4:  # the first column may be a running number
-        running = bool((np.diff(points[:, 0]) == 1).all())
-        points = points[:, 1:] if running else points[:, :3]
+        points = points[:, 1:] if is_number_of_point(rows[:, 0]) else points[:, :3]
     attributes = {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)}
-    return Content(points, attributes, layout.metres, layout.z_metres)
+    notes = said_of_first(path.name, layout, rows[:, 0])
+    if layout.promised is not None and held > promised:
+        notes = (*notes, said_of_more(path.name, held, promised))
+    left_out = {EMPTY: empty} if empty else {}
+    return Content(points, attributes, layout.metres, layout.z_metres, notes=notes, left_out=left_out)
 
 
 def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray:
     """Return the columns of a regular file; ValueError where it is not."""
-    if layout.separator == ANY:
+    if not layout.plain:
         raise ValueError
     if path.stat().st_size > LARGE and (rows := read_regular(path, layout, columns)) is not None:
         return rows
-    if _holds(path, b".#"):
+    if not _is_plain(path, layout):
         raise ValueError
     source: Path | StringIO = path
     if layout.comma:
@@ -59,39 +65,12 @@ def _read_fast(path: Path, layout: Layout, columns: Sequence[int]) -> np.ndarray
     )
 
 
-def _holds(path: Path, sign: bytes) -> bool:
+def _is_plain(path: Path, layout: Layout) -> bool:
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        return data.find(sign) >= 0
+        return is_plain(data, layout)
 
 
-def _read_lines(path: Path, layout: Layout, columns: Sequence[int]) -> tuple[np.ndarray, int | None]:
-    """Return the columns of any file, and the sum of its count lines."""
-    values, promised = array("d"), layout.promised
-    for number, row in _rows(path, layout):
-        try:
-            point = [number_of(row[column], layout.comma) for column in columns]
-        except (ValueError, IndexError):
-            if promised is not None and len(row) == 1 and row[0].isdecimal():  # a PTS file of several scans
-                promised += int(row[0])
-            elif any(is_number(field, layout.comma) for field in row):
-                raise _no_point(path, layout, number, row) from None
-            continue
-        if any(row[column] for column in layout.columns):
-            values.extend(point)
-    return np.array(values).reshape(-1, len(columns)), promised
-
-
-def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number (from 1) and the fields of each line that is not empty, behind the header."""
+def _read_lines(path: Path, layout: Layout, columns: Sequence[int]) -> Ragged:
+    """Return the columns of any file."""
     with path.open(encoding=layout.encoding, errors="replace") as file:
-        for number, line in enumerate(file, start=1):
-            if number > layout.skip and (row := split_line(line.rstrip("\n"), layout.separator)):
-                yield number, row
-
-
-def _no_point(path: Path, layout: Layout, number: int, row: list[str]) -> FormatError:
-    columns = ", ".join(str(column + 1) for column in layout.columns[-3:])
-    said = " ".join(row)[:60]
-    return FormatError(
-        f"{path}: line {number} ({said!r}) has no numbers x, y, z in columns {columns}; mend or delete it"
-    )
+        return read_ragged(path, islice(file, layout.skip, None), layout, columns, lambda: layout.skip)

@@ -25,12 +25,14 @@ from .pcd import read_pcd_header
 from .ply import row_type
 from .ply_header import PLY, read_header
 from .readers import PACKED, READERS
+from .rising import has_unnamed_first, is_number_of_point, said_of_first
 from .systems import system_of
 from .units import metres_of
 
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
+SAMPLE = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
@@ -45,12 +47,13 @@ class Source:
     begin: int = 0  #: byte at which points begin: rows, text
     end: int = 0  #: byte behind the points: text
     rows: np.dtype[np.void] | None = None  #: layout of a row
-    columns: tuple[int, ...] = ()  #: of the coordinates: text
+    columns: tuple[int, ...] = ()  #: of the coordinates, or of the number of a point and them: text
     layout: Layout | None = None  #: of a text
     metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
     z_metres: float | None = None  #: ... of z
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
+    notes: tuple[str, ...] = ()  #: what should be said of how it is read
     in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
     notes: tuple[str, ...] = ()  #: what a user should know
 
@@ -239,8 +242,12 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     points = layout.promised or max(round((size - start) * lines / max(len(sample), 1)), 1)
     points = min(points, (size - start) // LEAST_LINE + 1)
     columns = layout.columns
-    if len(columns) == 4:
-        columns = columns[1:] if _counts(path, layout, size) else columns[:3]
+    notes: tuple[str, ...] = ()
+    if has_unnamed_first(layout):
+        first = _first_column(path, layout, start, size)
+        notes = said_of_first(path.name, layout, *first)
+        if len(columns) == 4 and not is_number_of_point(np.concatenate(first)):
+            columns = columns[:3]
     return Source(
         path,
         "text",
@@ -251,19 +258,23 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
         layout=layout,
         metres=layout.metres,
         z_metres=layout.z_metres,
+        notes=notes,
     )
 
 
-def _counts(path: Path, layout: Layout, size: int) -> bool:
-    """Whether the first of four columns is a running number at the start, in the middle and at the end of a text."""
+def _first_column(path: Path, layout: Layout, start: int, size: int) -> list[np.ndarray]:
+    """Return the first of the columns at the start, in the middle and at the end of a text."""
     from .chunks import text_rows
 
-    for begin in {0, size // 2, max(size - (1 << 14), 0)}:
+    parts, end = [], start
+    for place in (start, size // 2, size - SAMPLE):
         with path.open("rb") as file:
-            file.seek(begin)
-            lines = file.read(1 << 14).split(b"\n")
-        lines = lines[layout.skip if begin == 0 else 1 : -1 if begin + (1 << 14) < size else None]
-        rows = text_rows(path, b"\n".join(lines), layout, layout.columns)
-        if len(rows) > 1 and not (np.diff(rows[:, 0]) == 1).all():
-            return False
-    return True
+            file.seek(max(place, end))
+            if place > end:
+                file.readline()
+            begin = file.tell()
+            lines = file.read(SAMPLE) + file.readline()
+            end = file.tell()
+        if lines.strip():
+            parts.append(text_rows(path, lines, layout, layout.columns, begin).rows[:, 0])
+    return parts

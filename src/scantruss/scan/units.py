@@ -42,11 +42,29 @@ def metres_of_comments(lines: Iterable[str]) -> float | None:
     return next((metres_of(match[1]) for match in found if match), None)
 
 
-def metres_of_columns(names: Sequence[str]) -> tuple[float | None, float | None]:
-    """Return the metres a unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None where they do not."""
+def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, float | None]:
+    """Return the metres a unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None where they do not.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    names : sequence of str
+        Names of the columns of x, y, z.
+
+    Raises
+    ------
+    InputError
+        x and y are in different units.
+    """
     found = [_IN_NAME.search(name.strip().strip("\"'").strip()) for name in names]
     x, y, z = (metres_of(match[1] or match[2]) if match else None for match in found)
-    return (x, z) if x and x == y else (None, None)
+    if x and y and x != y:
+        raise InputError(
+            f"{path} has x in {name_of(x)} and y in {name_of(y)} by the names of its columns; a grid needs one unit, so"
+            " export it again in one"
+        )
+    return (x, z) if x and y else (None, None)
 
 
 def name_of(metres: float | None) -> str:
