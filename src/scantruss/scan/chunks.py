@@ -209,7 +209,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
                     rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
                 left_out = {EMPTY: empty} if empty else {}
-                yield source.said_of(Content(rows[:, :3], more, notes=source.notes, left_out=left_out))
+                yield source.said_of(Content(rows[:, :3], more, left_out=left_out))
 
 
 def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Ragged:

@@ -53,7 +53,6 @@ class Source:
     z_metres: float | None = None  #: ... of z
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
-    notes: tuple[str, ...] = ()  #: what should be said of how it is read
     in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
     notes: tuple[str, ...] = ()  #: what a user should know
 
