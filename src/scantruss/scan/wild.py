@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import InputError
 from .apart import bulk_of
 
-SAMPLE = 10_000  # points that tell where most of them lie
+SAMPLE = 2_000  # points that tell where most of them lie
 FEWEST = 100  # points that tell it
 FAR = 1e6  # widths of the middle half of a scan from its middle, beyond which a point is none of it
 FEW = 0.01  # share of the points that are left out; more are a fault of the file
