@@ -18,6 +18,7 @@ from scantruss.scan.cloud import PointCloud, measure_spacing
 from scantruss.splice import pairs as pair_module
 from scantruss.splice import splice_scans
 from scantruss.splice.pose_file import pose_values, read_poses
+from scantruss.splice.saving import splice_values
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 NAMES = ["a", "b", "c", "d"]
@@ -212,6 +213,17 @@ def test_wrong_poses_taken_as_they_are_are_told(scanned):
         assert NAMES[0] in wrong.alone and set(NAMES[1:]).isdisjoint(wrong.alone)
         assert all(NAMES[0] in (pair.first, pair.second) for pair in wrong.contradicting)
         assert bool(wrong.contradicting) == (shift < 10.0)
+
+
+def test_a_pair_of_which_nothing_agrees_is_listed_without_a_residual():
+    plate = np.stack([*np.meshgrid(np.arange(60.0), np.arange(40.0)), np.zeros((40, 60))], axis=2).reshape(-1, 3)
+    pose = np.eye(4)
+    pose[2, 3] = 3.0
+    clouds = [PointCloud.from_array(plate), PointCloud.from_array(plate)]
+    result = splice_scans(clouds, ["one", "other"], poses={"one": np.eye(4), "other": pose}, use_poses=True)
+    (pair,) = result.contradicting
+    assert pair.agreement == 0.0 and pair.residual is None and result.alone == ("one", "other")
+    assert '"residual": null' in json.dumps(splice_values(result))
 
 
 def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(scanned):

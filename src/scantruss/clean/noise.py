@@ -99,12 +99,13 @@ def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.nda
         (N, 3) rows of the tree; other points where they are [scan unit].
     """
     broad = _broad(near, surfaces, distance)
-    between, _ = onto_surfaces(near, broad)
-    layers = known | _two(near, surfaces, broad, distance)
-    close = _two(near, surfaces, surfaces, distance) & ~layers
-    between[close] = onto_surfaces(near, surfaces)[0][close]
-    layers |= close
-    return layers, np.where(layers[:, None], between, near.tree.points)
+    apart = known | _two(near, surfaces, broad, distance)
+    layers = apart | _two(near, surfaces, surfaces, distance)
+    between = near.tree.points.copy()
+    for rows, patches in ((apart, broad), (layers & ~apart, surfaces)):
+        if rows.any():
+            between[rows] = onto_surfaces(near, patches)[0][rows]
+    return layers, between
 
 
 def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:

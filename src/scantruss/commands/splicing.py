@@ -146,8 +146,8 @@ def show_splice(result: Splice, written: list[Path]) -> None:
             f"{pair.first} - {pair.second}",
             f"{100.0 * pair.overlap:.0f} %",
             f"{100.0 * pair.agreement:.0f} %",
-            f"{pair.residual:.4g}{unit}",
-            f"{pair.residual / result.spacing:.2f}",
+            "-" if pair.residual is None else f"{pair.residual:.4g}{unit}",
+            "-" if pair.residual is None else f"{pair.residual / result.spacing:.2f}",
         )
         for pair in result.pairs
     ]

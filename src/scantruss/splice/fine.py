@@ -28,6 +28,7 @@ class Fit:
     share: float  #: overlap: the agreeing share of the places of the scan that has the larger one
     residual: float  #: root of the mean squared distance of agreeing places across the surface [scan unit]
     near: float  #: distance across the surface within which places agree [scan unit]
+    over: float  #: share of the places, agreeing or against, of the scan that has the larger one
 
     @property
     def agreement(self) -> float:
@@ -123,7 +124,7 @@ def solve(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
 
 def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
     """Return how two scans agree under a pose (4, 4) of the first in the frame of the second; near and reach [scan unit]."""
-    shares, sums = [], np.zeros(5)
+    shares, over, sums = [], [], np.zeros(5)
     for a, b, back in ((first, second, pose), (second, first, invert(pose))):
         part = np.zeros(5)
         kernels.judge(
@@ -131,6 +132,7 @@ def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float,
             np.ascontiguousarray(back), turn, b.spacing, near, reach, part,
         )  # fmt: skip
         shares.append(part[0] / max(len(a.points), 1))
+        over.append((part[0] + part[1]) / max(len(a.points), 1))
         sums += part
     residual = float(np.sqrt(sums[2] / max(sums[0], 1.0)))
-    return Fit(int(sums[0]), int(sums[1]), float(max(shares)), residual, near)
+    return Fit(int(sums[0]), int(sums[1]), float(max(shares)), residual, near, float(max(over)))

@@ -153,7 +153,7 @@ def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, l
     agreeing, against = sum(fit.agreeing for fit in fits), sum(fit.against for fit in fits)
     squares = sum(fit.residual**2 * fit.agreeing for fit in fits)
     near = max(fit.near for fit in fits)
-    all_of_them = Fit(agreeing, against, 0.0, math.sqrt(squares / max(agreeing, 1)), near)
+    all_of_them = Fit(agreeing, against, 0.0, math.sqrt(squares / max(agreeing, 1)), near, 0.0)
     smaller = min(
         sum(len(scans[i].middle.points) for i in group.members) / len(group.members) for group in (one, other)
     )
@@ -178,12 +178,8 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
 
 def links_of(scans: list[Scan], group: Group, *, against: bool = False) -> dict[tuple[int, int], Fit]:
     """Return how the scans of a group agree that overlap, two by two; with `against` also those that overlap and do not agree."""
-    links = {}
-    for pair in pairs_as_they_lie(scans, group):
-        share = pair.fit.share / pair.fit.agreement if against and pair.fit.agreeing else pair.fit.share
-        if share >= LINKED:
-            links[pair.first, pair.second] = pair.fit
-    return links
+    pairs = pairs_as_they_lie(scans, group)
+    return {(p.first, p.second): p.fit for p in pairs if (p.fit.over if against else p.fit.share) >= LINKED}
 
 
 def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:

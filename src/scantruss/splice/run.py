@@ -41,7 +41,7 @@ class PairFit:
     second: str
     overlap: float  #: share of the places of the one that has the larger share, which lie on the other
     agreement: float  #: share of the places over the other scan that lie on it
-    residual: float  #: root of the mean squared distance of the layers [scan unit]
+    residual: float | None  #: root of the mean squared distance of what agrees [scan unit]; None where nothing does
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,4 +277,4 @@ def _judged_as_they_lie(scans: list[Scan], group: Group) -> list[Scan]:
 def _pair_fit(scans: list[Scan], names: list[str], pair: tuple[int, int], fit: Fit) -> PairFit:
     """Return how two scans agree, in the order they were given."""
     first, second = sorted((scans[i].name for i in pair), key=names.index)
-    return PairFit(first, second, fit.share, fit.agreement, fit.residual)
+    return PairFit(first, second, fit.share, fit.agreement, fit.residual if fit.agreeing else None)

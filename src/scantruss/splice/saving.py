@@ -26,7 +26,7 @@ def splice_values(splice: Splice) -> dict[str, Any]:
                 "overlap": pair.overlap,
                 "agreement": pair.agreement,
                 "residual": pair.residual,
-                "residual_spacings": pair.residual / splice.spacing,
+                "residual_spacings": None if pair.residual is None else pair.residual / splice.spacing,
             }
             for pair in splice.pairs
         ],
