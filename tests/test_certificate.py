@@ -239,6 +239,8 @@ def test_what_is_forced_follows_from_euler_number_and_rim(name):
 def test_a_grid_that_is_changed_loses_its_certificate(made):
     grid, _ = made
     assert grid.replace(nodes=grid.nodes + 1.0).certificate is None
+    assert grid.replace(seconds={"total": 1.0}).quality is grid.quality
+    assert grid.replace(nodes=2.0 * grid.nodes).quality.length_mean == pytest.approx(2.0 * grid.quality.length_mean)
     assert grid.replace(settings=SETTINGS).certificate is grid.certificate
 
 

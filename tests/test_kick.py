@@ -123,3 +123,20 @@ def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
     relief.net.state[:, 2] = kernels.LOCKED
     assert not kernels.list_area(relief.net, relief.patches, area, int(np.flatnonzero(relief.net.degree > 0)[0]))
+
+
+@pytest.mark.kernels
+def test_a_net_is_as_before_until_a_member_of_the_area_changes(settled):
+    _, relief, scratch, area = settled
+    net, changed = relief.net, 0
+    for v in np.flatnonzero(net.degree > 0)[::4].tolist():
+        before = trace(net)[:2]
+        assert kernels.list_area(net, relief.patches, area, v)
+        assert kernels.is_as_before(net, area)
+        made = kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
+        used, rings = trace(net)[:2]
+        same = used == before[0] and all(set(a) == set(b) for a, b in zip(rings, before[1], strict=True))
+        assert kernels.is_as_before(net, area) == same
+        changed += made > 0 and not same
+        kernels.put_area_back(net, relief.patches, area)
+    assert changed > 3

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from .quality import GridQuality, Topology
 
 
+TOLD = {"settings", "before", "certificate", "seconds"}  # fields that no figure of a grid depends on
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """A triangular grid truss: its nodes lie on the scan, its edges are the members."""
@@ -36,10 +39,16 @@ class Grid:
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
 
     def replace(self, **changes: Any) -> Grid:
-        """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of."""
+        """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of.
+
+        What has been measured goes along where it is the same.
+        """
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
             changes = {"certificate": None, **changes}
-        return replace(self, **changes)
+        copy = replace(self, **changes)
+        if changes.keys() <= TOLD:
+            vars(copy).update({name: value for name, value in vars(self).items() if name not in vars(copy)})
+        return copy
 
     @cached_property
     def _half_edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,14 +12,14 @@ from .vectors import Vector, cross, dot, norm, row, subtract
 @kernel
 def smallest_angle(a: Vector, b: Vector, c: Vector) -> float:
     """Smallest angle of a triangle [radian]; 0 where two corners meet."""
-    least = math.pi
-    for _ in range(3):
-        u, w = subtract(b, a), subtract(c, a)
-        n = norm(cross(u, w))
-        d = dot(u, w)
-        least = min(least, math.atan2(n, d) if n > 0.0 or d != 0.0 else 0.0)
-        a, b, c = b, c, a
-    return least
+    u, v, w = subtract(b, a), subtract(c, b), subtract(a, c)
+    uu, vv, ww = dot(u, u), dot(v, v), dot(w, w)
+    if uu <= vv and uu <= ww:  # it lies opposite to the shortest side
+        u, w = v, w
+    elif ww <= vv:
+        u, w = u, v
+    n, d = norm(cross(u, w)), -dot(u, w)
+    return math.atan2(n, d) if n > 0.0 or d != 0.0 else 0.0
 
 
 @kernel

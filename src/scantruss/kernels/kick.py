@@ -9,10 +9,10 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import settle_node
-from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, target_length, wings
+from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, place_of, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
-from .trial import MARK, Scratch, gather, local_energy
+from .trial import MARK, TRIED, Scratch, gather, local_energy
 from .vectors import fill_row, norm, row, subtract
 
 WIDE, SEARCHED, KICKED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
@@ -22,7 +22,10 @@ MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
-HOPELESS = 2.2  # energy that moves at random and a first settling may cost: what costs more never pays in the end
+HOPELESS, HOPE = (
+    2.2,
+    0.2,
+)  # energy that moves at random may cost once settled, and once searched: what costs more hardly ever pays
 
 
 class Area(NamedTuple):
@@ -182,16 +185,22 @@ def settle_area(net: Net, patches: np.ndarray, rim: Rim, area: Area, length: flo
 def search_area(
     net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, area: Area, length: float, weight: float, worth: float
 ) -> int:
-    """Try moves at the irregular nodes in the middle of the area; returns how many were kept."""
+    """Try moves at the irregular nodes in the middle of the area that are not marked as tried; returns how many were kept."""
     kept = 0
     for k in range(area.counter[COUNT] + area.free[-1]):
         listed = k < area.counter[COUNT]
         v = area.around[k] if listed else added_node(net, area, k - area.counter[COUNT])
-        if v < 0 or net.state[v, DEGREE] == 0 or area.mark[v, 1] > SEARCHED or is_regular(net, v, length):
+        if v < 0 or net.state[v, DEGREE] == 0 or area.mark[v, 1] > SEARCHED:
+            continue
+        if scratch.note[v, TRIED] == 1 or is_regular(net, v, length):
             continue
         i = 0
         while i < 4 * net.state[v, DEGREE] and kept < 20:
             u, way = net.ring[v, i // 4], i % 4
+            if way == 0 and scratch.note[u, TRIED] == 1:
+                i += 4  # this edge was tried from its other end
+                continue
+            scratch.note[v, TRIED] = 1
             i += 1
             move, a, b = (way + 1) // 2, v, u
             if way == 2:
@@ -207,6 +216,28 @@ def search_area(
                 kept += 1
                 i = 0
     return kept
+
+
+@kernel
+def forget_trials(net: Net, scratch: Scratch, area: Area) -> None:
+    """Mark all nodes of the area as not tried."""
+    for k in range(area.counter[COUNT] + area.free[-1]):
+        scratch.note[area.around[k] if k < area.counter[COUNT] else area.free[k - area.counter[COUNT]], TRIED] = 0
+
+
+@kernel
+def is_as_before(net: Net, area: Area) -> bool:
+    """Whether each node of the area has the neighbours that it had before the kick."""
+    if net.free[-2] != area.free[-2]:
+        return False
+    for k in range(area.counter[COUNT]):
+        v = area.around[k]
+        if net.state[v, DEGREE] != area.state[k, DEGREE]:
+            return False
+        for i in range(net.state[v, DEGREE]):
+            if place_of(net, v, area.ring[k, i]) < 0:
+                return False
+    return True
 
 
 @kernel
@@ -233,12 +264,16 @@ def kick(
     if move_at_random(net, patches, rim, scratch, area) == 0:
         return False
     for turn in range(ROUNDS):
+        forget_trials(net, scratch, area)
         settle_area(net, patches, rim, area, length, weight)
-        if turn == 0 and area_energy(net, scratch, area, length, weight) - before > HOPELESS:
+        if area_energy(net, scratch, area, length, weight) - before > (HOPELESS if turn == 0 else HOPE):
             put_area_back(net, patches, area)
             return False
         if search_area(net, patches, rim, scratch, area, length, weight, worth) == 0:
             break
+        if turn == 0 and is_as_before(net, area):
+            put_area_back(net, patches, area)
+            return False
     settle_area(net, patches, rim, area, length, weight)
     after = area_energy(net, scratch, area, length, weight)
     more = area.free[-2] - net.free[-2]
