@@ -36,8 +36,9 @@ def energy_of(relief, scratch):
 
 
 def kick(relief, scratch, area, v, worth, heat=0.0):
-    return kernels.kick(
-        relief.net, relief.patches, relief.rim, scratch, area, v, relief.length, WEIGHT, worth, 0.0, heat
+    listed = kernels.list_area(relief.net, relief.patches, area, v) == kernels.LISTED
+    return listed and kernels.kick(
+        relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, worth, 0.0, heat
     )
 
 
@@ -49,7 +50,7 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     before, free, patches = trace(net), int(net.free[-2]), relief.patches[net.degree > 0].tobytes()
     kicked = 0
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
-        assert kernels.list_area(net, relief.patches, area, v)
+        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
         kicked += kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
         kernels.search_area(net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, 0.05)
@@ -64,7 +65,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
     _, relief, scratch, area = settled
     net = relief.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
-        assert kernels.list_area(net, relief.patches, area, v)
+        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
         before = kernels.area_energy(net, scratch, area, relief.length, WEIGHT), energy_of(relief, scratch)
         kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
@@ -122,7 +123,22 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
 def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
     relief.net.state[:, 2] = kernels.LOCKED
-    assert not kernels.list_area(relief.net, relief.patches, area, int(np.flatnonzero(relief.net.degree > 0)[0]))
+    first = int(np.flatnonzero(relief.net.degree > 0)[0])
+    assert kernels.list_area(relief.net, relief.patches, area, first) == kernels.UNFIT
+
+
+@pytest.mark.kernels
+def test_an_area_that_reaches_out_of_bounds_is_told(settled):
+    _, relief, _, area = settled
+    net = relief.net
+    first = int(np.flatnonzero(net.degree > 0)[0])
+    assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
+    around = area.around[: area.counter[kernels.COUNT]].copy()
+    for out in around[:: max(len(around) // 5, 1)].tolist():
+        area.mark[out, kernels.OUT] = 1
+        assert kernels.list_area(net, relief.patches, area, first) == kernels.BEYOND
+        area.mark[out, kernels.OUT] = 0
+    assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
 
 
 @pytest.mark.kernels
@@ -131,7 +147,7 @@ def test_a_net_is_as_before_until_a_member_of_the_area_changes(settled):
     net, changed = relief.net, 0
     for v in np.flatnonzero(net.degree > 0)[::4].tolist():
         before = trace(net)[:2]
-        assert kernels.list_area(net, relief.patches, area, v)
+        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
         assert kernels.is_as_before(net, area)
         made = kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
         used, rings = trace(net)[:2]

@@ -15,11 +15,13 @@ import numpy as np
 
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
-from ..kernels.kick import KEPT, MOST, Area, kick_all
+from ..kernels.grid import Net
+from ..kernels.kick import KEPT, MOST, OUT, Area, kick_all
 from ..kernels.search import search, suit_nodes
 from ..kernels.trial import Scratch, total_energy
 from .flips import FOLD, ROUNDS
 from .grid import Grid
+from .halves import Halves
 from .quality import shape_qualities
 from .relief import NEAR, Relief
 
@@ -29,6 +31,8 @@ PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
+LARGE = 400  # nodes from which on a grid is kicked in halves
+HALVINGS, FEW = 2, 12  # how often, as long as so many nodes wait
 MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once
 HOT = 0.8  # part of the rounds in which they may cost anything
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
@@ -61,14 +65,14 @@ def settle_again(relief: Relief) -> None:
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
     """Try flips, collapses and splits where nodes ask for them; returns how many were kept."""
-    strain, share = _strain_and_share(relief, scratch)
+    strain, share, _ = _wanted(relief, scratch)
     return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
 
 
-def _strain_and_share(relief: Relief, scratch: Scratch) -> tuple[float, float]:
-    """Mean length over desired length - 1, and the energy that any node has."""
+def _wanted(relief: Relief, scratch: Scratch) -> tuple[float, float, int]:
+    """Mean length over desired length - 1, the energy that any node has, and the number of nodes."""
     energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
-    return mean / relief.length - 1.0, min(energy / max(count, 1), SHARE)
+    return mean / relief.length - 1.0, min(energy / max(count, 1), SHARE), max(count, 1)
 
 
 def grid_energy(grid: Grid, length: float) -> float:
@@ -98,18 +102,18 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
         settle_again(relief)
 
 
-def new_area(relief: Relief) -> Area:
-    """Return room for what a kick may change, and a fresh source of chance."""
+def new_area(relief: Relief, number: int = 0) -> Area:
+    """Return room for what a kick may change, and a source of chance of its own for each number."""
     capacity, width = relief.net.ring.shape
     return Area(
-        mark=np.zeros((capacity, 2), np.int64),
+        mark=np.zeros((capacity, 3), np.int64),
         around=np.zeros(MOST, np.int64),
         nodes=np.zeros((MOST, 5)),
         ring=np.zeros((MOST, width), np.int64),
         patches=np.zeros((MOST, relief.patches.shape[1])),
         state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
         free=np.zeros(KEPT + 2, np.int64),
-        counter=np.zeros(4, np.int64),
+        counter=np.array([0, 0, 7919 * number, 0]),
     )
 
 
@@ -121,18 +125,47 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
     rounds, heat = KICKS[effort]
     if effort == "normal" and relief.net.used > MANY:
         rounds = 1
-    scratch, area = new_scratch(relief), new_area(relief)
+    rooms = [(new_scratch(relief), new_area(relief, number)) for number in (1, 2, 0)] if rounds else []
     for done in range(rounds):
         if progress:
             progress(0.6 + 0.2 * done / rounds)
-        strain, share = _strain_and_share(relief, scratch)
-        cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
-        kick_all(
-            relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, strain, PRICE, share, cooled
-        )
+        _kick_once(relief, rooms, heat * max(0.0, 1.0 - done / (HOT * rounds)))
         relief.renew(FAR)
     if rounds:
         settle_again(relief)
+
+
+def _kick_once(relief: Relief, rooms: list[tuple[Scratch, Area]], heat: float) -> None:
+    """Kick the grid once at each irregular node: a large one in halves, then in other halves what lies between these, then the rest."""
+    net, waiting = relief.net, np.ones(len(relief.net.arc), np.bool_)
+
+    def kick(own: Net, room: int, strain: float, share: float, count: int) -> None:
+        kick_all(
+            own,
+            relief.patches,
+            relief.rim,
+            *rooms[room],
+            waiting,
+            relief.length,
+            WEIGHT,
+            strain,
+            PRICE,
+            share,
+            count,
+            heat,
+        )
+
+    def kick_halves(halves: Halves) -> None:
+        strain, share, count = _wanted(relief, rooms[2][0])
+        for side in (0, 1):
+            rooms[side][1].mark[:, OUT] = halves.label != side
+        halves.run(lambda side: kick(halves.nets[side], side, strain, share, count // 2))
+
+    for _ in range(HALVINGS):
+        irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
+        if net.used >= LARGE and irregular.sum() >= FEW:
+            kick_halves(Halves(net, irregular))
+    kick(net, 2, *_wanted(relief, rooms[2][0]))
 
 
 def finish(relief: Relief, prefer: str = "balance") -> None:

@@ -51,17 +51,19 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         fault = Fault("empty", empty or "has nodes that are nowhere")
         return replace(_topology(grid, boundary, settings), faults=(fault,))
     sites, length = boundary.sites, settings.length
-    places = scan_places(sites)
-    boxes = boxes_of(places, 0.5 * length)
     with ThreadPoolExecutor(1) as pool:  # kernels, which leave the interpreter to the rest
         nearest = pool.submit(nodes_of_sites, grid, sites, length)
+        places = scan_places(sites)
+        boxes = boxes_of(places, 0.5 * length)
         left = pool.submit(distances_to_grid, places, boxes, grid, length)
         told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
         cuts = find_crossings(grid.nodes, grid.triangles)
-    told = replace(told, crossings=len(cuts), **_cover(grid, sites, length, places, boxes, left.result()))
+        told = replace(told, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
+        on_sheets = faults_on_sheets(grid, sites, nearest.result())
+    told = replace(told, **_from_grid(grid, sites, length, places, left.result()))
     faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
     known = {fault.kind for fault in faults}
-    faults += [f for f in faults_on_sheets(grid, sites, nearest.result()) if f.kind not in known]
+    faults += [fault for fault in on_sheets if fault.kind not in known]
     return replace(told, faults=tuple(faults))
 
 
@@ -83,11 +85,8 @@ def _topology(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate
     )
 
 
-def _cover(
-    grid: Grid, sites: Sites, length: float, places: np.ndarray, boxes: SearchBoxes, left: np.ndarray
-) -> dict[str, Any]:
-    """Return how far scan and grid lie from each other; places (P, 3) of the scan by box, `left` (P,) their distance from the grid."""
-    local = length * scan_field(sites)
+def _from_scan(grid: Grid, length: float, places: np.ndarray, boxes: SearchBoxes) -> dict[str, Any]:
+    """Return how far the grid lies from the scan, places (P, 3) of which are given by box."""
     middles = grid.nodes[grid.triangles].mean(axis=1)
     members = np.full(len(middles), length) if grid.desired is None else grid.desired[grid.triangles].mean(axis=1)
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
@@ -96,11 +95,18 @@ def _cover(
     if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
         off = np.where(np.isnan(grid.deviation), np.nan, np.fmin(off, grid.deviation))  # not over closed holes
     return {
-        "scan_within_reach": float((left <= REACH * local).mean()),
-        "farthest_scan": _worst(left, places, grid, length / local),
         "grid_within_reach": float((astray <= REACH * members).mean()),
         "farthest_triangle": _worst(astray, middles, grid, length / members),
         "node_deviation": _worst(off, grid.nodes, grid, length / at_nodes),
+    }
+
+
+def _from_grid(grid: Grid, sites: Sites, length: float, places: np.ndarray, left: np.ndarray) -> dict[str, Any]:
+    """Return how far the scan lies from the grid; `left` (P,) is the distance of places (P, 3) of the scan from it."""
+    local = length * scan_field(sites)
+    return {
+        "scan_within_reach": float((left <= REACH * local).mean()),
+        "farthest_scan": _worst(left, places, grid, length / local),
     }
 
 

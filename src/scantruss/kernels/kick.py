@@ -22,16 +22,16 @@ MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
-HOPELESS, HOPE = (
-    2.2,
-    0.2,
-)  # energy that moves at random may cost once settled, and once searched: what costs more hardly ever pays
+HOPELESS = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
+HOPE = 0.2, 3.0  # the same once searched, and for each unit of heat: what costs more hardly ever does
+OUT = 2  # column of `Area.mark`
+LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
 
 
 class Area(NamedTuple):
     """The nodes that a kick may change, as they were before it."""
 
-    mark: np.ndarray  #: (C, 2) int64 number of the kick that has the node in its area; rings away from the kicked node
+    mark: np.ndarray  #: (C, 3) int64 number of the kick that has the node in its area; rings away from the kicked node; 1 out of bounds
     around: np.ndarray  #: (A,) int64 the nodes
     nodes: np.ndarray  #: (A, 5) their places, arcs and desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
@@ -49,8 +49,11 @@ def chance(area: Area, choices: int) -> int:
 
 
 @kernel
-def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> bool:
-    """List the nodes around a node as they are now; False where there are too many, or a defect is among them."""
+def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
+    """List the nodes around a node as they are now: LISTED, or UNFIT where there are too many or a defect is among them.
+
+    BEYOND where one is out of bounds.
+    """
     area.counter[STAMP] += 1
     stamp = area.counter[STAMP]
     area.around[0] = v
@@ -59,15 +62,17 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> bool:
     while at < count:
         u = area.around[at]
         at += 1
+        if area.mark[u, OUT] == 1:
+            return BEYOND
         if net.state[u, KIND] == LOCKED:
-            return False
+            return UNFIT
         if area.mark[u, 1] == WIDE:
             continue
         for i in range(net.state[u, DEGREE]):
             w = net.ring[u, i]
             if area.mark[w, 0] != stamp:
                 if count == len(area.around):
-                    return False
+                    return UNFIT
                 area.mark[w, 0], area.mark[w, 1] = stamp, area.mark[u, 1] + 1
                 area.around[count] = w
                 count += 1
@@ -84,7 +89,7 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> bool:
     area.free[-2], area.free[-1] = free, min(free, KEPT)
     for k in range(area.free[-1]):
         area.free[k] = net.free[free - 1 - k]
-    return True
+    return LISTED
 
 
 @kernel
@@ -247,26 +252,25 @@ def kick(
     rim: Rim,
     scratch: Scratch,
     area: Area,
-    v: int,
     length: float,
     weight: float,
     worth: float,
     bend: float,
     heat: float,
 ) -> bool:
-    """Kick the grid at a node; True if that has paid, else all is as before.
+    """Kick the grid in the area that is listed; True if that has paid, else all is as before.
 
     worth, bend : n more nodes may cost worth n - bend n^2
     """
-    if not list_area(net, patches, area, v):
-        return False
     before = area_energy(net, scratch, area, length, weight)
     if move_at_random(net, patches, rim, scratch, area) == 0:
         return False
     for turn in range(ROUNDS):
         forget_trials(net, scratch, area)
         settle_area(net, patches, rim, area, length, weight)
-        if area_energy(net, scratch, area, length, weight) - before > (HOPELESS if turn == 0 else HOPE):
+        if area_energy(net, scratch, area, length, weight) - before > (
+            HOPELESS if turn == 0 else HOPE[0] + HOPE[1] * heat
+        ):
             put_area_back(net, patches, area)
             return False
         if search_area(net, patches, rim, scratch, area, length, weight, worth) == 0:
@@ -292,21 +296,32 @@ def kick_all(
     rim: Rim,
     scratch: Scratch,
     area: Area,
+    waiting: np.ndarray,
     length: float,
     weight: float,
     strain: float,
     price: float,
     share: float,
+    count: int,
     heat: float,
 ) -> int:
-    """Kick the grid once at every node that has more or fewer neighbours than suit it; returns how often that paid.
+    """Kick the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
 
+    Parameters
+    ----------
+    waiting : (C,) bool; on return only of nodes with one out of bounds around them
     strain, price, share : as in `search`
+    count : V, as in `search`; those within bounds
     """
     paid, free = area.counter[PAID], net.free[-2]
-    count = max(len(net.arc) - free, 1)
     for v in range(net.free[-1]):
+        if not waiting[v] or area.mark[v, OUT] == 1:
+            continue
+        listed = UNFIT
         if net.state[v, DEGREE] > 0 and net.state[v, DEGREE] != net.state[v, IDEAL]:
+            listed = list_area(net, patches, area, v)
+        waiting[v] = listed == BEYOND
+        if listed == LISTED:
             worth = share + price * (strain - 0.5 * (free - net.free[-2]) / count)
-            kick(net, patches, rim, scratch, area, v, length, weight, worth, 0.25 * price / count, heat)
+            kick(net, patches, rim, scratch, area, length, weight, worth, 0.25 * price / count, heat)
     return area.counter[PAID] - paid
