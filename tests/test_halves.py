@@ -67,7 +67,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(machine, "processors", lambda count=count: count)
-        monkeypatch.setattr(equalize, "LARGE", 100)
+        monkeypatch.setattr(equalize, "MANY", 100)
         rough = make(1)
         relief = rough.relief()
         equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
@@ -95,7 +95,7 @@ def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
         seen.append(sum(int((getattr(net, name)[between] != old[name]).sum()) for name in before))
 
     monkeypatch.setattr(Halves, "run", look)
-    monkeypatch.setattr(equalize, "LARGE", 100)
+    monkeypatch.setattr(equalize, "MANY", 100)
     equalize.search_widely(relief, "normal")
     assert len(seen) >= 2 and not any(seen)
     assert any(not np.array_equal(getattr(net, name), before[name]) for name in before)

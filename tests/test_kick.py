@@ -38,7 +38,7 @@ def energy_of(relief, scratch):
 def kick(relief, scratch, area, v, worth, heat=0.0):
     listed = kernels.list_area(relief.net, relief.patches, area, v) == kernels.LISTED
     return listed and kernels.kick(
-        relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, worth, 0.0, heat
+        relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, worth, 0.0, heat, kernels.HOPE
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..kernels.equalize import settle_all
 from ..kernels.flips import flip_by_angle
 from ..kernels.grid import Net
-from ..kernels.kick import KEPT, MOST, OUT, Area, kick_all
+from ..kernels.kick import HOPE, HOPELESS, KEPT, MOST, OUT, Area, kick_all
 from ..kernels.search import search, suit_nodes
 from ..kernels.trial import Scratch, total_energy
 from .flips import FOLD, ROUNDS
@@ -31,9 +31,8 @@ PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
 KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
-LARGE = 400  # nodes from which on a grid is kicked in halves
-HALVINGS, FEW = 2, 12  # how often, as long as so many nodes wait
-MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once
+MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
+HALVINGS, FEW = 2, 12  # times that it does so, as long as so many nodes wait
 HOT = 0.8  # part of the rounds in which they may cost anything
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
@@ -123,49 +122,60 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
     For `best` it may cost a little at first and less and less later on (simulated annealing).
     """
     rounds, heat = KICKS[effort]
+    if not rounds:
+        return
     if effort == "normal" and relief.net.used > MANY:
-        rounds = 1
-    rooms = [(new_scratch(relief), new_area(relief, number)) for number in (1, 2, 0)] if rounds else []
-    for done in range(rounds):
-        if progress:
-            progress(0.6 + 0.2 * done / rounds)
-        _kick_once(relief, rooms, heat * max(0.0, 1.0 - done / (HOT * rounds)))
-        relief.renew(FAR)
-    if rounds:
-        settle_again(relief)
+        kick_in_halves(relief)
+    else:
+        room = new_scratch(relief), new_area(relief)
+        for done in range(rounds):
+            if progress:
+                progress(0.6 + 0.2 * done / rounds)
+            cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
+            waiting = np.ones(len(relief.net.arc), np.bool_)
+            kick(relief, relief.net, room, waiting, _wanted(relief, room[0]), cooled, HOPELESS)
+            relief.renew(FAR)
+    settle_again(relief)
 
 
-def _kick_once(relief: Relief, rooms: list[tuple[Scratch, Area]], heat: float) -> None:
-    """Kick the grid once at each irregular node: a large one in halves, then in other halves what lies between these, then the rest."""
+def kick_in_halves(relief: Relief) -> None:
+    """Kick a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
+
+    What lies between the halves is kicked in other halves, and what is left then by itself.
+    """
     net, waiting = relief.net, np.ones(len(relief.net.arc), np.bool_)
+    rooms = [(new_scratch(relief), new_area(relief, number)) for number in range(3)]
 
-    def kick(own: Net, room: int, strain: float, share: float, count: int) -> None:
-        kick_all(
-            own,
-            relief.patches,
-            relief.rim,
-            *rooms[room],
-            waiting,
-            relief.length,
-            WEIGHT,
-            strain,
-            PRICE,
-            share,
-            count,
-            heat,
-        )
-
-    def kick_halves(halves: Halves) -> None:
+    def kick_both(halves: Halves) -> None:
         strain, share, count = _wanted(relief, rooms[2][0])
         for side in (0, 1):
             rooms[side][1].mark[:, OUT] = halves.label != side
-        halves.run(lambda side: kick(halves.nets[side], side, strain, share, count // 2))
+        halves.run(
+            lambda side: kick(relief, halves.nets[side], rooms[side], waiting, (strain, share, count // 2), 0.0, HOPE)
+        )
 
     for _ in range(HALVINGS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
-        if net.used >= LARGE and irregular.sum() >= FEW:
-            kick_halves(Halves(net, irregular))
-    kick(net, 2, *_wanted(relief, rooms[2][0]))
+        if irregular.sum() >= FEW:
+            kick_both(Halves(net, irregular))
+    kick(relief, net, rooms[2], waiting, _wanted(relief, rooms[2][0]), 0.0, HOPE)
+    relief.renew(FAR)
+
+
+def kick(
+    relief: Relief,
+    net: Net,
+    room: tuple[Scratch, Area],
+    waiting: np.ndarray,
+    wanted: tuple[float, float, int],
+    heat: float,
+    hope: float,
+) -> None:
+    """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.kick.kick_all`."""
+    strain, share, count = wanted
+    scratch, area = room
+    of_grid = relief.patches, relief.rim, scratch, area, waiting, relief.length
+    kick_all(net, *of_grid, WEIGHT, strain, PRICE, share, count, heat, hope)
 
 
 def finish(relief: Relief, prefer: str = "balance") -> None:

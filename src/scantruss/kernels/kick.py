@@ -23,7 +23,7 @@ ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
 HOPELESS = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
-HOPE = 0.2, 3.0  # the same once searched, and for each unit of heat: what costs more hardly ever does
+HOPE = 0.2  # the same once searched: what costs more hardly ever does
 OUT = 2  # column of `Area.mark`
 LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
 
@@ -257,10 +257,12 @@ def kick(
     worth: float,
     bend: float,
     heat: float,
+    hope: float,
 ) -> bool:
     """Kick the grid in the area that is listed; True if that has paid, else all is as before.
 
     worth, bend : n more nodes may cost worth n - bend n^2
+    hope : what still costs more once it is searched is given up; below HOPELESS, so is what the search has undone
     """
     before = area_energy(net, scratch, area, length, weight)
     if move_at_random(net, patches, rim, scratch, area) == 0:
@@ -268,14 +270,12 @@ def kick(
     for turn in range(ROUNDS):
         forget_trials(net, scratch, area)
         settle_area(net, patches, rim, area, length, weight)
-        if area_energy(net, scratch, area, length, weight) - before > (
-            HOPELESS if turn == 0 else HOPE[0] + HOPE[1] * heat
-        ):
+        if area_energy(net, scratch, area, length, weight) - before > (HOPELESS if turn == 0 else hope):
             put_area_back(net, patches, area)
             return False
         if search_area(net, patches, rim, scratch, area, length, weight, worth) == 0:
             break
-        if turn == 0 and is_as_before(net, area):
+        if turn == 0 and hope < HOPELESS and is_as_before(net, area):
             put_area_back(net, patches, area)
             return False
     settle_area(net, patches, rim, area, length, weight)
@@ -304,6 +304,7 @@ def kick_all(
     share: float,
     count: int,
     heat: float,
+    hope: float,
 ) -> int:
     """Kick the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
 
@@ -312,6 +313,7 @@ def kick_all(
     waiting : (C,) bool; on return only of nodes with one out of bounds around them
     strain, price, share : as in `search`
     count : V, as in `search`; those within bounds
+    heat, hope : as in `kick`
     """
     paid, free = area.counter[PAID], net.free[-2]
     for v in range(net.free[-1]):
@@ -323,5 +325,5 @@ def kick_all(
         waiting[v] = listed == BEYOND
         if listed == LISTED:
             worth = share + price * (strain - 0.5 * (free - net.free[-2]) / count)
-            kick(net, patches, rim, scratch, area, length, weight, worth, 0.25 * price / count, heat)
+            kick(net, patches, rim, scratch, area, length, weight, worth, 0.25 * price / count, heat, hope)
     return area.counter[PAID] - paid
