@@ -5,7 +5,7 @@ import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
 from scantruss import machine
-from scantruss.grid import equalize
+from scantruss.grid import equalize, kicks
 from scantruss.grid.halves import Halves
 from scantruss.kernels.halves import BETWEEN
 
@@ -67,12 +67,12 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(machine, "processors", lambda count=count: count)
-        monkeypatch.setattr(equalize, "MANY", 100)
+        monkeypatch.setattr(kicks, "MANY", 100)
         rough = make(1)
         relief = rough.relief()
         equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
         before = equalize.energy_of_node(relief)
-        equalize.search_widely(relief, "normal")
+        kicks.search_widely(relief, "normal")
         assert equalize.energy_of_node(relief) < before
         assert same_topology(rough.grid, relief.to_grid(rough.grid))
         nets.append(relief.net)
@@ -95,7 +95,7 @@ def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
         seen.append(sum(int((getattr(net, name)[between] != old[name]).sum()) for name in before))
 
     monkeypatch.setattr(Halves, "run", look)
-    monkeypatch.setattr(equalize, "MANY", 100)
-    equalize.search_widely(relief, "normal")
+    monkeypatch.setattr(kicks, "MANY", 100)
+    kicks.search_widely(relief, "normal")
     assert len(seen) >= 2 and not any(seen)
     assert any(not np.array_equal(getattr(net, name), before[name]) for name in before)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_area, new_scratch, search_widely, settle
+from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_scratch, settle
+from scantruss.grid.kicks import new_area, search_widely
 from scantruss.kernels import kick as kernels
 from scantruss.kernels.trial import total_energy
 

@@ -109,6 +109,7 @@ def compile_optimization(settings: Settings) -> None:
 
     from .boundary import Boundary, Loop
     from .grid.grid import Grid
+    from .grid.halves import Halves
     from .grid.optimize import improve
     from .grid.proof import certify
     from .grid.relief import Relief
@@ -148,6 +149,7 @@ def compile_optimization(settings: Settings) -> None:
     relief = Relief.from_grid(grid, surface, boundary.rim, boundary.corners, settings.length)
     relief.to_grid(grid)
     improve(relief, sites, np.zeros((0, 3)), settings)
+    Halves(relief.net, relief.net.degree > 0)  # which so small a grid is not kicked in
     certify(relief.to_grid(grid), boundary, settings)
 
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.flips import flip_by_angle
-from .equalize import equalize, finish, search_widely
+from .equalize import equalize, finish
 from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import FOLD, ROUNDS
 from .grid import Grid
+from .kicks import search_widely
 from .on_lines import with_rim_members
 from .relief import Relief
 from .smoothing import smooth

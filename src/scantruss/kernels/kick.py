@@ -224,7 +224,7 @@ def search_area(
 
 
 @kernel
-def forget_trials(net: Net, scratch: Scratch, area: Area) -> None:
+def forget_trials(scratch: Scratch, area: Area) -> None:
     """Mark all nodes of the area as not tried."""
     for k in range(area.counter[COUNT] + area.free[-1]):
         scratch.note[area.around[k] if k < area.counter[COUNT] else area.free[k - area.counter[COUNT]], TRIED] = 0
@@ -268,7 +268,7 @@ def kick(
     if move_at_random(net, patches, rim, scratch, area) == 0:
         return False
     for turn in range(ROUNDS):
-        forget_trials(net, scratch, area)
+        forget_trials(scratch, area)
         settle_area(net, patches, rim, area, length, weight)
         if area_energy(net, scratch, area, length, weight) - before > (HOPELESS if turn == 0 else hope):
             put_area_back(net, patches, area)

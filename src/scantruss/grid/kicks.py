@@ -1,0 +1,96 @@
+"""Kicks of a whole grid: from where a search that only goes down does not get on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..kernels.grid import Net
+from ..kernels.kick import HOPE, HOPELESS, KEPT, MOST, OUT, Area, kick_all
+from ..kernels.trial import Scratch
+from .equalize import FAR, PRICE, WEIGHT, new_scratch, settle_again, wanted
+from .halves import Halves
+from .relief import Relief
+
+KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
+MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
+HALVINGS, FEW = 2, 12  # times that it does so, as long as so many nodes wait
+HOT = 0.8  # part of the rounds in which they may cost anything
+
+
+def new_area(relief: Relief, number: int = 0) -> Area:
+    """Return room for what a kick may change, and a source of chance of its own for each number."""
+    capacity, width = relief.net.ring.shape
+    return Area(
+        mark=np.zeros((capacity, 3), np.int64),
+        around=np.zeros(MOST, np.int64),
+        nodes=np.zeros((MOST, 5)),
+        ring=np.zeros((MOST, width), np.int64),
+        patches=np.zeros((MOST, relief.patches.shape[1])),
+        state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
+        free=np.zeros(KEPT + 2, np.int64),
+        counter=np.array([0, 0, 7919 * number, 0]),
+    )
+
+
+def search_widely(relief: Relief, effort: str, progress: Callable[[float], None] | None = None) -> None:
+    """Kick the grid at its irregular nodes: what a search from there finds is kept if it has paid.
+
+    For `best` it may cost a little at first and less and less later on (simulated annealing).
+    """
+    rounds, heat = KICKS[effort]
+    if not rounds:
+        return
+    if effort == "normal" and relief.net.used > MANY:
+        kick_in_halves(relief)
+    else:
+        room = new_scratch(relief), new_area(relief)
+        for done in range(rounds):
+            if progress:
+                progress(0.6 + 0.2 * done / rounds)
+            cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
+            waiting = np.ones(len(relief.net.arc), np.bool_)
+            kick(relief, relief.net, room, waiting, wanted(relief, room[0]), cooled, HOPELESS)
+            relief.renew(FAR)
+    settle_again(relief)
+
+
+def kick_in_halves(relief: Relief) -> None:
+    """Kick a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
+
+    What lies between the halves is kicked in other halves, and what is left then by itself.
+    """
+    net, waiting = relief.net, np.ones(len(relief.net.arc), np.bool_)
+    rooms = [(new_scratch(relief), new_area(relief, number)) for number in range(3)]
+
+    def kick_both(halves: Halves) -> None:
+        strain, share, count = wanted(relief, rooms[2][0])
+        for side in (0, 1):
+            rooms[side][1].mark[:, OUT] = halves.label != side
+        halves.run(
+            lambda side: kick(relief, halves.nets[side], rooms[side], waiting, (strain, share, count // 2), 0.0, HOPE)
+        )
+
+    for _ in range(HALVINGS):
+        irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
+        if irregular.sum() >= FEW:
+            kick_both(Halves(net, irregular))
+    kick(relief, net, rooms[2], waiting, wanted(relief, rooms[2][0]), 0.0, HOPE)
+    relief.renew(FAR)
+
+
+def kick(
+    relief: Relief,
+    net: Net,
+    room: tuple[Scratch, Area],
+    waiting: np.ndarray,
+    wanted: tuple[float, float, int],
+    heat: float,
+    hope: float,
+) -> None:
+    """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.kick.kick_all`."""
+    strain, share, count = wanted
+    scratch, area = room
+    of_grid = relief.patches, relief.rim, scratch, area, waiting, relief.length
+    kick_all(net, *of_grid, WEIGHT, strain, PRICE, share, count, heat, hope)
