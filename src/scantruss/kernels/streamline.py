@@ -7,23 +7,40 @@ import numpy as np
 from .boxes import SearchBoxes, box_index, slot_of
 from .compile import kernel
 
+BITS, SIDE, REST = 3, 8, 7  # boxes along the side of a block
+BYTES = 64  # a bit for each of its boxes
+CHOSEN, BLOCKS = 0, 1  # places in `count`
+
 
 @kernel
 def choose_first(
-    points: np.ndarray, boxes: SearchBoxes, among: np.ndarray, chosen: np.ndarray, begin: int, end: int, count: int
-) -> tuple[int, int]:
+    points: np.ndarray,
+    boxes: SearchBoxes,
+    blocks: SearchBoxes,
+    taken: np.ndarray,
+    among: np.ndarray,
+    chosen: np.ndarray,
+    begin: int,
+    end: int,
+    count: np.ndarray,
+) -> int:
     """Choose the first of the points `among` (M,), of those before `end` where M is 0, in each box that is not taken yet.
+
+    What lies together in space does so in memory: a scan of which all boxes do not fit into the cache has few blocks of them.
 
     Parameters
     ----------
     points : (N, 3)
-    boxes : SearchBoxes, of which only the keys are used
+    boxes : SearchBoxes, of which only bounds, sizes and counts are used
+    blocks : SearchBoxes of the blocks of boxes, each with its row of `taken` as its first item
+    taken : (B, BYTES) uint8, zero at the start: a bit for each box of a block
     chosen : (capacity,) int64, filled with the points
-    begin, end, count : where to go on and to stop in `among`, and the points so far
+    begin, end : where to go on and to stop in `among`
+    count : (2,) int64 the points and the blocks so far
 
     Returns
     -------
-    begin, count : begin < end where `chosen` is full
+    int : where to go on; less than `end` where `chosen` or `taken` is full
     """
     for m in range(begin, end):
         p = among[m] if len(among) > 0 else m
@@ -32,11 +49,20 @@ def choose_first(
             box_index(boxes, 1, points[p, 1]),
             box_index(boxes, 2, points[p, 2]),
         )
-        slot = slot_of(boxes, i, j, k)
-        if boxes.keys[slot] == -1:
-            if count == len(chosen):
-                return m, count
-            boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
-            chosen[count] = p
-            count += 1
-    return end, count
+        slot = slot_of(blocks, i >> BITS, j >> BITS, k >> BITS)
+        block = blocks.first[slot]
+        if block < 0:
+            block = count[BLOCKS]
+            if block == len(taken):
+                return m
+            blocks.keys[slot] = ((i >> BITS) * blocks.counts[1] + (j >> BITS)) * blocks.counts[2] + (k >> BITS)
+            blocks.first[slot] = block
+            count[BLOCKS] += 1
+        byte, bit = ((i & REST) << BITS) + (j & REST), np.uint8(1 << (k & REST))
+        if taken[block, byte] & bit == 0:
+            if count[CHOSEN] == len(chosen):
+                return m
+            taken[block, byte] |= bit
+            chosen[count[CHOSEN]] = p
+            count[CHOSEN] += 1
+    return end

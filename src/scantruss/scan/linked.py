@@ -47,7 +47,7 @@ def thin_dense(points: np.ndarray, radius: float, spacing: float) -> np.ndarray:
     that is turned or moved stays sorted as it was.
     """
     if is_dense(spacing, FINE * radius):
-        points = points[streamlined(points, FINE * radius)]
+        points = points.take(streamlined(points, FINE * radius), axis=0)
     if len(points) < MANY:
         return points
     owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)

@@ -117,7 +117,7 @@ def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
     """Return the surface with all points near some sites (R,), where it has only some of them: those of the rim tell where it is."""
     if sites.whole is None or len(rim) == 0:
         return surface
-    near = sites.whole[points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1])]
+    near = sites.whole.take(points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1]), axis=0)
     owner, means, reach = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
     in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, reach, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))

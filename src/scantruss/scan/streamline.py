@@ -18,7 +18,8 @@ DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan i
 PART = 200_000  # fewest points for a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
 MARKS = 1 << 18  # of boxes near a place
-ROOM, MOST_ROOM = 1 << 16, 1 << 19  # boxes that the first table has room for
+ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
+FILLED = 64  # of these, in a block of boxes
 
 
 def is_dense(spacing: float, size: float) -> bool:
@@ -58,27 +59,36 @@ class _First:
     """The first points of boxes, as far as they have been looked at."""
 
     def __init__(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, room: int) -> None:
-        self.points, self.lower, self.upper, self.size = points, lower, upper, size
-        self.found, self.count = np.empty(room, np.int64), 0
-        self.boxes = new_boxes(lower, upper, size, 0, room)
+        self.points, self.boxes = points, new_boxes(lower, upper, size, 0, 0)
+        self.found, self.count = np.empty(0, np.int64), np.zeros(2, np.int64)
+        self._make_room(room)
 
     @property
     def chosen(self) -> np.ndarray:
         """(K,) int64 the points so far."""
-        return self.found[: self.count]
+        return self.found[: self.count[kernels.CHOSEN]]
 
     def choose(self, among: np.ndarray, begin: int, end: int) -> None:
         """Look at the points `among` (M,) from `begin` to `end` - 1, at all points for an empty one."""
         while begin < end:
-            begin, self.count = kernels.choose_first(self.points, self.boxes, among, self.found, begin, end, self.count)
+            begin = self._choose(among, begin, end)
             if begin < end:
-                self._make_room()
+                self._make_room(4 * len(self.found))
 
-    def _make_room(self) -> None:
-        old = self.chosen
-        self.found = np.empty(4 * len(self.found), np.int64)
-        self.boxes = new_boxes(self.lower, self.upper, self.size, 0, len(self.found))
-        kernels.choose_first(self.points, self.boxes, old, self.found, 0, self.count, 0)
+    def _choose(self, among: np.ndarray, begin: int, end: int) -> int:
+        return kernels.choose_first(
+            self.points, self.boxes, self.blocks, self.taken, among, self.found, begin, end, self.count
+        )
+
+    def _make_room(self, room: int) -> None:
+        """Make room for so many points, and as many blocks as these are in at most where each has many of them."""
+        old, rows = self.chosen, max(room // FILLED, 1)
+        rows = max(rows, 4 * int(self.count[kernels.BLOCKS]))
+        self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
+        self.taken = np.zeros((rows, kernels.BYTES), np.uint8)
+        table = new_boxes(np.zeros(3), np.ones(3), 1.0, 0, rows)
+        self.blocks = table._replace(counts=self.boxes.counts // kernels.SIDE + 1)
+        self._choose(old, 0, len(old))
 
 
 def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
