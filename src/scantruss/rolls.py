@@ -8,6 +8,7 @@ from .curves import length_around
 from .kernels import boundary as kernels
 from .kernels.surface import Surface
 from .machine import in_parts
+from .scan.orientation import dots
 from .scan.sites import with_own_scratch
 
 TRIES = 20  # of rolling the disc from one place
@@ -92,7 +93,8 @@ class _Rolls:
 def disc_radii(surface: Surface, radius: float) -> np.ndarray:
     """Radius of the disc at each site (S,): larger where the scan is sparse, so that it does not fall between the points."""
     sixth = surface.neighbors[:, 5]
-    gap = np.linalg.norm(surface.mean[sixth] - surface.mean, axis=1)
+    arm = surface.mean[sixth] - surface.mean
+    gap = np.sqrt(dots(arm, arm))
     radii = np.where(sixth >= 0, np.maximum(radius, 0.75 * gap), radius)
     wide = np.flatnonzero(radii > radius)
     around = surface.neighbors[wide]

@@ -14,7 +14,7 @@ from .cloud import bounds_of
 from .streamline import is_dense, streamlined
 
 NEIGHBORS = 12  # links of a site
-CLOSE = 1.5  # size of the search boxes while sites are chosen, in their radii
+CLOSE = 2.2  # size of the search boxes while sites are chosen, in their radii
 MANY = 250_000  # points from which on they no longer fit into the cache, and are sorted
 LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
 PART = 20_000  # fewest points for a thread of their own

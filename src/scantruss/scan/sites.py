@@ -18,7 +18,7 @@ from ..settings import Settings
 from .cloud import PointCloud
 from .field import Wish, length_field, wish_of
 from .linked import PART, ROUGH, SHEETS, Linked, group, is_rough, link_finer, link_sites, settle_to_sheet, thin_dense
-from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
+from .orientation import STEEP, cut_steep_links, dots, face_one_side, face_outside, mean_normals
 from .streamline import points_near
 
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
@@ -240,7 +240,8 @@ def _site_areas(surface: Surface) -> np.ndarray:
     linked = surface.neighbors >= 0
     count = linked.sum(axis=1)
     last = surface.neighbors[np.arange(len(count)), np.maximum(count - 1, 0)]
-    reach = ((surface.mean[last] - surface.mean) ** 2).sum(axis=1)
+    arm = surface.mean[last] - surface.mean
+    reach = dots(arm, arm)
     return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
 
 
