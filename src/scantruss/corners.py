@@ -59,7 +59,8 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
     """Places (P,) of a closed curve that turn most within `APART` to both sides, and by more than enough."""
     half = round(APART / STEP)
-    highest = np.max([np.roll(turn, o) for o in range(-half, half + 1)], axis=0)
+    around = np.concatenate([turn[-half:], turn, turn[:half]])
+    highest = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1).max(axis=1)
     peaks = np.flatnonzero((turn >= highest) & (turn > enough))
     return peaks[np.diff(peaks, append=peaks[:1] + len(turn)) > half]
 
@@ -94,8 +95,10 @@ def _turns(curve: np.ndarray) -> np.ndarray:
     """Angle (M,) between lines fitted to the curve before and after each place [degree]."""
     offsets = np.arange(round(SIGHT[0] / STEP), round(SIGHT[1] / STEP) + 1)
     slope = (offsets - offsets.mean()) / ((offsets - offsets.mean()) ** 2).sum()
-    after = sum(s * np.roll(curve, -o, axis=0) for s, o in zip(slope, offsets.tolist(), strict=True))
-    before = -sum(s * np.roll(curve, o, axis=0) for s, o in zip(slope, offsets.tolist(), strict=True))
+    count, most = len(curve), int(offsets[-1])
+    around = np.concatenate([curve[-most:], curve, curve[:most]])
+    after = sum(s * around[most + o : most + o + count] for s, o in zip(slope, offsets.tolist(), strict=True))
+    before = -sum(s * around[most - o : most - o + count] for s, o in zip(slope, offsets.tolist(), strict=True))
     cosine = (before * after).sum(axis=1)
     cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-300)
     return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

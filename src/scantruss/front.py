@@ -108,7 +108,7 @@ def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     Loops of the boundary of which the front has reached no segment are left out.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
-    for s in range(int(front.count[lists.SEGMENTS])):
+    for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()

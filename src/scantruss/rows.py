@@ -12,6 +12,7 @@ from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
+from .scan.orientation import dots
 
 APART = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
@@ -106,7 +107,8 @@ def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, Vect
         place = nodes[((nodes - middle) ** 2).sum(axis=1).argmin()]
         half = min(round(length / np.linalg.norm(loop.points[(at + 1) % count] - middle)), count // 4)
         ahead = loop.points[(at + half) % count] - loop.points[at - half]
-        site = int(((surface.mean - place) ** 2).sum(axis=1).argmin())
+        arm = surface.mean - place
+        site = int(dots(arm, arm).argmin())
     normal = surface.normals[site]
     ahead = ahead - normal * (ahead @ normal)
     angle = np.radians(turn)

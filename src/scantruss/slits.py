@@ -91,6 +91,8 @@ def check_kept(members: np.ndarray, triangles: np.ndarray, nodes: np.ndarray) ->
     FrontError
         Names a place.
     """
+    if len(members) == 0:
+        return
     count = len(nodes)
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     made = np.unique(ends.min(axis=1) * count + ends.max(axis=1))
