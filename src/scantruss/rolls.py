@@ -8,8 +8,8 @@ from .curves import length_around
 from .kernels import boundary as kernels
 from .kernels.surface import Surface
 from .machine import in_parts
-from .scan.orientation import dots
 from .scan.sites import with_own_scratch
+from .vectors import dots
 
 TRIES = 20  # of rolling the disc from one place
 PART = 3000  # fewest sites for a thread of their own

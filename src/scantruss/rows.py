@@ -12,7 +12,7 @@ from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
-from .scan.orientation import dots
+from .vectors import dots
 
 APART = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are

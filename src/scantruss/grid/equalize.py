@@ -10,6 +10,7 @@ where l_e is the mean of what is desired at the two nodes of a member.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,14 +58,24 @@ def settle_again(relief: Relief) -> None:
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
     """Try flips, collapses and splits where nodes ask for them; returns how many were kept."""
-    strain, share, _ = wanted(relief, scratch)
-    return search(relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, strain, PRICE, share)
+    terms = terms_of(relief, scratch)
+    return search(
+        relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, terms.strain, PRICE, terms.share
+    )
 
 
-def wanted(relief: Relief, scratch: Scratch) -> tuple[float, float, int]:
-    """Mean length over desired length - 1, the energy that any node has, and the number of nodes."""
+class Terms(NamedTuple):
+    """What decides over one node more or less, beside the energy around it."""
+
+    strain: float  #: mean length over desired length - 1
+    share: float  #: energy that any node has
+    nodes: int  #: how many there are
+
+
+def terms_of(relief: Relief, scratch: Scratch) -> Terms:
+    """Return the terms of a whole grid as it is now."""
     energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
-    return mean / relief.length - 1.0, min(energy / max(count, 1), SHARE), max(count, 1)
+    return Terms(mean / relief.length - 1.0, min(energy / max(count, 1), SHARE), max(count, 1))
 
 
 def grid_energy(grid: Grid, length: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.grid import Net
 from ..kernels.kick import HOPE, HOPELESS, KEPT, MOST, OUT, Area, kick_all
 from ..kernels.trial import Scratch
-from .equalize import FAR, PRICE, WEIGHT, new_scratch, settle_again, wanted
+from .equalize import FAR, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
 from .halves import Halves
 from .relief import Relief
 
@@ -51,7 +51,7 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
                 progress(0.6 + 0.2 * done / rounds)
             cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
             waiting = np.ones(len(relief.net.arc), np.bool_)
-            kick(relief, relief.net, room, waiting, wanted(relief, room[0]), cooled, HOPELESS)
+            kick(relief, relief.net, room, waiting, terms_of(relief, room[0]), cooled, HOPELESS)
             relief.renew(FAR)
     settle_again(relief)
 
@@ -65,18 +65,17 @@ def kick_in_halves(relief: Relief) -> None:
     rooms = [(new_scratch(relief), new_area(relief, number)) for number in range(3)]
 
     def kick_both(halves: Halves) -> None:
-        strain, share, count = wanted(relief, rooms[2][0])
+        terms = terms_of(relief, rooms[2][0])
+        terms = terms._replace(nodes=terms.nodes // 2)  # each half brings the mean length to the desired one by itself
         for side in (0, 1):
             rooms[side][1].mark[:, OUT] = halves.label != side
-        halves.run(
-            lambda side: kick(relief, halves.nets[side], rooms[side], waiting, (strain, share, count // 2), 0.0, HOPE)
-        )
+        halves.run(lambda side: kick(relief, halves.nets[side], rooms[side], waiting, terms, 0.0, HOPE))
 
     for _ in range(HALVINGS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
         if irregular.sum() >= FEW:
             kick_both(Halves(net, irregular))
-    kick(relief, net, rooms[2], waiting, wanted(relief, rooms[2][0]), 0.0, HOPE)
+    kick(relief, net, rooms[2], waiting, terms_of(relief, rooms[2][0]), 0.0, HOPE)
     relief.renew(FAR)
 
 
@@ -85,12 +84,10 @@ def kick(
     net: Net,
     room: tuple[Scratch, Area],
     waiting: np.ndarray,
-    wanted: tuple[float, float, int],
+    terms: Terms,
     heat: float,
     hope: float,
 ) -> None:
     """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.kick.kick_all`."""
-    strain, share, count = wanted
-    scratch, area = room
-    of_grid = relief.patches, relief.rim, scratch, area, waiting, relief.length
-    kick_all(net, *of_grid, WEIGHT, strain, PRICE, share, count, heat, hope)
+    of_grid = relief.patches, relief.rim, *room, waiting, relief.length
+    kick_all(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, heat, hope)

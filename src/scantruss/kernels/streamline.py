@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from .boxes import SearchBoxes, box_index, slot_of
+from .boxes import SearchBoxes, box_index, put_into, slot_of
 from .compile import kernel
 
-BITS, SIDE, REST = 3, 8, 7  # boxes along the side of a block
-BYTES = 64  # a bit for each of its boxes
+BITS = 3
+SIDE = 1 << BITS  # boxes along the side of a block
+REST = SIDE - 1
+BYTES = SIDE * SIDE  # a bit for each box of a block
 CHOSEN, BLOCKS = 0, 1  # places in `count`
 
 
@@ -49,14 +51,12 @@ def choose_first(
             box_index(boxes, 1, points[p, 1]),
             box_index(boxes, 2, points[p, 2]),
         )
-        slot = slot_of(blocks, i >> BITS, j >> BITS, k >> BITS)
-        block = blocks.first[slot]
+        block = blocks.first[slot_of(blocks, i >> BITS, j >> BITS, k >> BITS)]
         if block < 0:
             block = count[BLOCKS]
             if block == len(taken):
                 return m
-            blocks.keys[slot] = ((i >> BITS) * blocks.counts[1] + (j >> BITS)) * blocks.counts[2] + (k >> BITS)
-            blocks.first[slot] = block
+            put_into(blocks, block, i >> BITS, j >> BITS, k >> BITS)
             count[BLOCKS] += 1
         byte, bit = ((i & REST) << BITS) + (j & REST), np.uint8(1 << (k & REST))
         if taken[block, byte] & bit == 0:

@@ -8,6 +8,7 @@ from ..errors import InputError
 from ..kernels import normals as kernels
 from ..kernels.surface import Surface
 from ..machine import in_parts
+from ..vectors import dots
 
 PART = 3000  # fewest sites for a thread of their own
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
@@ -57,11 +58,6 @@ def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> No
             side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
         if side < 0:
             normals[piece == i] *= -1.0
-
-
-def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the scalar product of each vector of a (N, 3) with that of b, (N,): by columns, as sums of three numbers are slow."""
-    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:

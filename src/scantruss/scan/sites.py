@@ -15,10 +15,11 @@ from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..settings import Settings
+from ..vectors import dots
 from .cloud import PointCloud
 from .field import Wish, length_field, wish_of
 from .linked import PART, ROUGH, SHEETS, Linked, group, is_rough, link_finer, link_sites, settle_to_sheet, thin_dense
-from .orientation import STEEP, cut_steep_links, dots, face_one_side, face_outside, mean_normals
+from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from .streamline import points_near
 
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end

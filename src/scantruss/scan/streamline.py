@@ -81,12 +81,11 @@ class _First:
         )
 
     def _make_room(self, room: int) -> None:
-        """Make room for so many points, and as many blocks as these are in at most where each has many of them."""
-        old, rows = self.chosen, max(room // FILLED, 1)
-        rows = max(rows, 4 * int(self.count[kernels.BLOCKS]))
+        """Make room for so many points, and for the blocks that these fill, or four times as many as there are."""
+        old, rows = self.chosen, max(room // FILLED, 4 * int(self.count[kernels.BLOCKS]), 1)
         self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
         self.taken = np.zeros((rows, kernels.BYTES), np.uint8)
-        table = new_boxes(np.zeros(3), np.ones(3), 1.0, 0, rows)
+        table = new_boxes(np.zeros(3), np.ones(3), 1.0, rows, rows)
         self.blocks = table._replace(counts=self.boxes.counts // kernels.SIDE + 1)
         self._choose(old, 0, len(old))
 
