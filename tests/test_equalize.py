@@ -7,7 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as some
 from rough import compiled_only, curve_of, rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.equalize import PRICE, WEIGHT, equalize, finish, grid_energy, new_scratch, search_once, settle
+from scantruss.grid.equalize import (
+    LAST_STRIDE,
+    PRICE,
+    WEIGHT,
+    equalize,
+    finish,
+    grid_energy,
+    new_scratch,
+    search_once,
+    settle,
+)
 from scantruss.kernels import equalize as kernels
 from scantruss.kernels import rim as curves
 from scantruss.kernels import search
@@ -252,7 +262,20 @@ def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, m
     relief.patches[v, 0:3] = net.nodes[v] + away * length * along
     relief.patches[v, 9:15] = 0.0
     place = net.nodes[v].copy()
-    gained = kernels.settle_node(net, relief.patches, relief.rim, v, length, WEIGHT, 1e-6)
+    gained = kernels.settle_node(net, relief.patches, relief.rim, v, length, WEIGHT, 1e-6, kernels.STRIDE)
     assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
     assert np.linalg.norm(net.nodes[v] - relief.patches[v, 0:3]) <= kernels.LEASH * length
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
+
+
+def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
+    """Successive over-relaxation: what is uneven in the large goes slowly, node by node."""
+
+    def energy_after(sweeps, stride):
+        relief = rough.relief()
+        settle(relief, WEIGHT, 0.0, sweeps, stride)
+        return total_energy(relief.net, new_scratch(relief), relief.length, WEIGHT)[0]
+
+    plain, long = energy_after(36, kernels.STRIDE), energy_after(18, LAST_STRIDE)
+    assert long < plain * 1.001
+    assert long < energy_after(18, 1.0)

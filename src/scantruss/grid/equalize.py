@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.equalize import settle_all
+from ..kernels.equalize import STRIDE, settle_all
 from ..kernels.flips import flip_by_angle
 from ..kernels.search import search, suit_nodes
 from ..kernels.trial import Scratch, total_energy
@@ -25,6 +25,10 @@ from .relief import NEAR, Relief
 
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
+LAST_SWEEPS = (12, 6)  # most of these, each time with new patches,
+LAST_STRIDE = (
+    1.75  # and their steps: over a whole grid, what is uneven in the large goes slowly (successive over-relaxation)
+)
 PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
@@ -44,10 +48,10 @@ def new_scratch(relief: Relief) -> Scratch:
     )
 
 
-def settle(relief: Relief, weight: float, enough: float, sweeps: int) -> int:
+def settle(relief: Relief, weight: float, enough: float, sweeps: int, stride: float = STRIDE) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made."""
     awake = np.ones(len(relief.net.degree), np.int64)
-    return settle_all(relief.net, relief.patches, relief.rim, awake, relief.length, weight, enough, sweeps)
+    return settle_all(relief.net, relief.patches, relief.rim, awake, relief.length, weight, enough, sweeps, stride)
 
 
 def settle_again(relief: Relief) -> None:
@@ -107,7 +111,7 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
 
 def finish(relief: Relief, prefer: str = "balance") -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
-    for _ in range(2):
+    for sweeps in LAST_SWEEPS:
         relief.renew(NEAR)
-        settle(relief, EVEN[prefer], 1e-5, 20)
+        settle(relief, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE)
     relief.return_to_scan(NEAR)

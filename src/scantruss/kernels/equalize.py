@@ -74,7 +74,9 @@ def star_energy(
 
 
 @kernel
-def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float) -> float:
+def settle_node(
+    net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float, stride: float
+) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
     Steps shorter than `still`, where members are to have the length, are not made.
@@ -89,7 +91,7 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
-    step = STRIDE * local * local / (net.state[v, DEGREE] * (weight + 1.3))
+    step = stride * local * local / (net.state[v, DEGREE] * (weight + 1.3))
     most = 0.3 * local
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
     if size < still * net.desired[v]:
@@ -118,7 +120,15 @@ def settle_node(net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, 
 
 @kernel
 def settle_all(
-    net: Net, patches: np.ndarray, rim: Rim, awake: np.ndarray, length: float, weight: float, enough: float, sweeps: int
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    awake: np.ndarray,
+    length: float,
+    weight: float,
+    enough: float,
+    sweeps: int,
+    stride: float,
 ) -> int:
     """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made.
 
@@ -130,7 +140,7 @@ def settle_all(
         for v in range(used):
             if awake[v] == 1:
                 awake[v] = 0
-                gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length)
+                gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length, stride)
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1

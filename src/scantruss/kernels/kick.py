@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compile import kernel
-from .equalize import settle_node
+from .equalize import STRIDE, settle_node
 from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, place_of, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
@@ -183,7 +183,7 @@ def settle_area(net: Net, patches: np.ndarray, rim: Rim, area: Area, length: flo
             listed = k < area.counter[COUNT]
             v = area.around[k] if listed else added_node(net, area, k - area.counter[COUNT])
             if v >= 0 and net.state[v, DEGREE] > 0 and area.mark[v, 1] < WIDE:
-                settle_node(net, patches, rim, v, length, weight, STILL * length)
+                settle_node(net, patches, rim, v, length, weight, STILL * length, STRIDE)
 
 
 @kernel

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .equalize import settle_node
+from .equalize import STRIDE, settle_node
 from .grid import (
     CURVE,
     DEGREE,
@@ -190,9 +190,9 @@ def try_move(
         break
     for turn in range(1 + SWEEPS):
         for i in range(min(4, scratch.counter[1]) if turn == 0 else scratch.counter[1]):
-            settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length)
+            settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length, STRIDE)
         if turn == 0 and added >= 0:
-            settle_node(net, patches, rim, added, length, weight, STILL * length)
+            settle_node(net, patches, rim, added, length, weight, STILL * length, STRIDE)
         after = local_energy(net, scratch, length, weight)
         if after > before + (EARLY[move] if turn == 0 else HOPE[move]):
             break
