@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hard_scans import hard
+from hypothesis import given, strategies
 from rough import compiled_only
 from small_clouds import sheet
 
@@ -87,6 +88,23 @@ def test_a_spike_of_a_rim_is_on_one_sheet(rise, normal, found):
     normals[len(x) :] *= normal
     _, gap = kernels.widest_spike(curve, normals, 0.6, 15, 60)
     assert (gap > 0) == found
+
+
+@given(strategies.integers(0, 10_000), strategies.integers(20, 90), strategies.floats(0.2, 1.2))
+def test_the_widest_spike_is_that_of_a_look_at_all_pairs(seed, count, width):
+    """A random closed curve of uneven steps in a plane; of two alike the first counts."""
+    rng = np.random.default_rng(seed)
+    walk = np.cumsum(rng.normal(size=(count, 2)), axis=0) * 0.1
+    walk -= np.linspace(0, 1, count)[:, None] * (walk[-1] - walk[0])
+    curve, normals = np.column_stack([walk, np.zeros(count)]), np.tile([0.0, 0.0, 1.0], (count, 1))
+    low, high = 4, count // 2
+    at, gap = 0, 0
+    for i in range(count):
+        for k in range(high, max(low, gap), -1):
+            if np.linalg.norm(curve[(i + k) % count] - curve[i]) < width:
+                at, gap = i, k
+                break
+    assert kernels.widest_spike(curve, normals, width, low, high) == (at, gap)
 
 
 def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():

@@ -12,7 +12,7 @@ from .scan.sites import with_own_scratch
 from .vectors import dots
 
 TRIES = 20  # of rolling the disc from one place
-PART = 3000  # fewest sites for a thread of their own
+PART = 1500  # fewest sites for a thread of their own
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
 
 

@@ -17,6 +17,7 @@ class SearchBoxes(NamedTuple):
 
     lower: np.ndarray  #: (3,) float64 lower bounds
     size: np.ndarray  #: (3,) float64, D of Eq. 3
+    inverse: np.ndarray  #: (3,) float64, 1 / D: a product takes a fraction of the time of a quotient
     counts: np.ndarray  #: (3,) int64, N of Eq. 2
     keys: np.ndarray  #: (H,) int64 number of the box in each slot, -1 free; H is a power of two
     first: np.ndarray  #: (H,) int64 first item of the box
@@ -36,6 +37,7 @@ def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, s
     return SearchBoxes(
         np.array(lower, float),
         size,
+        1.0 / size,
         parts + 1,
         np.full(table, -1, np.int64),
         np.full(table, -1, np.int64),
@@ -46,7 +48,7 @@ def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, s
 @kernel
 def box_index(boxes: SearchBoxes, axis: int, x: float) -> int:
     """Eq. 4, counted from 0; places outside the bounds belong to the outermost box."""
-    i = int((x - boxes.lower[axis]) / boxes.size[axis])
+    i = int((x - boxes.lower[axis]) * boxes.inverse[axis])
     return min(max(i, 0), boxes.counts[axis] - 1)
 
 

@@ -10,7 +10,7 @@ from ..kernels.surface import Surface
 from ..machine import in_parts
 from ..vectors import dots
 
-PART = 3000  # fewest sites for a thread of their own
+PART = 1500  # fewest sites for a thread of their own
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
 STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
 
