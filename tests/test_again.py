@@ -11,35 +11,39 @@ from scantruss import pipeline
 from scantruss.errors import FrontError
 
 
-def others(sharp=False, **settings):
-    boundary = SimpleNamespace(lines=SimpleNamespace(sharp=np.array([sharp])))
+def size_of(settings):
+    return settings.box_size and round(settings.box_size, 3)
+
+
+def others(sharp=False, smooth=False, **settings):
+    boundary = SimpleNamespace(lines=SimpleNamespace(sharp=np.array([sharp])), sites=SimpleNamespace(smooth=smooth))
     return [
-        (o.ridge_angle, round(o.box_size, 3), o.method)
-        for o in pipeline._others(boundary, st.Settings(length=1.0, **settings))
+        (o.ridge_angle, size_of(o), o.method) for o in pipeline._others(boundary, st.Settings(length=1.0, **settings))
     ]
 
 
 def test_what_is_tried_in_which_order():
     ridge = st.Settings(length=1.0).ridge_angle
     coarser = [0.22, 0.24, 0.26]
-    assert others() == [(ridge, size, "default") for size in coarser] + [(ridge, 0.2, "paper")]
-    assert others(sharp=True) == [(0.0, size, "default") for size in (0.2, *coarser)] + [(0.0, 0.2, "paper")]
+    assert others() == [(ridge, size, "default") for size in coarser] + [(ridge, None, "paper")]
+    assert others(sharp=True) == [(0.0, size, "default") for size in (None, *coarser)] + [(0.0, None, "paper")]
+    assert others(smooth=True) == [(ridge, size, "default") for size in (0.2, *coarser)] + [(ridge, None, "paper")]
     assert others(box_size=0.5) == [(ridge, 0.5, "paper")]
     assert others(method="paper") == []
 
 
-@pytest.mark.parametrize(("size", "method"), [(0.22, "default"), (0.26, "default"), (0.2, "paper")])
+@pytest.mark.parametrize(("size", "method"), [(0.22, "default"), (0.26, "default"), (None, "paper")])
 def test_the_first_that_passes_is_the_grid_and_its_settings_say_so(monkeypatch, size, method):
     whole = pipeline._checked_grid
 
     def refuse_others(cloud, boundary, settings, *rest):
-        if (round(settings.box_size, 3), settings.method) != (size, method):
+        if (size_of(settings), settings.method) != (size, method):
             raise FrontError("not these")
         return whole(cloud, boundary, settings, *rest)
 
     monkeypatch.setattr(pipeline, "_checked_grid", refuse_others)
     grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
-    assert (round(grid.settings.box_size, 3), grid.settings.method) == (size, method)
+    assert (size_of(grid.settings), grid.settings.method) == (size, method)
     assert grid.certificate.passed
 
 

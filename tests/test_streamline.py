@@ -10,6 +10,7 @@ import scantruss as st
 from scantruss import machine
 from scantruss.boundary import find_boundary
 from scantruss.scan import streamline
+from scantruss.scan.cloud import bounds_of
 from scantruss.scan.sites import prepare_sites
 from scantruss.scan.streamline import is_dense, points_near, streamlined
 
@@ -29,7 +30,7 @@ def slow(points, size):
 @settings(max_examples=10)
 def test_the_first_point_of_each_box_stays(seed, size):
     points = np.random.default_rng(seed).uniform(0, 4, (400, 3)) * [1.0, 0.7, 0.01]
-    assert streamlined(points, size).tolist() == slow(points, size)
+    assert streamlined(points, bounds_of(points), size).tolist() == slow(points, size)
 
 
 @pytest.mark.parametrize("room", [1, 64, 1 << 16])
@@ -42,7 +43,7 @@ def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
     for count in (1, 2, 5):
         monkeypatch.setattr(machine, "processors", lambda count=count: count)
         monkeypatch.setattr(streamline, "processors", lambda count=count: count)
-        found.append(streamlined(points, 0.1).tolist())
+        found.append(streamlined(points, bounds_of(points), 0.1).tolist())
     assert found[0] == found[1] == found[2] == slow(points, 0.1)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -159,9 +159,10 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
     rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)
     loops = [(loop, piece) for loop, piece in rolled if piece in sites.pieces]
-    dense = with_whole_rim(sites, np.concatenate([np.zeros(0, np.int64), *(loop for loop, _ in loops)]), surface)
-    for loop, piece in loops:
-        points = boundary_points(dense, loop, max(0.5 * radius, 2.5 * sites.spacing), STEP * length)
+    slid = boundary_points(
+        sites, surface, [loop for loop, _ in loops], max(0.5 * radius, 2.5 * sites.spacing), STEP * length
+    )
+    for points, (loop, piece) in zip(slid, loops, strict=True):
         if len(points) < 3:
             continue
         if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
@@ -207,31 +208,51 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
     return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
 
 
-def boundary_points(surface: Surface, loop: np.ndarray, radius: float, step: float) -> np.ndarray:
-    """Return the boundary points (M, 3) along a loop of sites: what a disc slid from outside touches, in order."""
+def boundary_points(
+    sites: Sites, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
+) -> list[np.ndarray]:
+    """Return the boundary points (M, 3) along each loop of sites: what a disc slid from outside touches, in order.
+
+    Where the surface has only some of the points, the disc slides once more, against all those beside what it has touched.
+    """
+    along = [_places_along(surface, loop, step) for loop in loops]
+    touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
+    if sites.whole is not None and loops:
+        surface = with_whole_rim(sites, surface, np.concatenate(touched))
+        touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
+    touched = [
+        _touch_points(surface, smooth_turns(points), near, radius, 4)
+        for points, (_, near) in zip(touched, along, strict=True)
+    ]
+    return [_in_order(points, step) for points in touched]
+
+
+def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places (M, 3) so far apart along a loop of sites, and the site near each (M,)."""
     turns = smooth_turns(surface.mean[loop])
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
     places = resample(turns, step)
     at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
-    near = loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
-    touched = np.empty_like(places)
-    for reach in (8, 4):
-        ahead = np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
-        _touch_points(surface, places, ahead, near, radius, touched)
-        places = smooth_turns(touched)
+    return places, loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
+
+
+def _in_order(touched: np.ndarray, step: float) -> np.ndarray:
+    """Return the points that go on along a loop, those that are hardly farther than the one before left out."""
     touched = touched[_onwards(touched)]
     forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
     return touched[forward]
 
 
-def _touch_points(
-    surface: Surface, places: np.ndarray, ahead: np.ndarray, near: np.ndarray, radius: float, touched: np.ndarray
-) -> None:
+def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius: float, reach: int) -> np.ndarray:
+    """Return what a disc touches at each place of a loop (M, 3), which runs from the places so many before to those after."""
+    touched, ahead = np.empty_like(places), np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
+
     def touch(part: int, begin: int, end: int) -> None:
         own = surface if part == 0 else with_own_scratch(surface)
         kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
 
     in_parts(len(places), PART, touch)
+    return touched
 
 
 def _onwards(touched: np.ndarray) -> list[int]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from .errors import CertificateError, FrontError, InputError, ScanTrussError
-from .settings import Settings, shortest_and_longest
+from .settings import SITE, Settings, shortest_and_longest
 
 if TYPE_CHECKING:
     from .boundary import Boundary
@@ -98,8 +98,8 @@ def grid_from_cloud(
     Returns
     -------
     Grid
-        Where no grid passes the checks, one without the ridges of the scan, with coarser sites or by the paper's method, if that
-        passes; its settings say so: `ridge_angle` 0, a larger `box_size`, `method` "paper".
+        Where no grid passes the checks, one without the ridges of the scan, with other sites or by the paper's method, if that
+        passes; its settings say so: `ridge_angle` 0, another `box_size`, `method` "paper".
     """
     started = perf_counter()
     check_length(cloud, settings)
@@ -162,7 +162,9 @@ def _others(boundary: Boundary, settings: Settings) -> Iterator[Settings]:
         settings = settings.replace(ridge_angle=0.0)
         yield settings
     if settings.method == "default":
-        for size in (share * settings.box_size for share in COARSER):
+        if boundary.sites.smooth:
+            yield settings.replace(box_size=SITE)
+        for size in (share * (settings.box_size or SITE) for share in COARSER):
             if size <= COARSEST:
                 yield settings.replace(box_size=size)
         yield settings.replace(method="paper")

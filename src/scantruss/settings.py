@@ -14,6 +14,7 @@ from typing import Any
 from .errors import InputError
 from .selection import FORMS, RETURNS, Selection
 
+SITE, SMOOTH_SITE = 0.2, 0.3  # distance of the sites of any scan, and of a dense and smooth one, in lengths
 HOLE = 4.0  # members around the smallest hole worth framing; the front runs over smaller ones
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
@@ -135,8 +136,11 @@ class Settings:
     case3: str = _setting(
         "merge", "case 3: merge the free nodes, or Foucault's quadrangle", source="Table 1, [30]", choices=CASE3
     )
-    box_size: float = _setting(
-        0.2, "distance of the sites to which the scan is thinned, in lengths; search boxes are larger", source="Eq. 1"
+    box_size: float | None = _setting(
+        None,
+        f"distance of the sites to which the scan is thinned, in lengths; none: {SITE:g}, where it is dense and smooth"
+        f" {SMOOTH_SITE:g}; search boxes are larger",
+        source="Eq. 1",
     )
     thin_spacing: float | None = _setting(
         None,
@@ -196,6 +200,8 @@ class Settings:
             ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
+            if value is None and name == "box_size":
+                continue
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise InputError(f"{name} must be a number, got {value!r}")
             if not low <= value <= high:

@@ -14,7 +14,7 @@ import numpy as np
 from .boxes import SearchBoxes, search
 from .compile import kernel
 from .surface import Surface, flood, walk
-from .vectors import Vector, across, along, cross, dot, row, subtract, unit
+from .vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
 DIRECTIONS = 64
 BINS = 240
@@ -294,16 +294,21 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
     at, gap : the first place and the steps to the second; gap 0 where there are none
     """
     count = len(curve)
-    at, gap = 0, 0
+    at, gap, longest = 0, 0, 0.0
     for i in range(count):
-        for k in range(high, max(low, gap), -1):
+        longest = max(longest, norm(subtract(row(curve, (i + 1) % count), row(curve, i))))
+    for i in range(count):
+        k = high
+        while k > max(low, gap):
             j = (i + k) % count
-            d = subtract(row(curve, j), row(curve, i))
-            dd = dot(d, d)
-            if dd < width * width:
-                if _beside(d, row(normals, i), row(normals, j)):
+            away = norm(subtract(row(curve, j), row(curve, i)))
+            if away < width:
+                if _beside(subtract(row(curve, j), row(curve, i)), row(normals, i), row(normals, j)):
                     at, gap = i, k
                     break
+                k -= 1
+            else:  # so many steps back it may be near enough
+                k -= max(1, int((away - width) / longest))
     return at, gap
 
 

@@ -95,22 +95,49 @@ def cut_steep_links(
 
 
 @kernel
+def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
+    """Cosine between the normal of site n and that of site s mirrored at the plane half-way; of either sign.
+
+    It follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
+    """
+    e = unit(subtract(row(mean, n), row(mean, s)))
+    a, b = row(normals, s), row(normals, n)
+    return abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b))
+
+
+@kernel
+def mark_uneven(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, least: float, uneven: np.ndarray, begin: int, end: int
+) -> None:
+    """Mark the sites from `begin` to `end` - 1, (S,) bool, with a link along which the scan is no arc.
+
+    There the normals, one mirrored to the other, have a cosine below `least`.
+    """
+    for s in range(begin, end):
+        uneven[s] = False
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            if _mirrored(mean, normals, s, n) < least:
+                uneven[s] = True
+                break
+
+
+@kernel
 def link_weights(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray, begin: int, end: int
 ) -> None:
     """How much the normals of neighbours disagree when one is mirrored to the other: 254 sqrt(1 - |cosine|), (S, K) uint8; 255 = no link.
 
-    Mirroring at the plane half-way follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009). Steps of a
-    third of a degree: links that are as certain are taken in their order, which lie together, not all over the scan.
+    Steps of a third of a degree: links that are as certain are taken in their order, which lie together, not all over the scan.
     """
     for s in range(begin, end):
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
             weights[s, k] = 255
             if n >= 0:
-                e = unit(subtract(row(mean, n), row(mean, s)))
-                a, b = row(normals, s), row(normals, n)
-                weights[s, k] = int(254.0 * math.sqrt(max(1.0 - abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b)), 0.0)))
+                weights[s, k] = int(254.0 * math.sqrt(max(1.0 - _mirrored(mean, normals, s, n), 0.0)))
 
 
 @kernel

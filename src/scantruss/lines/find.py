@@ -35,7 +35,7 @@ def find_lines(
     InputError
         One of the fixed lines cannot be used.
     """
-    wanted = settings.ridge_angle > 0.0 and settings.method == "default"
+    wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not sites.smooth
     ridges = find_ridges(sites, settings) if wanted else []
     if not settings.fixed_lines and not ridges:
         return NO_LINES

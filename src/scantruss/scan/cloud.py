@@ -13,6 +13,8 @@ from ..machine import in_parts, processors
 from .units import check_unit
 from .wild import CAUSE, check_sensible, find_wild, said_of_wild
 
+Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
+
 LARGEST = 1e100  # coordinates beyond this overflow when squared
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
 SAMPLE = 600  # points at which the spacing is measured
@@ -33,7 +35,7 @@ class PointCloud:
     notes: tuple[str, ...] = ()  #: what a user should know of how it was read
 
     @cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self) -> Bounds:
         """Smallest and largest coordinates, (3,) each [scan unit]."""
         return bounds_of(self.points)
 
@@ -125,7 +127,7 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
     return array, lower, upper
 
 
-def bounds_of(array: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bounds_of(array: np.ndarray) -> Bounds:
     """Return the smallest and largest coordinates, (3,) each; NaN where one is NaN or infinite."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
@@ -186,7 +188,7 @@ def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, said: str)
         raise InputError(f"{said}all points lie on a line; a grid needs points spread over a surface")
 
 
-def measure_spacing(points: np.ndarray, bounds: tuple[np.ndarray, np.ndarray] | None = None) -> float:
+def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
     """Return the typical distance between neighbouring points.
 
     The median of the distance to the nearest other point that does not coincide, at up to 600 points taken evenly

@@ -10,7 +10,7 @@ from ..kernels import normals as normal_kernels
 from ..kernels import sites as kernels
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..machine import in_parts
-from .cloud import bounds_of
+from .cloud import Bounds, bounds_of
 from .streamline import is_dense, streamlined
 
 NEIGHBORS = 12  # links of a site
@@ -18,12 +18,15 @@ CLOSE = 2.2  # size of the search boxes while sites are chosen, in their radii
 MANY = 250_000  # points from which on they no longer fit into the cache, and are sorted
 LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
 PART = 20_000  # fewest points for a thread of their own
+SITES = 1500  # fewest sites
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
 SOME_ROUGH = 0.002  # share of such sites from which on that is done
 SHEETS = 0.12  # sites thicker than this may be several sheets
 FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
 FINEST = 1.0  # spacings between the finest sites
+BENT = 0.075  # sites of a smooth scan are no thicker than this, in member lengths
+FEW = 2  # sites at which a smooth scan is not: there is no room for a ridge
 
 
 class Linked(NamedTuple):
@@ -40,14 +43,14 @@ class Linked(NamedTuple):
     thickness: np.ndarray  #: (S,)
 
 
-def thin_dense(points: np.ndarray, radius: float, spacing: float) -> np.ndarray:
-    """Return those of very dense points that serve as well as all of them, sorted where they are many.
+def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float) -> np.ndarray:
+    """Return those of very dense points, within these bounds, that serve as well as all of them, sorted where they are many.
 
     Sorted by much larger sites, what lies together in space does so in memory, in all that follows. By sites, not by boxes: a scan
     that is turned or moved stays sorted as it was.
     """
     if is_dense(spacing, FINE * radius):
-        points = points.take(streamlined(points, FINE * radius), axis=0)
+        points = points.take(streamlined(points, bounds, FINE * radius), axis=0)
     if len(points) < MANY:
         return points
     owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)
@@ -59,6 +62,19 @@ def link_sites(points: np.ndarray, radius: float, length: float, spacing: float)
     owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
     grouped, start, mean = group(points, owner, len(chosen))
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
+
+
+def is_smooth(found: Linked, length: float, uneven: float) -> bool:
+    """Whether the scan is a smooth surface at the sites, flat or evenly bent: larger sites tell as much of it as smaller ones.
+
+    uneven : angle by which the normals of neighbours, one mirrored to the other, differ at most [degree]
+    """
+    if (found.thickness > BENT * length).sum() > FEW:
+        return False
+    marks, least = np.empty(len(found.mean), np.bool_), float(np.cos(np.radians(uneven)))
+    linked = found.mean, found.normals, found.neighbors
+    in_parts(len(marks), SITES, lambda _, begin, end: normal_kernels.mark_uneven(*linked, least, marks, begin, end))
+    return bool(marks.sum() <= FEW)
 
 
 def link_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
@@ -133,7 +149,7 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
     in_parts(
-        len(places), 3000, lambda _, begin, end: kernels.nearest_sites(places, boxes, near, far, neighbors, begin, end)
+        len(places), SITES, lambda _, begin, end: kernels.nearest_sites(places, boxes, near, far, neighbors, begin, end)
     )
     kernels.link_back(places, neighbors)
     return neighbors
@@ -144,7 +160,7 @@ def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.nd
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
         len(mean),
-        3000,
+        SITES,
         lambda _, begin, end: normal_kernels.site_normals(mean, neighbors, normals, thickness, begin, end),
     )
     return normals, thickness

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,30 @@ from ..kernels.boxes import SearchBoxes
 from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
 from ..machine import in_parts
-from ..settings import Settings
+from ..settings import SITE, SMOOTH_SITE, Settings
 from ..vectors import dots
-from .cloud import PointCloud
+from .cloud import Bounds, PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
-from .linked import PART, ROUGH, SHEETS, Linked, group, is_rough, link_finer, link_sites, settle_to_sheet, thin_dense
+from .linked import (
+    FINE,
+    PART,
+    ROUGH,
+    SHEETS,
+    Linked,
+    group,
+    is_rough,
+    is_smooth,
+    link_finer,
+    link_sites,
+    settle_to_sheet,
+    thin_dense,
+)
 from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from .streamline import points_near
 
+BESIDE = 1.5  # how far all points are beside those that serve as well, in distances of these
+SPARSE = 0.08  # spacing of the points, in member lengths, from which on no larger sites are tried
+UNEVEN = 20.0  # as `Asked.uneven`: a ridge that bends by twice as much would be seen
 SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
 
 
@@ -41,6 +58,7 @@ class Sites:
     repeated: int = 0  #: points that were left out because they repeat another one
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
+    smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
 
     @property
     def left_out(self) -> tuple[int, float]:
@@ -55,9 +73,39 @@ class Sites:
         return is_graded(self.surface)
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[tuple[float, float, float, bool, Wish | None], Sites]] = (
-    weakref.WeakKeyDictionary()
-)
+class Asked(NamedTuple):
+    """What of the settings decides over the sites."""
+
+    length: float
+    box_size: float | None
+    stray_distance: float
+    drop_repeated: bool
+    uneven: (
+        float  #: angle by which normals, one mirrored to the other, differ no more where the scan bends evenly [degree]
+    )
+    wish: Wish | None
+
+    @classmethod
+    def of(cls, settings: Settings, origin: np.ndarray) -> Asked:
+        """Return it for a cloud with this origin."""
+        strays = settings.stray_distance if settings.clean else 0.0
+        repeated = settings.clean and settings.drop_repeated
+        uneven = min(UNEVEN, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN
+        return cls(settings.length, settings.box_size, strays, repeated, uneven, wish_of(settings, origin))
+
+
+class _Chosen(NamedTuple):
+    """The sites of a scan, and of what they were chosen."""
+
+    found: Linked
+    radius: float  #: of a site
+    points: np.ndarray  #: (N, 3) the points given to the sites
+    whole: np.ndarray  #: (M, 3) all points of the scan
+    strays: int  #: points that were left out of it
+    smooth: bool
+
+
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[Asked, Sites]] = weakref.WeakKeyDictionary()
 
 
 def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
@@ -70,14 +118,12 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
         `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
         out, `length_field` where members are to be longer.
     """
-    strays = settings.stray_distance if settings.clean else 0.0
-    repeated = settings.clean and settings.drop_repeated
-    key = (settings.length, settings.box_size, strays, repeated, wish_of(settings, cloud.origin))
+    asked = Asked.of(settings, cloud.origin)
     kept = _KEPT.setdefault(cloud, {})
-    if key not in kept:
+    if asked not in kept:
         kept.clear()
-        kept[key] = _prepare(cloud.points, cloud.spacing, *key)
-    return kept[key]
+        kept[asked] = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+    return kept[asked]
 
 
 def is_graded(surface: Surface) -> bool:
@@ -94,8 +140,8 @@ def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Set
     """Return the sites of the same points of a cloud and of made-up ones (F, 3) [scan unit]."""
     points = sites.surface.points
     both = np.concatenate([points, added])
-    wish = wish_of(settings, cloud.origin)
-    prepared = _prepare(both, sites.spacing, settings.length, settings.box_size, 0.0, False, wish, len(points))
+    asked = Asked.of(settings, cloud.origin)._replace(stray_distance=0.0, drop_repeated=False)
+    prepared = _prepare(both, bounds_of(both), sites.spacing, asked, len(points))
     return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole)
 
 
@@ -114,13 +160,13 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     return surface._replace(scale=scale)
 
 
-def with_whole_rim(sites: Sites, rim: np.ndarray, surface: Surface) -> Surface:
-    """Return the surface with all points near some sites (R,), where it has only some of them: those of the rim tell where it is."""
+def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
+    """Return the surface with all points near some of its points (R, 3), where it has only some: those of the rim tell where it is."""
     if sites.whole is None or len(rim) == 0:
         return surface
-    near = sites.whole.take(points_near(sites.whole, surface.mean[rim], 2.0 * surface.scale[1]), axis=0)
-    owner, means, reach = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
-    in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, reach, owner, begin, end))
+    near = sites.whole.take(points_near(sites.whole, rim, BESIDE * FINE * surface.scale[1]), axis=0)
+    owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
+    in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, far, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
     grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
@@ -158,42 +204,21 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(
-    points: np.ndarray,
-    spacing: float,
-    length: float,
-    box_size: float,
-    stray_distance: float,
-    drop_repeated: bool,
-    wish: Wish | None,
-    measured: int | None = None,
-) -> Sites:
-    """Return the sites of points, of which those from the number `measured` on are made up."""
-    radius = max(box_size * length, 0.25 * spacing)
-    repeated, strays = 0, 0
-    if drop_repeated and has_repeats(points):
+def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, measured: int | None = None) -> Sites:
+    """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
+    length, repeated = asked.length, 0
+    if asked.drop_repeated and has_repeats(points):
         kept = ~find_repeated(points)
         repeated = int(len(points) - kept.sum())
         points = np.ascontiguousarray(points[kept])
-    whole = points
-    if measured is None:
-        points = thin_dense(whole, radius, spacing)
-    found = link_sites(points, radius, length, spacing)
-    if stray_distance and has_strays(found.neighbors):
-        stray = find_strays(whole, stray_distance, length)
-        strays = int(stray.sum())
-        if strays:
-            whole = np.ascontiguousarray(whole[~stray])
-            points = thin_dense(whole, radius, spacing)
-            found = link_sites(points, radius, length, spacing)
-    if is_rough(found, SHEETS * length):
-        fine = link_finer(whole, radius, length, spacing)
-        if fine is not None:
-            points, (found, radius) = whole, fine
-    if is_rough(found, ROUGH * length):
-        found = settle_to_sheet(found, points, radius, length, spacing)
-    surface, piece = _faced_surface(found, radius, length, spacing)
-    surface = surface._replace(field=length_field(surface, wish))
+        bounds = bounds_of(points)
+    thinned = measured is None
+    chosen = _smooth_sites(points, bounds, spacing, asked, thinned) or _usual_sites(
+        points, bounds, spacing, asked, thinned
+    )
+    found = chosen.found
+    surface, piece = _faced_surface(found, chosen.radius, length, spacing)
+    surface = surface._replace(field=length_field(surface, asked.wish))
     piece = _number(piece)
     area = _site_areas(surface)
     graded = area / surface.field**2
@@ -206,11 +231,46 @@ def _prepare(
         float(area.sum()),
         float(graded.sum()),
         _large_pieces(piece, area, graded, length),
-        strays,
+        chosen.strays,
         repeated,
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
-        whole if len(points) < len(whole) else None,
+        chosen.whole if len(chosen.points) < len(chosen.whole) else None,
+        chosen.smooth,
     )
+
+
+def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, thinned: bool) -> _Chosen | None:
+    """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
+    length, radius = asked.length, SMOOTH_SITE * asked.length
+    if asked.box_size is not None or spacing > SPARSE * length:
+        return None
+    some = thin_dense(points, bounds, radius, spacing) if thinned else points
+    found = link_sites(some, radius, length, spacing)
+    if has_strays(found.neighbors) or not is_smooth(found, length, asked.uneven):
+        return None
+    return _Chosen(found, radius, some, points, 0, True)
+
+
+def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, thinned: bool) -> _Chosen:
+    """Return the sites of any scan, without its strays; of a rough one moved to the middle of its sheets."""
+    length, strays = asked.length, 0
+    radius = max((asked.box_size or SITE) * length, 0.25 * spacing)
+    some = thin_dense(points, bounds, radius, spacing) if thinned else points
+    found = link_sites(some, radius, length, spacing)
+    if asked.stray_distance and has_strays(found.neighbors):
+        stray = find_strays(points, asked.stray_distance, length)
+        strays = int(stray.sum())
+        if strays:
+            points = np.ascontiguousarray(points[~stray])
+            some = thin_dense(points, bounds_of(points), radius, spacing)
+            found = link_sites(some, radius, length, spacing)
+    if is_rough(found, SHEETS * length):
+        fine = link_finer(points, radius, length, spacing)
+        if fine is not None:
+            some, (found, radius) = points, fine
+    if is_rough(found, ROUGH * length):
+        found = settle_to_sheet(found, some, radius, length, spacing)
+    return _Chosen(found, radius, some, points, strays, False)
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:

@@ -12,7 +12,7 @@ from ..kernels import nearby
 from ..kernels import streamline as kernels
 from ..kernels.boxes import new_boxes
 from ..machine import in_parts, processors
-from .cloud import bounds_of
+from .cloud import Bounds
 
 DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
 PART = 200_000  # fewest points for a thread of their own
@@ -27,12 +27,13 @@ def is_dense(spacing: float, size: float) -> bool:
     return 0.0 < spacing < DENSE * size
 
 
-def streamlined(points: np.ndarray, size: float) -> np.ndarray:
+def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
     """Return the first point in each occupied search box, in their order.
 
     Parameters
     ----------
     points : (N, 3) float64 [scan unit]
+    bounds : the lowest and the highest coordinates, (3,) each [scan unit]
     size : about the distance of the points that stay [scan unit]
 
     Returns
@@ -40,7 +41,7 @@ def streamlined(points: np.ndarray, size: float) -> np.ndarray:
     (K,) int64
         Which points stay; the same for any number of processors.
     """
-    lower, upper = bounds_of(points)
+    lower, upper = bounds
     room = min(max(len(points) // 2, ROOM), MOST_ROOM)
     parts: dict[int, _First] = {}
 
