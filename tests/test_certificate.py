@@ -301,19 +301,19 @@ def test_the_front_is_tried_again_with_another_length_where_a_grid_fails(plate, 
 
 
 def test_where_no_attempt_passes_the_fault_of_the_first_whole_grid_is_told(plate, monkeypatch):
-    """Three attempts without rows, three more with each coarser look at the scan, and three by the paper's method."""
-    lengths = damaged(monkeypatch, 15)
+    """Three attempts without rows, three with each other look at the scan (the usual one, three coarser), three by the paper."""
+    lengths = damaged(monkeypatch, 18)
     with pytest.raises(FrontError, match=r"the grid leaves out .* of the scan") as refused:
         st.grid_from_points(plate, st.Settings(length=1.5))
-    assert isinstance(refused.value, CertificateError) and len(lengths) == 15
+    assert isinstance(refused.value, CertificateError) and len(lengths) == 18
     assert refused.value.where == refused.value.grid.certificate.faults[0].where
     assert not refused.value.grid.certificate.passed
 
 
 def test_where_the_default_method_fails_that_of_the_paper_is_tried(plate, monkeypatch):
-    lengths = damaged(monkeypatch, 12)
+    lengths = damaged(monkeypatch, 15)
     grid = st.grid_from_points(plate, st.Settings(length=1.5))
-    assert len(lengths) == 13 and grid.certificate.passed
+    assert len(lengths) == 16 and grid.certificate.passed
     assert grid.settings == st.Settings(length=1.5, method="paper")
 
 

@@ -7,7 +7,7 @@ import pytest
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "scantruss"
 LAYERS = (  # lowest first; a module imports from its own line and from lines above
-    ("errors", "kernels", "__init__"),  # __init__: the version
+    ("errors", "kernels", "vectors", "__init__"),  # __init__: the version
     ("selection", "settings", "machine", "workers"),
     ("scan", "clean"),
     ("splice",),

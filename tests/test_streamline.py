@@ -20,7 +20,7 @@ def slow(points, size):
     lower, extent = points.min(axis=0), np.ptp(points, axis=0)
     step = np.where(extent > 0.5 * size, extent / np.maximum(np.ceil(extent / size), 1), size)
     first = {}
-    for number, box in enumerate(np.floor((points - lower) / step).astype(int).tolist()):
+    for number, box in enumerate(np.floor((points - lower) * (1.0 / step)).astype(int).tolist()):
         first.setdefault(tuple(box), number)
     return sorted(first.values())
 

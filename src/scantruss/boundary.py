@@ -213,9 +213,13 @@ def boundary_points(
 ) -> list[np.ndarray]:
     """Return the boundary points (M, 3) along each loop of sites: what a disc slid from outside touches, in order.
 
-    Where the surface has only some of the points, the disc slides once more, against all those beside what it has touched.
+    Where the surface has only some of the points, the disc slides once more, against all points beside what it touched at first.
     """
     along = [_places_along(surface, loop, step) for loop in loops]
+    if sites.smooth:
+        # a loop of larger sites cuts re-entrant corners; on a rough scan its own sites are the ones to trust
+        for places, near in along:
+            kernels.come_nearer(surface, places, near)
     touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
     if sites.whole is not None and loops:
         surface = with_whole_rim(sites, surface, np.concatenate(touched))

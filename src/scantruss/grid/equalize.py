@@ -26,9 +26,7 @@ from .relief import NEAR, Relief
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
 LAST_SWEEPS = (12, 6)  # most of these, each time with new patches,
-LAST_STRIDE = (
-    1.75  # and their steps: over a whole grid, what is uneven in the large goes slowly (successive over-relaxation)
-)
+LAST_STRIDE = 1.75  # and their steps: what is uneven in the large goes slowly (successive over-relaxation)
 PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move

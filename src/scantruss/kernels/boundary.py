@@ -222,6 +222,13 @@ def roll_disc(
 
 
 @kernel
+def come_nearer(surface: Surface, places: np.ndarray, sites: np.ndarray) -> None:
+    """Go from the site near each place (M,) on to the nearest one."""
+    for m in range(len(places)):
+        sites[m] = walk(surface, sites[m], row(places, m))
+
+
+@kernel
 def touch_points(
     surface: Surface,
     places: np.ndarray,
