@@ -17,7 +17,7 @@ from .cloud import Bounds
 DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
 PART = 200_000  # fewest points for a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
-MARKS = 1 << 18  # of boxes near a place
+MARKS = 1 << 20  # of boxes near a place: some thousands, which hardly ever share one with a box elsewhere
 ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
 FILLED = 64  # of these, in a block of boxes
 
