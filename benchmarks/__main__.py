@@ -2,7 +2,7 @@
 
 Without a section all of them, one after the other, each written as soon as it is measured. By what parts of it took, some
 four to eight hours on two cores, nearly all of it for the other ways; stopped and called again, their runs that were kept
-(benchmarks/.runs) are not done again. `--quick`: two clouds, about four minutes of processor time.
+(benchmarks/runs) are not done again. `--quick`: two clouds, about four minutes of processor time.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The benchmarks tell what is there: known nets by hand, ways that are missing or crash, tables, what became slower."""
 
 import copy
+import json
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -247,3 +248,12 @@ def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys
     assert changed({"ratio": 1.2, "low": 1.19, "high": 1.21})[0] == 0  # within the tolerance
     assert changed({"ratio": 0.1, "low": 0.1, "high": 0.1}, cv=0.01, angle_min=50.0)[0] == 0
     assert changed(cv=0.06)[0] == 1 and changed(right=False)[0] == 1 and changed(cv=0.0505)[0] == 0
+
+
+def test_a_row_of_another_version_takes_the_place_of_the_old_one(tmp_path):
+    path = tmp_path / "runs" / "rows.jsonl"
+    keys = [json.dumps([{"shape": "scallop"}, way, version, "yard", 1.0, 3]) for way, version in ("a1", "b1", "a2")]
+    for key in keys:
+        runs.Store(path).add(key, runs.Row(CLOUD, "way", key[-20:], "", {}, {}))
+    assert list(runs.Store(path).rows) == [keys[1], keys[2]]
+    assert [entry.name for entry in path.parent.iterdir()] == ["rows.jsonl"]
