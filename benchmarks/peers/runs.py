@@ -78,7 +78,8 @@ class Store:
 
     def add(self, key: str, row: Row) -> None:
         """Keep a row, in place of those of the same run by another version or measured otherwise."""
-        self.rows = {known: kept for known, kept in self.rows.items() if _run_of(known) != _run_of(key)} | {key: row}
+        run = _run_of(key)
+        self.rows = {known: kept for known, kept in self.rows.items() if _run_of(known) != run} | {key: row}
         lines = [json.dumps({"key": known, **asdict(kept)}) + "\n" for known, kept in self.rows.items()]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         beside = self.path.with_suffix(".part")

@@ -221,11 +221,11 @@ def boundary_points(
         for places, near in along:
             kernels.come_nearer(surface, places, near)
     touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
-    if sites.whole is not None and loops:
-        surface = with_whole_rim(sites, surface, np.concatenate(touched))
-        touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
+    dense = with_whole_rim(sites, surface, np.concatenate(touched)) if touched else surface
+    if dense is not surface:
+        touched = [_touch_points(dense, places, near, radius, 8) for places, near in along]
     touched = [
-        _touch_points(surface, smooth_turns(points), near, radius, 4)
+        _touch_points(dense, smooth_turns(points), near, radius, 4)
         for points, (_, near) in zip(touched, along, strict=True)
     ]
     return [_in_order(points, step) for points in touched]

@@ -8,11 +8,11 @@ from .curves import length_around
 from .kernels import boundary as kernels
 from .kernels.surface import Surface
 from .machine import in_parts
+from .scan.linked import SITES
 from .scan.sites import with_own_scratch
 from .vectors import dots
 
 TRIES = 20  # of rolling the disc from one place
-PART = 1500  # fewest sites for a thread of their own
 TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
 
 
@@ -28,7 +28,7 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
         own = surface if part == 0 else with_own_scratch(surface)
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
-    in_parts(len(free), PART, look)
+    in_parts(len(free), SITES, look)
     rolls = _Rolls(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
     loops = []
     for site in np.flatnonzero(free < 9.0).tolist():

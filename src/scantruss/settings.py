@@ -200,7 +200,7 @@ class Settings:
             ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
             value = getattr(self, name)
-            if value is None and name == "box_size":
+            if value is None and type(self).__dataclass_fields__[name].default is None:
                 continue
             if isinstance(value, bool) or not isinstance(value, int | float):
                 raise InputError(f"{name} must be a number, got {value!r}")

@@ -112,7 +112,7 @@ def make_grid(
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:
         bars.note(
-            f"the usual look at this scan gives no grid that passes, so it is made as with --box-size {grid.settings.box_size:g}"
+            f"the first look at this scan gives no grid that passes, so it is made as with --box-size {grid.settings.box_size:g}"
         )
     if grid.settings is not None and grid.settings.method != settings.method:
         bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")

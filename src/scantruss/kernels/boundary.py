@@ -308,9 +308,10 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
         k = high
         while k > max(low, gap):
             j = (i + k) % count
-            away = norm(subtract(row(curve, j), row(curve, i)))
+            d = subtract(row(curve, j), row(curve, i))
+            away = norm(d)
             if away < width:
-                if _beside(subtract(row(curve, j), row(curve, i)), row(normals, i), row(normals, j)):
+                if _beside(d, row(normals, i), row(normals, j)):
                     at, gap = i, k
                     break
                 k -= 1

@@ -38,8 +38,8 @@ from .streamline import points_near
 
 BESIDE = 1.5  # how far all points are beside those that serve as well, in distances of these
 SPARSE = 0.08  # spacing of the points, in member lengths, from which on no larger sites are tried
-UNEVEN = 20.0  # as `Asked.uneven`: a ridge that bends by twice as much would be seen
-SOME, ALL = 8.0, 24.0  # most points of a site that a patch is fitted to, on the way and in the end
+UNEVEN = 20.0  # as `_Asked.uneven`: a ridge that bends by twice as much would be seen
+SOME, ALL = 8.0, 24.0  # most points of a usual site that a patch is fitted to, on the way and in the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,8 @@ class Sites:
     strays: int = 0  #: stray points that were left out
     repeated: int = 0  #: points that were left out because they repeat another one
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
-    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them
+    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
+    apart: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
 
     @property
@@ -73,20 +74,18 @@ class Sites:
         return is_graded(self.surface)
 
 
-class Asked(NamedTuple):
+class _Asked(NamedTuple):
     """What of the settings decides over the sites."""
 
     length: float
     box_size: float | None
     stray_distance: float
     drop_repeated: bool
-    uneven: (
-        float  #: angle by which normals, one mirrored to the other, differ no more where the scan bends evenly [degree]
-    )
+    uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
     wish: Wish | None
 
     @classmethod
-    def of(cls, settings: Settings, origin: np.ndarray) -> Asked:
+    def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
         """Return it for a cloud with this origin."""
         strays = settings.stray_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_repeated
@@ -105,7 +104,7 @@ class _Chosen(NamedTuple):
     smooth: bool
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[Asked, Sites]] = weakref.WeakKeyDictionary()
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, Sites]] = weakref.WeakKeyDictionary()
 
 
 def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
@@ -118,7 +117,7 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
         `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
         out, `length_field` where members are to be longer.
     """
-    asked = Asked.of(settings, cloud.origin)
+    asked = _Asked.of(settings, cloud.origin)
     kept = _KEPT.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
@@ -140,9 +139,11 @@ def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Set
     """Return the sites of the same points of a cloud and of made-up ones (F, 3) [scan unit]."""
     points = sites.surface.points
     both = np.concatenate([points, added])
-    asked = Asked.of(settings, cloud.origin)._replace(stray_distance=0.0, drop_repeated=False)
+    asked = _Asked.of(settings, cloud.origin)._replace(stray_distance=0.0, drop_repeated=False)
+    if not sites.smooth:  # then it is not with more points either
+        asked = asked._replace(box_size=asked.box_size or SITE)
     prepared = _prepare(both, bounds_of(both), sites.spacing, asked, len(points))
-    return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole)
+    return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole, apart=sites.apart)
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -154,7 +155,7 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
     scale = surface.scale.copy()
     scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
-    scale[3] = ALL
+    scale[3] = ALL * (SMOOTH_SITE / SITE) ** 2 if sites.smooth else ALL  # as many for an area
     if np.isfinite(points):  # so many points, whatever the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
     return surface._replace(scale=scale)
@@ -162,9 +163,9 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
 
 def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
     """Return the surface with all points near some of its points (R, 3), where it has only some: those of the rim tell where it is."""
-    if sites.whole is None or len(rim) == 0:
+    if sites.whole is None:
         return surface
-    near = sites.whole.take(points_near(sites.whole, rim, BESIDE * FINE * surface.scale[1]), axis=0)
+    near = sites.whole.take(points_near(sites.whole, rim, BESIDE * sites.apart), axis=0)
     owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
     in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, far, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
@@ -204,7 +205,7 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, measured: int | None = None) -> Sites:
+def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, measured: int | None = None) -> Sites:
     """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
     if asked.drop_repeated and has_repeats(points):
@@ -235,11 +236,12 @@ def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, m
         repeated,
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
+        FINE * chosen.radius,
         chosen.smooth,
     )
 
 
-def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, thinned: bool) -> _Chosen | None:
+def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
     """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
     length, radius = asked.length, SMOOTH_SITE * asked.length
     if asked.box_size is not None or spacing > SPARSE * length:
@@ -251,7 +253,7 @@ def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: Ask
     return _Chosen(found, radius, some, points, 0, True)
 
 
-def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: Asked, thinned: bool) -> _Chosen:
+def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
     """Return the sites of any scan, without its strays; of a rough one moved to the middle of its sheets."""
     length, strays = asked.length, 0
     radius = max((asked.box_size or SITE) * length, 0.25 * spacing)
