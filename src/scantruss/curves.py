@@ -7,6 +7,9 @@ import numpy as np
 from .kernels import boundary as kernels
 from .kernels.seat import nearest_site
 from .kernels.surface import Surface
+from .vectors import dots
+
+AHEAD = 4  # steps to both sides that tell the direction of a curve
 
 
 def length_around(turns: np.ndarray) -> float:
@@ -28,6 +31,30 @@ def resample(points: np.ndarray, step: float) -> np.ndarray:
     return np.stack([np.interp(at, arc, closed[:, c]) for c in range(3)], axis=1)
 
 
+def heights_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
+    """How far each point of a closed polyline (M, 3), the surface to its left, lies outside the line through its two neighbours (M,)."""
+    before, span = turns - np.roll(turns, 1, axis=0), np.roll(turns, -1, axis=0) - np.roll(turns, 1, axis=0)
+    return dots(before, _outward(surface, turns, span))
+
+
+def moved_out(surface: Surface, curve: np.ndarray, distance: float) -> np.ndarray:
+    """Return a closed curve of equal steps (M, 3), the surface to its left, moved away from the surface."""
+    return curve + distance * _outward(surface, curve, np.roll(curve, -AHEAD, axis=0) - np.roll(curve, AHEAD, axis=0))
+
+
+def _outward(surface: Surface, turns: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Unit vectors (M, 3) along the surface, square to the direction ahead (M, 3) of a closed polyline, to its right."""
+    out = np.cross(ahead, _normals_along(surface, turns))
+    return out / np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
+
+
+def _normals_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
+    """Normals of the scan along a closed polyline (M, 3)."""
+    normals = np.empty_like(turns)
+    kernels.normals_along(surface, turns, nearest_site(surface, *turns[0].tolist()), normals)
+    return normals
+
+
 def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
     """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
 
@@ -35,8 +62,7 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
     joined directly.
     """
     while True:
-        normals = np.empty_like(curve)
-        kernels.normals_along(surface, curve, nearest_site(surface, *curve[0].tolist()), normals)
+        normals = _normals_along(surface, curve)
         high = min(len(curve) // 2, int(30.0 * width / step))
         at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
         if gap == 0:
@@ -58,7 +84,7 @@ def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: 
     terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
     filter_ = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
     if len(at) == 0:
-        return sum(f * np.roll(curve, -o, axis=0) for f, o in zip(filter_, offsets, strict=True)), at
+        return _filtered(curve[np.arange(-half, len(curve) + half) % len(curve)], filter_), at
     parts, corner_at, size = [], [], 0
     for i in range(len(at)):
         begin, end = at[i], at[(i + 1) % len(at)] + (len(curve) if i + 1 == len(at) else 0)
@@ -69,12 +95,17 @@ def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: 
         reach = min(half, n - 1)
         mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
         taken = filter_ if reach == half else _narrow(filter_, half - reach)
-        smooth = sum(f * mirrored[o : o + n] for o, f in enumerate(taken))
+        smooth = _filtered(mirrored, taken)
         smooth[0], smooth[-1] = part[0], part[-1]
         corner_at.append(size)
         parts.append(smooth[:-1])
         size += n - 1
     return np.concatenate(parts), np.array(corner_at, np.int64)
+
+
+def _filtered(places: np.ndarray, filter_: np.ndarray) -> np.ndarray:
+    """Mean of each place and those around it (M, 3), weighted by a symmetric filter (F,): M - F + 1 of them."""
+    return np.stack([np.convolve(places[:, c], filter_, "valid") for c in range(3)], axis=1)
 
 
 def _narrow(filter_: np.ndarray, cut: int) -> np.ndarray:

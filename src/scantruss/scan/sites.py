@@ -69,6 +69,11 @@ class Sites:
         return len(small), float(small.sum() / sites.sum())
 
     @property
+    def density(self) -> float:
+        """Points for an area [1 / scan unit^2]."""
+        return len(self.surface.points if self.whole is None else self.whole) / self.area
+
+    @property
     def graded(self) -> bool:
         """Whether the desired member length differs from place to place."""
         return is_graded(self.surface)
