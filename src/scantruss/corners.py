@@ -11,7 +11,7 @@ from .settings import Settings
 STEP = 0.05  # distance of the points of a boundary curve, in member lengths
 ROUND = 0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
 CUT = 0.4  # the same where the disc has cut off a sharp re-entrant corner
-REACH = 1.4  # part of the curve at each side that tells the place of a corner, in member lengths
+REACH = 2.0  # part of the curve at each side that tells the place of a corner, in member lengths
 SHORTEST = 0.6  # the same where another corner is near
 SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
 APART = 0.5  # corners nearer to each other are one, in member lengths
