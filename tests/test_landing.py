@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
-from shapes import make
+from scipy.spatial import cKDTree
+from shapes import Shape, make
 
 import scantruss as st
 
@@ -14,3 +16,31 @@ def test_nodes_lie_nearer_to_the_true_surface_than_half_the_noise(lines: float) 
     shape = make("scallop", 40_000, scan_lines=lines)
     grid = st.grid_from_points(shape.points, st.Settings(length=shape.length, effort="quick"))
     assert shape.distance(grid.nodes + grid.origin).mean() <= 0.5 * shape.noise
+
+
+def heights(shape: Shape, nodes: np.ndarray) -> np.ndarray:
+    """How far nodes lie off the plane of the nearest true triangle: beside the rim too, where the surface itself has ended."""
+    corners = shape.surface.nodes[shape.surface.triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    near = cKDTree(corners.mean(axis=1)).query(nodes)[1]
+    off = ((nodes - corners[near, 0]) * normals[near]).sum(axis=1) / np.linalg.norm(normals[near], axis=1)
+    return np.minimum(abs(off), shape.distance(nodes))
+
+
+@pytest.mark.parametrize("name", ["scallop", "cloth"])
+def test_noise_moves_nodes_of_a_rim_and_corners_less_than_points(name: str) -> None:
+    """There a patch has half or a quarter of its points, all to one side."""
+    inside, rim, corners = [], [], []
+    for seed in range(3):
+        shape = make(name, 100_000, seed=seed, noise=0.01 * make(name).length)
+        grid = st.grid_from_points(shape.points, st.Settings(length=shape.length, effort="quick"))
+        nodes = grid.nodes + grid.origin
+        off = heights(shape, nodes) / shape.noise
+        at_corner = cKDTree(nodes).query(shape.corners)[1]
+        at_rim = np.zeros(len(nodes), bool)
+        at_rim[grid.edges[grid.edge_uses == 1]] = True
+        inside.append(off[~at_rim].mean())
+        corners.append(off[at_corner].mean())
+        at_rim[at_corner] = False
+        rim.append(off[at_rim].mean())
+    assert np.mean(inside) <= 0.195 and np.mean(rim) <= 0.36 and np.mean(corners) <= 1.5

@@ -119,7 +119,10 @@ def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) 
         place = _meeting(sides[0][0], sides[1][0])
         window = np.arange(at - half, at + half + 1) % len(curve)
         away = ((curve[window] - place) ** 2).sum(axis=1)
-        centre = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
+        nearest = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
+        if nearest == centre:
+            break
+        centre = nearest
     cosines = [_cosine(sides[0][k][1], sides[1][k][1]) for k in (0, 1)]
     straight, bent = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).tolist()
     return place, min(straight, BENT * bent)

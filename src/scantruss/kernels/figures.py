@@ -12,8 +12,8 @@ from .vectors import Vector, cross, dot, norm, row, subtract
 
 @kernel
 def _angle_between(u: Vector, w: Vector) -> float:
-    """Angle between two vectors [degree]."""
-    return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w)))
+    """Angle between two vectors [degree]; 0 where one has no length."""
+    return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w) + 0.0))  # of -0 and 0 it would be 180
 
 
 @kernel

@@ -13,6 +13,13 @@ LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, b
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
 ALIKE = 0.9  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
+FEW = 24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much
+
+
+@kernel
+def _away(patch: np.ndarray, taken: int) -> float:
+    """Mean distance of the points of a surface from a patch fitted to so many: that of the points, and what the patch used up of it."""
+    return float(patch[17] * np.sqrt(taken / max(taken - 6.0, 1.0)))
 
 
 @kernel
@@ -21,22 +28,24 @@ def _fit_widest(
 ) -> int:
     """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off.
 
-    Points along one scan line tell nothing of the surface beside it: such a patch is too narrow, however near they lie.
+    Points along one scan line tell nothing of the surface beside it, and a few too little: such a patch is too narrow, however near
+    they lie.
     """
     taken = fit_patch(fine, patch, site, place)
     fill_row(narrow, patch)
-    least = patch[17]
+    least = _away(patch, taken)
     kept = patch.copy()
     for turn in range(2):
         if turn == 0 and middle.scale[2] > ALIKE * broad.scale[2]:
             continue
         more = fit_patch(middle if turn == 0 else broad, patch, site, place)
-        lined = kept[18] < LINED
-        if more < 4 or (patch[17] > LIKE * least and not lined):
+        too_narrow = kept[18] < LINED or taken < FEW
+        away = _away(patch, more)
+        if more < 4 or (away > LIKE * least and not too_narrow):
             fill_row(patch, kept)
             break
-        if lined:
-            least = patch[17]
+        if too_narrow:
+            least = away
         taken = more
         fill_row(kept, patch)
     return taken
