@@ -28,7 +28,7 @@ def heights(shape: Shape, nodes: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["scallop", "cloth"])
-def test_noise_moves_nodes_of_a_rim_and_corners_less_than_points(name: str) -> None:
+def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> None:
     """There a patch has half or a quarter of its points, all to one side."""
     inside, rim, corners = [], [], []
     for seed in range(3):

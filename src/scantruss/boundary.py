@@ -43,11 +43,9 @@ PART = 500  # fewest places of a loop for a thread of their own
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 WIDE = 1.0  # the same where that moves the curve no farther than chance did
 BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `surface_beyond` says
-EXACT, CHANCE = (
-    0.1,
-    0.4,
-)  # heights of boundary points over their neighbours where all are on the edge, and by chance, in that distance
-OUT = 0.5  # share of it that the curve moves out: more would put nodes off the surface
+EXACT = 0.1  # in that distance, how far boundary points that were put on the edge lie over their neighbours at most,
+CHANCE = 0.4  # and those that lie by chance at least
+OUT = 0.5  # share of that distance by which the curve moves out: more would put nodes off the surface
 MOVED = 2.0  # how far chance moved the curve at most, in that distance
 
 

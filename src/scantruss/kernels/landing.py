@@ -13,13 +13,14 @@ LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, b
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
 ALIKE = 0.9  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
+TERMS = 6.0  # of a quadric: so many points it passes through
 FEW = 24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much
 
 
 @kernel
 def _away(patch: np.ndarray, taken: int) -> float:
     """Mean distance of the points of a surface from a patch fitted to so many: that of the points, and what the patch used up of it."""
-    return float(patch[17] * np.sqrt(taken / max(taken - 6.0, 1.0)))
+    return float(patch[17] * np.sqrt(taken / max(taken - TERMS, 1.0)))
 
 
 @kernel
