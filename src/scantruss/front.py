@@ -31,6 +31,7 @@ STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room wai
 GAP = 60  # gaps with more segments stay open
 CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
 NEARER = 0.33  # the same for an appointed position
+BOX = 2.4  # size of the search boxes of the nodes, in member lengths: as far as a step of the front looks for others
 BUDGET = 500  # segments advanced between two calls of `progress`
 
 
@@ -126,7 +127,7 @@ def new_front(sites: Sites, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
     mean, room = sites.surface.mean, int(2.0 * sites.graded_area / (0.433 * settings.length**2)) + 2000
     usual = settings.length * float(np.sqrt(sites.area / sites.graded_area))
-    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), usual, room, room)
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), BOX * usual, room, room)
     return _blank(room, boxes)
 
 

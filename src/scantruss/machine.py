@@ -8,6 +8,9 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
+
+Result = TypeVar("Result")
 
 UNKNOWN_MEMORY = 4e9  # bytes, where a machine tells nothing
 
@@ -29,18 +32,33 @@ def in_parts(count: int, least: int, work: Callable[[int, int, int], object]) ->
         work(0, 0, count)
         return
     bounds = [count * part // parts for part in range(parts + 1)]
-    others = [_pool(parts - 1).submit(work, part, bounds[part], bounds[part + 1]) for part in range(1, parts)]
+    others = {part: _pool(parts - 1).submit(work, part, *bounds[part : part + 2]) for part in range(1, parts)}
     try:
         work(0, 0, bounds[1])
+        for part, other in others.items():
+            if other.cancel():  # no thread has come to it
+                work(part, *bounds[part : part + 2])
     finally:
-        wait(others)
-    for other in others:
-        other.result()
+        wait(other for other in others.values() if not other.cancel())
+    for other in others.values():
+        if not other.cancelled():
+            other.result()
+
+
+def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
+    """Begin some work on another processor, if one is free; return what waits for its result, or does it where nobody has begun.
+
+    The result must not depend on when it is done.
+    """
+    if processors() < 2:
+        return work
+    begun = _pool(processors() - 1).submit(work)
+    return lambda: work() if begun.cancel() else begun.result()
 
 
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads that are kept: starting some takes as long as many a kernel. Their work asks for no parts, or they would wait."""
+    """Threads that are kept: starting some takes as long as many a kernel."""
     return ThreadPoolExecutor(threads, thread_name_prefix="scantruss")
 
 

@@ -14,13 +14,13 @@ from .front import advance_front
 from .grid.equalize import energy_of_node, equalize
 from .grid.fixed import check_positions, hold_nodes
 from .grid.on_lines import with_rim_members
-from .grid.optimize import improve_further
+from .grid.optimize import come_to_rest, improve_further
 from .grid.relief import Relief
 from .kernels import advance as advancing
 from .kernels import landing
 from .kernels import search as searching
 from .kernels.compile import is_compiled
-from .machine import processors
+from .machine import alongside, processors
 from .rows import Rows
 from .scan.sites import with_own_scratch
 
@@ -94,10 +94,12 @@ def several_grids(
     def finish(number: int, relief: Relief) -> Grid | None:
         def work() -> Grid:
             own = settings if number < len(ways) else settings.replace(effort="normal")
-            improve_further(relief, boundary.sites, positions, own)
             front = fronts[number % len(ways)]
-            grid = with_rim_members(relief.to_grid(front), boundary.lines, settings.length)
-            return check(grid.replace(settings=settings, before=front.quality))
+            improve_further(relief, positions, own)
+            closed, before = relief.begin_to_close(front), alongside(lambda: front.quality)
+            come_to_rest(relief, boundary.sites, own)
+            grid = with_rim_members(relief.to_grid(front, closed()), boundary.lines, settings.length)
+            return check(grid.replace(settings=settings, before=before()))
 
         return _passed(faults, number, work)
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 
 TOLD = {"settings", "before", "certificate", "seconds"}  # fields that no figure of a grid depends on
+OF_TRIANGLES = {  # what follows from the triangles alone
+    "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +49,11 @@ class Grid:
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
             changes = {"certificate": None, **changes}
         copy = replace(self, **changes)
+        known = {name: value for name, value in vars(self).items() if name not in vars(copy)}
         if changes.keys() <= TOLD:
-            vars(copy).update({name: value for name, value in vars(self).items() if name not in vars(copy)})
+            vars(copy).update(known)
+        elif "triangles" not in changes and len(copy.nodes) == len(self.nodes):
+            vars(copy).update({name: known[name] for name in OF_TRIANGLES & known.keys()})
         return copy
 
     @cached_property

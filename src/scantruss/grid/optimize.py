@@ -101,19 +101,20 @@ def improve(
     else:
         hold_nodes(relief, positions)
         equalize(relief, report)
-        improve_further(relief, sites, positions, settings, report)
+        improve_further(relief, positions, settings, report)
+        come_to_rest(relief, sites, settings)
 
 
 def improve_further(
-    relief: Relief,
-    sites: Sites,
-    positions: np.ndarray,
-    settings: Settings,
-    report: Callable[[float], None] | None = None,
+    relief: Relief, positions: np.ndarray, settings: Settings, report: Callable[[float], None] | None = None
 ) -> None:
-    """Improve an equalized grid with the effort of the settings, make the nodes that are still missing, land on the scan."""
+    """Improve an equalized grid with the effort of the settings, and make the nodes that are still missing."""
     search_widely(relief, settings.effort, report)
     fix_nodes(relief, positions)
+
+
+def come_to_rest(relief: Relief, sites: Sites, settings: Settings) -> None:
+    """Settle a grid of which no member changes any more, and land on the scan."""
     finish(relief, settings.prefer)
     land(relief, sites)
 

@@ -5,13 +5,13 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..kernels.figures import folds_of
+from ..machine import alongside
 from .certificate import Certificate, Fault, Worst, place_of
 from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_field, scan_places
 from .crossings import find_crossings
@@ -51,16 +51,15 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         fault = Fault("empty", empty or "has nodes that are nowhere")
         return replace(_topology(grid, boundary, settings), faults=(fault,))
     sites, length = boundary.sites, settings.length
-    with ThreadPoolExecutor(1) as pool:  # kernels, which leave the interpreter to the rest
-        nearest = pool.submit(nodes_of_sites, grid, sites, length)
-        places = scan_places(sites)
-        boxes = boxes_of(places, 0.5 * length)
-        left = pool.submit(distances_to_grid, places, boxes, grid, length)
-        told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
-        cuts = find_crossings(grid.nodes, grid.triangles)
-        told = replace(told, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
-        on_sheets = faults_on_sheets(grid, sites, nearest.result())
-    told = replace(told, **_from_grid(grid, sites, length, places, left.result()))
+    places = scan_places(sites)
+    boxes = boxes_of(places, 0.5 * length)
+    nearest = alongside(lambda: nodes_of_sites(grid, sites, length))  # kernels, which leave the interpreter to the rest
+    left = alongside(lambda: distances_to_grid(places, boxes, grid, length))
+    told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
+    cuts = find_crossings(grid.nodes, grid.triangles)
+    told = replace(told, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
+    on_sheets = faults_on_sheets(grid, sites, nearest())
+    told = replace(told, **_from_grid(grid, sites, length, places, left()))
     faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
     known = {fault.kind for fault in faults}
     faults += [fault for fault in on_sheets if fault.kind not in known]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim
 from ..kernels.surface import PATCH, Surface
 from ..lines.network import NO_LINES, Lines
-from ..machine import in_parts
+from ..machine import alongside, in_parts
 from ..scan.sites import is_graded, with_own_scratch
 from .grid import Grid
 from .on_lines import find_on_lines, inner_lines, joined
@@ -24,6 +25,9 @@ NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in
 PART = 300  # fewest nodes for a thread of their own
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
 MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
+
+
+Closed = tuple[Grid, np.ndarray]  #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
 
 
 def no_rim() -> Rim:
@@ -91,16 +95,31 @@ def close_net(
     `deviation` (C,) is the distance of each node of the net from the scan, `desired` (C,) the desired member length there, where it
     is not the same for all [scan unit].
     """
+    return with_places(*join_again(net, source, grid), net, deviation, desired)
+
+
+def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
+    """Put the triangles of a net together again; returns them, and the node of the net that each node stands for (V,)."""
     used = net.used
     room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
     triangles = room[: kernels.list_triangles(net, room)]
     merged = np.where(source[:used] >= 0, source[:used], np.arange(used))
     kept, inverse = np.unique(merged[triangles], return_inverse=True)
-    return grid.replace(
-        nodes=np.ascontiguousarray(net.nodes[kept]),
+    closed = grid.replace(
+        nodes=net.nodes[kept],
         triangles=inverse.reshape(-1, 3).astype(np.int64),
         fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
         lines=_lines_of(net, merged, kept),
+    )
+    return closed, kept
+
+
+def with_places(
+    closed: Grid, kept: np.ndarray, net: Net, deviation: np.ndarray | None, desired: np.ndarray | None
+) -> Grid:
+    """Return a grid with its nodes, of which `kept` (V,) are the nodes of the net, where these are now; see `close_net`."""
+    return closed.replace(
+        nodes=net.nodes[kept],
         deviation=None if deviation is None else deviation[kept],
         desired=None if desired is None else desired[kept],
     )
@@ -226,11 +245,22 @@ class Relief:
         seat.distances_from_scan(self.net, self.patches, values)
         return values
 
-    def to_grid(self, grid: Grid) -> Grid:
-        """Put the net together again, with all else as in `grid`; deviation measured."""
+    def begin_to_close(self, grid: Grid) -> Callable[[], Closed]:
+        """Put the net together again and see what it is, beside other work: members are neither added nor taken away from now on."""
+
+        def close() -> Closed:
+            closed, kept = join_again(self.net, self.source, grid.replace(fixed=self.fixed))
+            _ = closed.topology, closed.edge_triangles
+            return closed, kept
+
+        return alongside(close)
+
+    def to_grid(self, grid: Grid, closed: Closed | None = None) -> Grid:
+        """Put the net together again, with all else as in `grid`, or as it was `closed` already; deviation measured."""
         deviation = self.deviation()
         desired = self.length * self.net.desired if self.graded else None
-        return close_net(self.net, self.source, grid.replace(fixed=self.fixed), deviation, desired)
+        again, kept = closed or join_again(self.net, self.source, grid.replace(fixed=self.fixed))
+        return with_places(again, kept, self.net, deviation, desired)
 
 
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -190,11 +190,11 @@ def clear_of_front(
         t = front.out[q]
         while t >= 0:
             e = front.head[t]
-            if t != s:
+            if t != s and q != p and e != p:
                 pe = row(front.nodes, e)
-                if q != a and e != a and q != p and e != p and lines_cross(pa, pp, pq, pe, SHEET * length):
+                if q != a and e != a and lines_cross(pa, pp, pq, pe, SHEET * length):
                     return False
-                if q != b and e != b and q != p and e != p and lines_cross(pb, pp, pq, pe, SHEET * length):
+                if q != b and e != b and lines_cross(pb, pp, pq, pe, SHEET * length):
                     return False
             t = front.out_next[t]
     return True

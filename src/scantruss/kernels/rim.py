@@ -123,8 +123,14 @@ def nearest_on_rim(rim: Rim, x: float, y: float, z: float) -> tuple[int, float, 
     """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 where there is no curve."""
     best, curve, arc = np.inf, -1, 0.0
     for c in range(len(rim.total)):
-        for i in range(rim.start[c], rim.start[c + 1]):
+        i, last = rim.start[c], rim.start[c + 1]
+        while i < last:
             square, along = foot_on_segment(rim, c, i, 0.0, np.inf, x, y, z)
+            here = rim.arc[i] + along
             if square < best:
-                best, curve, arc = square, c, rim.arc[i] + along
+                best, curve, arc = square, c, here
+            spare = here + np.sqrt(square) - np.sqrt(best)  # no place before this is nearer
+            i += 1
+            while i + 1 < last and rim.arc[i + 1] < spare:
+                i += 1
     return curve, arc, np.sqrt(best)
