@@ -38,11 +38,11 @@ def test_the_slope_of_the_energy_agrees_with_differences():
     net, length = relief.net, rough.settings.length
     for v in range(0, len(rough.grid.nodes), 5):
         place = net.nodes[v].copy()
-        slope = np.array(kernels.star_energy(net, relief.patches, v, *place, length, 1.7)[1:])
+        slope = np.array(kernels.star_energy(net, relief.patches, v, *place, length, 1.7, True)[1:])
         for c in range(3):
             step = np.eye(3)[c] * 1e-6
-            up = kernels.star_energy(net, relief.patches, v, *(place + step), length, 1.7)[0]
-            down = kernels.star_energy(net, relief.patches, v, *(place - step), length, 1.7)[0]
+            up = kernels.star_energy(net, relief.patches, v, *(place + step), length, 1.7, False)[0]
+            down = kernels.star_energy(net, relief.patches, v, *(place - step), length, 1.7, False)[0]
             assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
 
 

@@ -205,11 +205,11 @@ def test_the_energy_goes_by_the_lengths_desired_at_both_ends():
     assert mean == pytest.approx(length * stretch.mean())
     for v in range(0, len(grid.nodes), 7):
         place = net.nodes[v].copy()
-        slope = np.array(star_energy(net, relief.patches, v, *place, length, 1.7)[1:])
+        slope = np.array(star_energy(net, relief.patches, v, *place, length, 1.7, True)[1:])
         for c in range(3):
             step = np.eye(3)[c] * 1e-6
-            up = star_energy(net, relief.patches, v, *(place + step), length, 1.7)[0]
-            down = star_energy(net, relief.patches, v, *(place - step), length, 1.7)[0]
+            up = star_energy(net, relief.patches, v, *(place + step), length, 1.7, False)[0]
+            down = star_energy(net, relief.patches, v, *(place - step), length, 1.7, False)[0]
             assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
 
 

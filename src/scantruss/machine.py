@@ -48,12 +48,12 @@ def in_parts(count: int, least: int, work: Callable[[int, int, int], object]) ->
 def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
     """Begin some work on another processor, if one is free; return what waits for its result, or does it where nobody has begun.
 
-    The result must not depend on when it is done.
+    The result must not depend on when it is done; it is kept.
     """
     if processors() < 2:
-        return work
+        return cache(work)
     begun = _pool(processors() - 1).submit(work)
-    return lambda: work() if begun.cancel() else begun.result()
+    return cache(lambda: work() if begun.cancel() else begun.result())
 
 
 @cache

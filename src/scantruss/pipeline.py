@@ -104,8 +104,10 @@ def grid_from_cloud(
     started = perf_counter()
     check_length(cloud, settings)
     from .boundary import find_boundary
+    from .rows import begin_rows
 
     checked = perf_counter()
+    begin_rows(cloud, settings)
     boundary = find_boundary(cloud, settings, progress=progress)
     found = perf_counter()
     try:

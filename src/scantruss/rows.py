@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,10 @@ from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
+from .machine import alongside
+from .scan.cloud import PointCloud
+from .scan.sites import Sites, prepare_sites
+from .settings import Settings
 from .vectors import dots
 
 APART = 0.55  # distance of the posts, in member lengths
@@ -33,12 +38,13 @@ class Rows:
 
 
 STRAIGHT = Rows()
+Levels = tuple[list[Posts], list[np.ndarray]]
 
 
 def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
     """Return the nodes of rows of a length [scan unit], for a front to come to."""
     length *= rows.scale * (1.0 if boundary.loops else CLOSED)
-    levels, owners = make_levels(boundary.sites.surface, length)
+    levels, owners = posts_of(boundary.sites, length)
     start, direction, node = first_row(boundary, length, rows.turn)
     for owner in owners:
         start = int(owner[start])
@@ -68,7 +74,27 @@ def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
     return RowNodes(posts.node[chosen], posts.normals[chosen], first[chosen], length)
 
 
-def make_levels(surface: Surface, length: float) -> tuple[list[Posts], list[np.ndarray]]:
+def begin_rows(cloud: PointCloud, settings: Settings) -> None:
+    """Begin to make the posts for the rows of a scan, if it gets any, beside the search for its boundary."""
+    if settings.method == "default" and not (sites := prepare_sites(cloud, settings)).graded:
+        _begin_posts(sites, settings.length)
+
+
+def _begin_posts(sites: Sites, length: float) -> Callable[[], Levels]:
+    surface = sites.surface
+    if length not in sites.posts:
+        sites.posts[length] = alongside(lambda: make_levels(surface, length))
+    return sites.posts[length]
+
+
+def posts_of(sites: Sites, length: float) -> Levels:
+    """Return `make_levels`, made once for all rows of a length [scan unit], with directions and lattices of one's own."""
+    levels, owners = _begin_posts(sites, length)()
+    own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in levels]
+    return own, owners
+
+
+def make_levels(surface: Surface, length: float) -> Levels:
     """Return posts from fine to coarse, and for each level the post of each place of the level below (sites at first)."""
     mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
     levels: list[Posts] = []

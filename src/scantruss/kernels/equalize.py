@@ -23,9 +23,9 @@ LEASH = 0.8  # farther from its middle a patch says nothing of the surface, in l
 
 @kernel
 def star_energy(
-    net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float
+    net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float, slope: bool
 ) -> tuple[float, float, float, float]:
-    """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient.
+    """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient, which takes time, if asked for.
 
     A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
     """
@@ -48,8 +48,9 @@ def star_energy(
             target = own + half * net.desired[w]
             stretch = size / target - 1.0
             energy += weight * stretch * stretch
-            f = 2.0 * weight * stretch / (target * size)
-            gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
+            if slope:
+                f = 2.0 * weight * stretch / (target * size)
+                gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
         if i == 0 and net.state[v, OPEN] == 1:
             continue
         energy += 1.0
@@ -64,11 +65,12 @@ def star_energy(
             f = -f
         g = f * doubled * doubled
         shape += g
-        h = 2.0 * g / squares
-        # the doubled area falls along e x u / |u|, the squares grow along -2 (b + c)
-        sx += h * (bx + cx) - f * (ey * uz - ez * uy)
-        sy += h * (by + cy) - f * (ez * ux - ex * uz)
-        sz += h * (bz + cz) - f * (ex * uy - ey * ux)
+        if slope:
+            h = 2.0 * g / squares
+            # the doubled area falls along e x u / |u|, the squares grow along -2 (b + c)
+            sx += h * (bx + cx) - f * (ey * uz - ez * uy)
+            sy += h * (by + cy) - f * (ez * ux - ex * uz)
+            sz += h * (bz + cz) - f * (ex * uy - ey * ux)
     side = 1.0 if shape >= 0.0 else -1.0
     return energy - side * shape, gx - side * sx, gy - side * sy, gz - side * sz
 
@@ -85,7 +87,7 @@ def settle_node(
     if kind >= REST or net.state[v, DEGREE] == 0:
         return 0.0
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
-    before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight)
+    before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
     if kind == INTERIOR:
         nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
         across = gx * nx + gy * ny + gz * nz
@@ -109,7 +111,7 @@ def settle_node(
             if dx * dx + dy * dy + dz * dz > LEASH * LEASH * local * local:
                 step *= 0.3
                 continue
-        after = star_energy(net, patches, v, px, py, pz, length, weight)[0]
+        after = star_energy(net, patches, v, px, py, pz, length, weight, False)[0]
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
             net.arc[v] = arc

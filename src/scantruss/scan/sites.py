@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class Sites:
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     apart: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
+    posts: dict[float, Callable[[], Any]] = field(default_factory=dict)  #: those for rows of a length, see `rows.posts_of`
 
     @property
     def left_out(self) -> tuple[int, float]:
