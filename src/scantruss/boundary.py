@@ -279,9 +279,9 @@ def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius
 
 def _onwards(touched: np.ndarray) -> list[int]:
     """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
-    ahead = np.zeros(len(touched), np.int64)
+    ahead, (x, y, z) = np.zeros(len(touched), np.int64), touched.T.copy()
     for k in range(1, BACK + 1):
-        ahead[:-k][(touched[:-k] == touched[k:]).all(axis=1)] = k
+        ahead[:-k][(x[:-k] == x[k:]) & (y[:-k] == y[k:]) & (z[:-k] == z[k:])] = k
     kept, at = [], 0
     while at < len(touched):
         kept.append(at)

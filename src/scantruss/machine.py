@@ -22,17 +22,18 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def in_parts(count: int, least: int, work: Callable[[int, int, int], object]) -> None:
+def in_parts(count: int, least: int, work: Callable[[int, int, int], object], each: int = 1) -> None:
     """Call ``work(part, begin, end)`` for all of `count` items, in parts of at least `least` items side by side.
 
-    The work must not depend on the parts. Kernels release the GIL, so threads do.
+    The work must not depend on the parts. Kernels release the GIL, so threads do. There are `each` parts for a processor: several
+    where some take longer than others.
     """
-    parts = min(processors(), count // least)
+    parts = min(each * processors(), count // least)
     if parts < 2:
         work(0, 0, count)
         return
     bounds = [count * part // parts for part in range(parts + 1)]
-    others = {part: _pool(parts - 1).submit(work, part, *bounds[part : part + 2]) for part in range(1, parts)}
+    others = {part: _pool(processors() - 1).submit(work, part, *bounds[part : part + 2]) for part in range(1, parts)}
     try:
         work(0, 0, bounds[1])
         for part, other in others.items():

@@ -102,9 +102,12 @@ def grid_from_cloud(
         passes; its settings say so: `ridge_angle` 0, another `box_size`, `method` "paper".
     """
     started = perf_counter()
-    check_length(cloud, settings)
     from .boundary import find_boundary
     from .rows import begin_rows
+    from .scan.sites import begin_sites
+
+    begin_sites(cloud, settings)
+    check_length(cloud, settings)
 
     checked = perf_counter()
     begin_rows(cloud, settings)

@@ -23,6 +23,7 @@ from .on_lines import find_on_lines, inner_lines, joined
 
 NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
 PART = 300  # fewest nodes for a thread of their own
+LANDINGS = 3  # parts of the nodes that a thread lands: those of the rim take less time
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
 MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
 
@@ -195,7 +196,7 @@ class Relief:
             )
             land_nodes(self.net, narrow, wider, widest, self.patches, stay, self.landed, begin, end)
 
-        in_parts(self.net.used, PART, land_part)
+        in_parts(self.net.used, PART // LANDINGS, land_part, LANDINGS)
 
     @cached_property
     def graded(self) -> bool:

@@ -29,6 +29,9 @@ BENT = 0.075  # sites of a smooth scan are no thicker than this, in member lengt
 FEW = 2  # sites at which a smooth scan is not: there is no room for a ridge
 
 
+Choice = tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]  #: what `sites_of_points` returns
+
+
 class Linked(NamedTuple):
     """Sites of one thinning radius, linked; their normals of either sign."""
 
@@ -57,9 +60,11 @@ def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float
     return group(points, owner, len(places))[0]
 
 
-def link_sites(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the sites of points for one thinning radius."""
-    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
+def link_sites(
+    points: np.ndarray, radius: float, length: float, spacing: float, choice: Choice | None = None
+) -> Linked:
+    """Return the sites of points for one thinning radius; of a choice where they were chosen already."""
+    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing, choice)
     grouped, start, mean = group(points, owner, len(chosen))
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
@@ -107,7 +112,7 @@ def is_rough(found: Linked, rough: float) -> bool:
     return bool((found.thickness > rough).mean() > SOME_ROUGH)
 
 
-def sites_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
+def sites_of_points(points: np.ndarray, radius: float) -> Choice:
     """Return a site within the radius of each point, the point of each site and where it is (S, 3), and the sites by box.
 
     Sites are points that keep the radius: each that has no earlier site nearer.
@@ -132,10 +137,10 @@ def sites_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.n
 
 
 def _settled(
-    points: np.ndarray, radius: float, length: float, spacing: float
+    points: np.ndarray, radius: float, length: float, spacing: float, choice: Choice | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
     """Return the nearest site of each point, the point of each site and where it is, the sites by box and their neighbours."""
-    owner, chosen, places, boxes = sites_of_points(points, radius)
+    owner, chosen, places, boxes = choice or sites_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
     in_parts(
         len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)

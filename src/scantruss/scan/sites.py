@@ -15,16 +15,18 @@ from ..kernels import normals as normal_kernels
 from ..kernels.boxes import SearchBoxes
 from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
-from ..machine import in_parts
+from ..machine import alongside, in_parts
 from ..settings import SITE, SMOOTH_SITE, Settings
 from ..vectors import dots
 from .cloud import Bounds, PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
 from .linked import (
     FINE,
+    MANY,
     PART,
     ROUGH,
     SHEETS,
+    Choice,
     Linked,
     group,
     is_rough,
@@ -32,6 +34,7 @@ from .linked import (
     link_finer,
     link_sites,
     settle_to_sheet,
+    sites_of_points,
     thin_dense,
 )
 from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
@@ -111,6 +114,19 @@ class _Chosen(NamedTuple):
     smooth: bool
 
 
+class _Begun(NamedTuple):
+    """Sites that are being chosen before anybody has asked for them."""
+
+    points: np.ndarray
+    radius: float
+    choice: Callable[[], Choice]
+
+    def of(self, points: np.ndarray, radius: float) -> Choice | None:
+        """Return them, if they are of these points."""
+        return self.choice() if points is self.points and radius == self.radius else None
+
+
+_BEGUN: weakref.WeakKeyDictionary[PointCloud, _Begun] = weakref.WeakKeyDictionary()
 _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, Sites]] = weakref.WeakKeyDictionary()
 
 
@@ -128,8 +144,21 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     kept = _KEPT.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
-        kept[asked] = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+        kept[asked] = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, begun=_BEGUN.pop(cloud, None))
     return kept[asked]
+
+
+def begin_sites(cloud: PointCloud, settings: Settings) -> None:
+    """Begin to choose the sites of a scan that may be dense and smooth beside other work, for `prepare_sites`.
+
+    How dense it is is not known yet: about as much as the longer sides of its box are covered, and the nearest of points that lie by
+    chance is half as far as in a lattice.
+    """
+    points, radius = cloud.points, SMOOTH_SITE * settings.length
+    covered = float(np.prod(np.sort(cloud.bounds[1] - cloud.bounds[0])[1:]))
+    dense = covered < len(points) * (2.0 * SPARSE * settings.length) ** 2
+    if settings.box_size is None and len(points) < MANY and dense:
+        _BEGUN[cloud] = _Begun(points, radius, alongside(lambda: sites_of_points(points, radius)))
 
 
 def is_graded(surface: Surface) -> bool:
@@ -212,7 +241,14 @@ def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
     return prepare_sites(cloud, settings).surface
 
 
-def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, measured: int | None = None) -> Sites:
+def _prepare(
+    points: np.ndarray,
+    bounds: Bounds,
+    spacing: float,
+    asked: _Asked,
+    measured: int | None = None,
+    begun: _Begun | None = None,
+) -> Sites:
     """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
     if asked.drop_repeated and has_repeats(points):
@@ -221,7 +257,7 @@ def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, 
         points = np.ascontiguousarray(points[kept])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_sites(points, bounds, spacing, asked, thinned) or _usual_sites(
+    chosen = _smooth_sites(points, bounds, spacing, asked, thinned, begun) or _usual_sites(
         points, bounds, spacing, asked, thinned
     )
     found = chosen.found
@@ -248,13 +284,15 @@ def _prepare(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, 
     )
 
 
-def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
+def _smooth_sites(
+    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool, begun: _Begun | None
+) -> _Chosen | None:
     """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
     length, radius = asked.length, SMOOTH_SITE * asked.length
     if asked.box_size is not None or spacing > SPARSE * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_sites(some, radius, length, spacing)
+    found = link_sites(some, radius, length, spacing, begun.of(some, radius) if begun else None)
     if has_strays(found.neighbors) or not is_smooth(found, length, asked.uneven):
         return None
     return _Chosen(found, radius, some, points, 0, True)
