@@ -220,6 +220,16 @@ def test_places_on_a_curve_agree_with_sampling(arc, place):
     assert np.linalg.norm(np.array(found[1:]) - place) == pytest.approx(distance, abs=1e-9)
 
 
+@given(some.integers(0, 10_000), some.tuples(some.floats(-3, 3), some.floats(-3, 3), some.floats(-1, 1)))
+def test_no_place_on_a_long_curve_is_nearer_than_the_one_found(seed, place):
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, 300))
+    wide = 1.0 + 0.6 * np.cos(rng.integers(2, 9) * angle) + rng.normal(0, 0.03, 300)
+    rim = curve_of(np.stack([wide * np.cos(angle), wide * np.sin(angle), 0.2 * np.sin(5 * angle)], axis=1))
+    squares = [curves.foot_on_segment(rim, 0, i, 0.0, np.inf, *place)[0] for i in range(300)]
+    assert curves.nearest_on_rim(rim, *place)[2] == pytest.approx(np.sqrt(min(squares)), rel=1e-12)
+
+
 @given(some.floats(0, 5), some.floats(0.01, 1), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
 def test_sliding_stays_within_reach_and_never_leads_away(arc, reach, place):
     rim = curve_of(LOOP)

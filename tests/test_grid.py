@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 from rough import rough_disc, rough_sphere, same_topology, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
-from scantruss.grid.relief import close_net, open_net
+from scantruss.grid.relief import close_net, join_again, open_net, with_places
 from scantruss.kernels import grid as kernels
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.2), (2, 1, 0), (3, 0, 1)]
@@ -42,6 +42,23 @@ def test_edges_and_their_triangles():
     assert grid.edge_uses.tolist() == [2 if other >= 0 else 1 for other in grid.edge_triangles[:, 1]]
 
 
+OF_TRIANGLES = "edges", "edge_uses", "edge_triangles", "boundary_loops", "topology"
+
+
+@pytest.mark.parametrize("name", [*SOUND, *BROKEN])
+def test_what_follows_from_the_triangles_alone_goes_along_with_them(name):
+    grid = (SOUND | BROKEN)[name]()
+    before = [getattr(grid, each) for each in OF_TRIANGLES]
+    moved = grid.replace(nodes=grid.nodes + grid.nodes[::-1] ** 2)
+    assert all(getattr(moved, each) is known for each, known in zip(OF_TRIANGLES, before, strict=True))
+    afresh = make_grid(moved.nodes, moved.triangles).replace(unit=grid.unit)
+    assert (moved.lengths == afresh.lengths).all() and moved.quality == afresh.quality
+    fewer, more = grid.replace(triangles=grid.triangles[1:]), grid.replace(nodes=np.append(grid.nodes, [[9, 9, 9]], 0))
+    for other in (fewer, more):
+        assert other.topology == make_grid(other.nodes, other.triangles).topology
+        assert other.edge_uses.sum() == 3 * len(other.triangles)
+
+
 def test_boundary_loops_run_with_their_triangles():
     (loop,) = fan().boundary_loops
     assert sorted(loop.tolist()) == [1, 2, 3, 4, 5, 6]
@@ -58,6 +75,17 @@ def test_a_net_closes_to_the_grid_it_was_opened_from(name):
     used = np.unique(grid.triangles)
     assert np.array_equal(back.nodes, grid.nodes[used])
     assert facing(back.replace(triangles=used[back.triangles])) == facing(grid)
+
+
+@pytest.mark.parametrize("name", [*SOUND, *BROKEN])
+def test_a_net_that_was_closed_before_its_nodes_came_to_rest_is_the_same_grid(name):
+    grid = (SOUND | BROKEN)[name]()
+    net, source = open_net(grid)
+    closed, kept = join_again(net, source, grid)
+    net.nodes[:] = np.random.default_rng(0).normal(size=net.nodes.shape)
+    later, at_once = with_places(closed, kept, net, None, None), close_net(net, source, grid)
+    assert later.nodes.tobytes() == at_once.nodes.tobytes()
+    assert later.triangles.tobytes() == at_once.triangles.tobytes()
 
 
 def test_nodes_without_a_triangle_are_dropped():

@@ -27,6 +27,59 @@ def test_every_item_is_in_one_part_and_no_part_is_too_small(count, least, proces
     assert len(parts) == max(1, min(processors, count // least))
 
 
+@pytest.mark.parametrize("each", [1, 2, 5])
+def test_a_processor_may_have_several_parts(monkeypatch, each):
+    monkeypatch.setattr(machine, "processors", lambda: 3)
+    done = np.zeros(100, int)
+
+    def work(part, begin, end):
+        done[begin:end] += 1 + part
+
+    machine.in_parts(100, 10, work, each)
+    assert len(set(done.tolist())) == min(3 * each, 10) and done.min() == 1
+
+
+def test_parts_that_no_thread_comes_to_are_done_by_who_asked(monkeypatch):
+    monkeypatch.setattr(machine, "processors", lambda: 2)
+    go_on, threads = threading.Event(), []
+    busy = machine.alongside(lambda: go_on.wait(20))
+    machine.in_parts(30, 10, lambda *_: threads.append(threading.current_thread()))
+    assert threads == 2 * [threading.current_thread()]
+    go_on.set()
+    assert busy()
+
+
+@pytest.mark.parametrize("processors", [1, 2, 4])
+def test_work_alongside_is_done_once_and_its_result_kept(monkeypatch, processors):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+    done = []
+    results = [machine.alongside(lambda i=i: done.append(i) or 10 * i) for i in range(5)]
+    assert [result() for result in results] == [result() for result in results] == [0, 10, 20, 30, 40]
+    assert sorted(done) == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("processors", [1, 2, 4])
+def test_work_alongside_may_have_parts_and_work_alongside_of_its_own(monkeypatch, processors):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+
+    def work(depth):
+        done = np.zeros(40, int)
+        inner = machine.alongside(lambda: work(depth - 1)) if depth else lambda: 0
+        machine.in_parts(40, 10, lambda part, begin, end: done.__setitem__(slice(begin, end), 1))
+        return done.sum() + inner()
+
+    assert machine.alongside(lambda: work(6))() == 7 * 40
+
+
+@pytest.mark.parametrize("processors", [1, 3])
+def test_what_goes_wrong_alongside_comes_out_when_it_is_asked_for(monkeypatch, processors):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+    result = machine.alongside(lambda: 1 // 0)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            result()
+
+
 def test_parts_run_side_by_side(monkeypatch):
     monkeypatch.setattr(machine, "processors", lambda: 3)
     all_there = threading.Barrier(3, timeout=20)

@@ -1,5 +1,7 @@
 """Rows: a lattice of one length along a smooth direction field, which turns and moves with the scan."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -139,6 +141,43 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
             links = posts.neighbors[p, : count[p]].tolist()
             assert p not in links and len(set(links)) == len(links)
         places = posts.mean
+
+
+def test_rows_laid_side_by_side_on_the_same_posts_are_those_laid_alone():
+    shape = make("cloth", 20_000)
+    _, boundary = boundary_of(shape.points, shape.length)
+    ways = [Rows(10.0 * turn) for turn in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda way: lay_rows(boundary, shape.length, way), ways))
+    assert list(boundary.sites.posts) == [shape.length]
+    for way, nodes in zip(ways, together, strict=True):
+        alone = lay_rows(boundary_of(shape.points, shape.length)[1], shape.length, way)
+        assert nodes.places.tobytes() == alone.places.tobytes()
+    assert len({nodes.places.tobytes() for nodes in together}) == 4
+
+
+def test_posts_begun_ahead_are_those_of_the_rows():
+    shape = make("cloth", 20_000)
+    cloud = st.PointCloud.from_array(shape.points)
+    asked = st.Settings(length=shape.length)
+    laying.begin_rows(cloud, asked)
+    boundary = st.find_boundary(cloud, asked)
+    (begun,) = boundary.sites.posts.values()
+    levels, owners = make_levels(boundary.sites.surface, shape.length)
+    for posts, owner, again, same in zip(*begun(), levels, owners, strict=True):
+        assert owner.tolist() == same.tolist() and posts.neighbors.tolist() == again.neighbors.tolist()
+        assert posts.mean.tobytes() == again.mean.tobytes()
+    nodes = lay_rows(boundary, shape.length, Rows())
+    assert list(boundary.sites.posts.values()) == [begun]
+    alone = lay_rows(boundary_of(shape.points, shape.length)[1], shape.length, Rows())
+    assert nodes.places.tobytes() == alone.places.tobytes()
+
+
+def test_no_posts_are_begun_where_no_rows_are_laid():
+    shape = make("cloth", 20_000)
+    cloud, asked = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length, method="paper")
+    laying.begin_rows(cloud, asked)
+    assert not st.find_boundary(cloud, asked).sites.posts
 
 
 def test_nodes_of_rows_keep_apart_and_lie_near_the_scan():

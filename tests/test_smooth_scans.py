@@ -10,8 +10,9 @@ from small_clouds import ball, cap, sheet, sites_of
 import scantruss as st
 from scantruss.kernels.boundary import come_nearer
 from scantruss.kernels.normals import mark_uneven
+from scantruss.scan import sites as sites_module
 from scantruss.scan.linked import link_sites
-from scantruss.scan.sites import SPARSE, prepare_sites, sites_with, with_whole_rim
+from scantruss.scan.sites import SPARSE, begin_sites, prepare_sites, sites_with, with_whole_rim
 from scantruss.settings import SITE, SMOOTH_SITE
 
 
@@ -62,6 +63,27 @@ def test_any_other_scan_has_the_usual_ones(name):
     assert not sites.smooth
     assert sites.surface.mean.tobytes() == asked.surface.mean.tobytes()
     assert sites.strays == asked.strays
+
+
+@pytest.mark.parametrize("name", [*SMOOTH, *OTHER])
+def test_sites_begun_before_the_spacing_is_known_are_the_same(name, monkeypatch):
+    points, asked, chosen = (SMOOTH | OTHER)[name](), st.Settings(length=1.0), []
+    choose = sites_module.sites_of_points
+    monkeypatch.setattr(sites_module, "sites_of_points", lambda *words: chosen.append(words) or choose(*words))
+    cloud = st.PointCloud.from_array(points)
+    begin_sites(cloud, asked)
+    begun, alone = prepare_sites(cloud, asked), sites_of(points)
+    assert begun.surface.mean.tobytes() == alone.surface.mean.tobytes()
+    assert begun.surface.points.tobytes() == alone.surface.points.tobytes()
+    assert begun.smooth == alone.smooth and begun.strays == alone.strays
+    assert name not in SMOOTH or len(chosen) == 1
+
+
+def test_no_sites_are_begun_of_a_sparse_scan_or_where_their_size_is_asked_for():
+    for step, asked in ((4 * SPARSE, st.Settings(length=1.0)), (0.05, st.Settings(length=1.0, box_size=0.2))):
+        cloud = st.PointCloud.from_array(sheet(8, 8, step))
+        begin_sites(cloud, asked)
+        assert cloud not in sites_module._BEGUN
 
 
 @pytest.mark.parametrize("angle", [42, 50, 70, 110])

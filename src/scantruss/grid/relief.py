@@ -28,7 +28,9 @@ WIDTH = 12  # neighbours a node may have while the grid is improved, unless it h
 MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
 
 
-Closed = tuple[Grid, np.ndarray]  #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
+Closed = tuple[
+    Grid, np.ndarray
+]  #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
 
 
 def no_rim() -> Rim:
