@@ -27,10 +27,8 @@ LANDINGS = 3  # parts of the nodes that a thread lands: those of the rim take le
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
 MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
 
-
-Closed = tuple[
-    Grid, np.ndarray
-]  #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
+#: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
+Closed = tuple[Grid, np.ndarray]
 
 
 def no_rim() -> Rim:

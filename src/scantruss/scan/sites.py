@@ -64,9 +64,8 @@ class Sites:
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     apart: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
-    posts: dict[float, Callable[[], Any]] = field(
-        default_factory=dict
-    )  #: those for rows of a length, see `rows.posts_of`
+    #: posts for rows of a length, or who makes them: see `rows.posts_of`
+    posts: dict[float, Callable[[], Any]] = field(default_factory=dict)
 
     @property
     def left_out(self) -> tuple[int, float]:
@@ -158,8 +157,8 @@ def begin_sites(cloud: PointCloud, settings: Settings) -> None:
     """
     points, radius = cloud.points, SMOOTH_SITE * settings.length
     covered = float(np.prod(np.sort(cloud.bounds[1] - cloud.bounds[0])[1:]))
-    dense = covered < len(points) * (2.0 * SPARSE * settings.length) ** 2
-    if settings.box_size is None and len(points) < MANY and dense:
+    dense = len(points) < MANY and covered < len(points) * (2.0 * SPARSE * settings.length) ** 2
+    if dense and settings.box_size is None and _Asked.of(settings, cloud.origin) not in _KEPT.get(cloud, {}):
         _BEGUN[cloud] = _Begun(points, radius, alongside(lambda: sites_of_points(points, radius)))
 
 
