@@ -190,6 +190,17 @@ def test_the_same_grid_comes_out_twice(rough):
     assert found[0].triangles.tobytes() == found[1].triangles.tobytes()
 
 
+def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough):
+    relief = rough.relief()
+    equalize(relief)
+    closed = relief.begin_to_close(rough.grid)
+    finish(relief)
+    early, late = relief.to_grid(rough.grid, closed()), relief.to_grid(rough.grid)
+    assert "topology" in vars(early) and early.topology == late.topology
+    for name in ("nodes", "triangles", "fixed", "deviation"):
+        assert getattr(early, name).tobytes() == getattr(late, name).tobytes()
+
+
 def test_a_grid_in_disorder_is_mended():
     rough = rough_disc(jitter=0.1)
     rng = np.random.default_rng(0)

@@ -10,6 +10,7 @@ from small_clouds import ball, cap, sheet, sites_of
 import scantruss as st
 from scantruss.kernels.boundary import come_nearer
 from scantruss.kernels.normals import mark_uneven
+from scantruss.scan import linked
 from scantruss.scan import sites as sites_module
 from scantruss.scan.linked import link_sites
 from scantruss.scan.sites import SPARSE, begin_sites, prepare_sites, sites_with, with_whole_rim
@@ -68,15 +69,16 @@ def test_any_other_scan_has_the_usual_ones(name):
 @pytest.mark.parametrize("name", [*SMOOTH, *OTHER])
 def test_sites_begun_before_the_spacing_is_known_are_the_same(name, monkeypatch):
     points, asked, chosen = (SMOOTH | OTHER)[name](), st.Settings(length=1.0), []
-    choose = sites_module.sites_of_points
-    monkeypatch.setattr(sites_module, "sites_of_points", lambda *words: chosen.append(words) or choose(*words))
+    choose, alone = linked.sites_of_points, sites_of(points)
+    for module in (sites_module, linked):
+        monkeypatch.setattr(module, "sites_of_points", lambda *words: chosen.append(words) or choose(*words))
     cloud = st.PointCloud.from_array(points)
     begin_sites(cloud, asked)
-    begun, alone = prepare_sites(cloud, asked), sites_of(points)
+    begun = prepare_sites(cloud, asked)
     assert begun.surface.mean.tobytes() == alone.surface.mean.tobytes()
     assert begun.surface.points.tobytes() == alone.surface.points.tobytes()
     assert begun.smooth == alone.smooth and begun.strays == alone.strays
-    assert name not in SMOOTH or len(chosen) == 1
+    assert name not in SMOOTH or len(chosen) == 1  # what was begun is what was used
 
 
 def test_no_sites_are_begun_of_a_sparse_scan_or_where_their_size_is_asked_for():

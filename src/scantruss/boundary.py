@@ -279,7 +279,8 @@ def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius
 
 def _onwards(touched: np.ndarray) -> list[int]:
     """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
-    ahead, (x, y, z) = np.zeros(len(touched), np.int64), touched.T.copy()
+    ahead = np.zeros(len(touched), np.int64)
+    x, y, z = touched.T.copy()
     for k in range(1, BACK + 1):
         ahead[:-k][(x[:-k] == x[k:]) & (y[:-k] == y[k:]) & (z[:-k] == z[k:])] = k
     kept, at = [], 0

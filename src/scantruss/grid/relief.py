@@ -84,19 +84,9 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     return net, source
 
 
-def close_net(
-    net: Net,
-    source: np.ndarray,
-    grid: Grid,
-    deviation: np.ndarray | None = None,
-    desired: np.ndarray | None = None,
-) -> Grid:
-    """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped.
-
-    `deviation` (C,) is the distance of each node of the net from the scan, `desired` (C,) the desired member length there, where it
-    is not the same for all [scan unit].
-    """
-    return with_places(*join_again(net, source, grid), net, deviation, desired)
+def close_net(net: Net, source: np.ndarray, grid: Grid) -> Grid:
+    """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped."""
+    return join_again(net, source, grid)[0]
 
 
 def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
@@ -111,19 +101,10 @@ def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
         triangles=inverse.reshape(-1, 3).astype(np.int64),
         fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
         lines=_lines_of(net, merged, kept),
+        deviation=None,
+        desired=None,
     )
     return closed, kept
-
-
-def with_places(
-    closed: Grid, kept: np.ndarray, net: Net, deviation: np.ndarray | None, desired: np.ndarray | None
-) -> Grid:
-    """Return a grid with its nodes, of which `kept` (V,) are the nodes of the net, where these are now; see `close_net`."""
-    return closed.replace(
-        nodes=net.nodes[kept],
-        deviation=None if deviation is None else deviation[kept],
-        desired=None if desired is None else desired[kept],
-    )
 
 
 def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
@@ -259,9 +240,9 @@ class Relief:
     def to_grid(self, grid: Grid, closed: Closed | None = None) -> Grid:
         """Put the net together again, with all else as in `grid`, or as it was `closed` already; deviation measured."""
         deviation = self.deviation()
-        desired = self.length * self.net.desired if self.graded else None
         again, kept = closed or join_again(self.net, self.source, grid.replace(fixed=self.fixed))
-        return with_places(again, kept, self.net, deviation, desired)
+        desired = self.length * self.net.desired[kept] if self.graded else None
+        return again.replace(nodes=self.net.nodes[kept], deviation=deviation[kept], desired=desired)
 
 
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -64,7 +64,7 @@ class Sites:
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     apart: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
-    #: posts for rows of a length, or who makes them: see `rows.posts_of`
+    #: what waits for the posts for rows of a length: see `rows.posts_of`
     posts: dict[float, Callable[[], Any]] = field(default_factory=dict)
 
     @property
