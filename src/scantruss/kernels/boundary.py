@@ -76,11 +76,38 @@ def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead
 
 
 @kernel
+def _block(
+    surface: Surface,
+    other: int,
+    place: Vector,
+    normal: Vector,
+    u: Vector,
+    v: Vector,
+    noise: float,
+    reach: float,
+    blocked: np.ndarray,
+) -> int:
+    """Mark the directions in which a disc `reach` wide that touches a place would hold another site; how many are new."""
+    if dot(row(surface.normals, other), normal) < FACING:
+        return 0
+    angle, distance = _polar(place, normal, u, v, row(surface.mean, other), noise)
+    new = 0
+    if 0.0 < distance < reach:
+        half = math.acos(distance / reach)
+        low = int(math.ceil((angle - half) * DIRECTIONS / (2.0 * math.pi)))
+        high = int(math.floor((angle + half) * DIRECTIONS / (2.0 * math.pi)))
+        for b in range(low, high + 1):
+            new += not blocked[b % DIRECTIONS]
+            blocked[b % DIRECTIONS] = True
+    return new
+
+
+@kernel
 def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
     """For each site from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
 
     Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
-    the middle of the widest free range, counted from `across(normal)`.
+    the middle of the widest free range, counted from `across(normal)`, less than a turn.
     """
     blocked = np.zeros(DIRECTIONS, np.bool_)
     ahead = np.empty((surface.neighbors.shape[1], 3))
@@ -93,24 +120,24 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
         if not has_gap(surface, s, u, v, widest, ahead):
             continue
         blocked[:] = False
-        radius = radii[s]
-        found = flood(surface, s, place, 2.0 * radius)
-        for i in range(1, found):
-            if dot(row(surface.normals, surface.queue[i]), normal) < FACING:
-                continue
-            angle, distance = _polar(place, normal, u, v, row(surface.mean, surface.queue[i]), noise)
-            if 0.0 < distance < 2.0 * radius:
-                half = math.acos(distance / (2.0 * radius))
-                low = int(math.ceil((angle - half) * DIRECTIONS / (2.0 * math.pi)))
-                high = int(math.floor((angle + half) * DIRECTIONS / (2.0 * math.pi)))
-                for b in range(low, high + 1):
-                    blocked[b % DIRECTIONS] = True
+        reach, left = 2.0 * radii[s], DIRECTIONS
+        for k in range(surface.neighbors.shape[1]):  # these are enough for most that are inside
+            n = surface.neighbors[s, k]
+            if n < 0 or left == 0:
+                break
+            d = subtract(row(surface.mean, n), place)
+            if dot(d, d) <= reach * reach:
+                left -= _block(surface, n, place, normal, u, v, noise, reach, blocked)
+        if left == 0:
+            continue
+        for i in range(1, flood(surface, s, place, reach)):
+            _block(surface, surface.queue[i], place, normal, u, v, noise, reach, blocked)
         best, run = 0, 0
         for b in range(2 * DIRECTIONS):
             run = 0 if blocked[b % DIRECTIONS] else run + 1
             if run > best and run <= DIRECTIONS:
                 best = run
-                free[s] = (b - 0.5 * (run - 1)) * 2.0 * math.pi / DIRECTIONS
+                free[s] = (b - 0.5 * (run - 1)) % DIRECTIONS * 2.0 * math.pi / DIRECTIONS
 
 
 @kernel
