@@ -231,6 +231,19 @@ def test_boundary_points_do_not_go_back_and_forth():
     assert (np.diff(kept) > 0).all()
 
 
+@pytest.mark.parametrize("seed", [1, 4, 8, 10])
+def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed):
+    """With ten points for a node the disc touches some in another order than they have along the rim."""
+    shape = make("great_court", 20_000, seed=seed)
+    length = float(np.sqrt(4 / np.sqrt(3) * shape.area / 2 / 2_000))
+    for loop in found(shape.points, length)[0].loops:
+        arc = np.cumsum(np.linalg.norm(np.diff(loop.points, axis=0, prepend=loop.points[-1:]), axis=1))
+        for steps in range(9, 30):
+            between = arc[steps:] - arc[:-steps]
+            straight = np.linalg.norm(loop.points[steps:] - loop.points[:-steps], axis=1)
+            assert ((between < 0.45 * length) | (between < 3.0 * straight)).all()
+
+
 def test_the_rim_for_the_kernels_is_made_of_the_loops():
     boundary, _ = found(ring(2.0, 6.0, 0.15))
     rim = boundary.rim

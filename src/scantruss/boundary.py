@@ -35,7 +35,7 @@ from .settings import Settings
 
 Progress = Callable[[str, float], None]
 
-SPIKE = 0.6  # tongues and bays narrower than this are cut off, in member lengths
+SPIKES = (0.6, 0.3, 0.16)  # tongues and bays narrower than this are cut off, in member lengths, short ones by the last
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
@@ -172,7 +172,9 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
             continue
         if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
             continue
-        curve = cut_spikes(surface, resample(points, STEP * length), SPIKE * length, STEP * length)
+        curve = resample(points, STEP * length)
+        for width in SPIKES:
+            curve = cut_spikes(surface, curve, width * length, STEP * length)
         if len(curve) >= 8:
             beyond = 0.0 if settings.method == "paper" else surface_beyond(surface, points, sites.density, disc)
             found.append((curve, piece, beyond))

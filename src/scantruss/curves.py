@@ -63,8 +63,8 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
     """
     while True:
         normals = _normals_along(surface, curve)
-        high = min(len(curve) // 2, int(30.0 * width / step))
-        at, gap = kernels.widest_spike(curve, normals, width, int(2.5 * width / step), high)
+        high = min(len(curve) // 2, round(30.0 * width / step))
+        at, gap = kernels.widest_spike(curve, normals, width, round(2.5 * width / step), high)
         if gap == 0:
             return curve
         curve = np.roll(curve, -at, axis=0)
