@@ -14,6 +14,8 @@ from scantruss import InputError, PointCloud, Settings, find_boundary
 from scantruss.kernels.boxes import new_boxes
 from scantruss.kernels.normals import cut_steep_links, link_weights, orient_normals, site_normals, smooth_normals
 from scantruss.kernels.sites import choose_sites, group_points, nearest_sites, put_all, settle_points
+from scantruss.scan import linked as module
+from scantruss.scan.cloud import bounds_of
 from scantruss.scan.sites import prepare_sites
 
 
@@ -317,3 +319,20 @@ def test_repeated_points_change_no_site():
     b = sites_of(np.concatenate([points, points[::3]])).surface
     assert len(a.mean) == len(b.mean)
     assert a.neighbors.tolist() == b.neighbors.tolist() or abs(a.mean - b.mean).max() < 0.1
+
+
+def test_points_are_sorted_where_their_sites_are_many(monkeypatch):
+    """The same points, each near those before it; points of few sites stay as they are."""
+    monkeypatch.setattr(module, "MANY_SITES", 1_000)
+    points = sheet(20.0, 20.0, 0.3)
+    bounds = bounds_of(points)
+
+    def step(places):
+        return np.linalg.norm(np.diff(places, axis=0), axis=1).mean()
+
+    found = module.thin_dense(points, bounds, 0.2, 0.3)
+    assert step(found) < 0.2 * step(points)
+    assert np.array_equal(np.unique(found, axis=0), np.unique(points, axis=0))
+    assert module.thin_dense(points, bounds, 0.2, 0.05) is points
+    few = points[:900]
+    assert module.thin_dense(few, bounds_of(few), 0.2, 0.3) is few

@@ -16,6 +16,8 @@ from .streamline import is_dense, streamlined
 NEIGHBORS = 12  # links of a site
 CLOSE = 2.2  # size of the search boxes while sites are chosen, in their radii
 MANY = 250_000  # points from which on they no longer fit into the cache, and are sorted
+MANY_SITES = 40_000  # the same where most points are sites of their own, which takes more room:
+LONE = 0.3  # so far apart, in radii of a site
 LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
 PART = 20_000  # fewest points for a thread of their own
 SITES = 1500  # the same for sites
@@ -54,7 +56,7 @@ def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float
     """
     if is_dense(spacing, FINE * radius):
         points = points.take(streamlined(points, bounds, FINE * radius), axis=0)
-    if len(points) < MANY:
+    if len(points) < (MANY_SITES if spacing > LONE * radius else MANY):
         return points
     owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)
     return group(points, owner, len(places))[0]
