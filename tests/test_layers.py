@@ -14,6 +14,7 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("grid.grid", "grid.quality"),  # the type that front, grid and export share
     ("curves",),
     ("rolls", "corners", "fill", "lines"),
+    ("edge",),
     ("boundary",),
     ("rows", "slits"),
     ("front",),

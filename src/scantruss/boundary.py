@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .corners import STEP, find_corners
-from .curves import cut_spikes, heights_along, length_around, moved_out, resample, smooth_between, smooth_turns
+from .corners import STEP
+from .curves import cut_spikes, length_around, resample, smooth_turns
+from .edge import ON_THE_EDGE, Chance, chance_of, curve_of_edge
 from .errors import InputError
 from .fill import fill_holes
 from .kernels import boundary as kernels
@@ -40,13 +41,6 @@ OPEN = 0.6  # share of a loop beside which there must be room for a disc
 NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
 PART = 500  # fewest places of a loop for a thread of their own
-WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
-WIDE = 1.0  # the same where that moves the curve no farther than chance did
-BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `surface_beyond` says
-EXACT = 0.1  # in that distance, how far boundary points that were put on the edge lie over their neighbours at most,
-CHANCE = 0.4  # and those that lie by chance at least
-OUT = 0.5  # share of that distance by which the curve moves out: more would put nodes off the surface
-MOVED = 2.0  # how far chance moved the curve at most, in that distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +155,7 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
     """All loops but those of small holes, none of them external yet."""
     length = settings.length
     radius = max(settings.boundary_radius * length, 1.3 * sites.surface.scale[1], 1.9 * sites.spacing)
-    found: list[tuple[np.ndarray, int, float]] = []
+    found: list[tuple[np.ndarray, int, Chance]] = []
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
     rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)
     loops = [(loop, piece) for loop, piece in rolled if piece in sites.pieces]
@@ -176,21 +170,10 @@ def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
         for width in SPIKES:
             curve = cut_spikes(surface, curve, width * length, STEP * length)
         if len(curve) >= 8:
-            beyond = 0.0 if settings.method == "paper" else surface_beyond(surface, points, sites.density, disc)
-            found.append((curve, piece, beyond))
+            paper = settings.method == "paper"
+            chance = ON_THE_EDGE if paper else chance_of(surface, points, sites.density, disc)
+            found.append((curve, piece, chance))
     return [kept for each in found if (kept := smooth_loop(*each, settings, surface)) is not None]
-
-
-def surface_beyond(surface: Surface, points: np.ndarray, density: float, radius: float) -> float:
-    """Return how far the surface goes on beyond its boundary points (M, 3), those that a disc slid from outside touches [scan unit].
-
-    Where points lie by chance, rho to an area, it is `BEYOND` rho^(-2/3) r^(-1/3) in the mean: the disc comes in until there is about
-    one point in the segment that it has entered, and that has an area of (4/3) (2 r)^(1/2) h^(3/2). Points that were put on the edge,
-    as those of a mesh are, lie on one curve, hardly over the lines through their neighbours: then it is 0.
-    """
-    by_chance = BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
-    uneven = float(np.median(np.abs(heights_along(surface, points)))) / by_chance
-    return by_chance * min(max((uneven - EXACT) / (CHANCE - EXACT), 0.0), 1.0)
 
 
 def _is_hole(loop: Loop, sites: Sites) -> bool:
@@ -292,19 +275,9 @@ def _onwards(touched: np.ndarray) -> list[int]:
     return kept
 
 
-def smooth_loop(curve: np.ndarray, piece: int, beyond: float, settings: Settings, surface: Surface) -> Loop | None:
-    """Find the corners of a closed curve of equal steps, smooth it between them; None where it is too short to keep.
-
-    beyond : how far the surface goes on beyond the curve [scan unit]; it is moved out, and smoothed more where chance explains it.
-    """
-    if beyond > 0.0:
-        curve = moved_out(surface, curve, OUT * beyond)
-    at, places = find_corners(curve, settings)
-    smoothed, corner_at = smooth_between(curve, at, places, round(WINDOW / STEP))
-    if beyond > 0.0:
-        step = smooth_between(curve, at, places, round(WIDE / STEP))[0] - smoothed
-        chance = 2.0 - np.linalg.norm(step, axis=1) / (MOVED * beyond)
-        smoothed += np.clip(chance, 0.0, 1.0)[:, None] * step
+def smooth_loop(curve: np.ndarray, piece: int, chance: Chance, settings: Settings, surface: Surface) -> Loop | None:
+    """Make a loop of a closed curve of equal steps through boundary points; None where it is too short to keep."""
+    smoothed, corner_at = curve_of_edge(curve, chance, settings, surface)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
     if (in_lengths if settings.fill_holes is None else length) < settings.bridged_rim:

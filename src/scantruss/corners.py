@@ -22,7 +22,7 @@ WOBBLY = 1.8  # and so many times more than three quarters of them,
 SHARP = 70.0  # or by this angle [degree]
 
 
-def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return where a closed curve has corners and their exact places.
 
     A corner may be where lines fitted to the curve before and after a place differ most in direction. It is one if quadratics do so
@@ -34,22 +34,25 @@ def find_corners(curve: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.
     curve : (M, 3) closed curve of steps `STEP * length`
     settings : Settings
         `corner_angle`, `length`.
+    coarser : float
+        How many times larger parts of the curve to look at: more where few points tell its course.
 
     Returns
     -------
     at : (C,) int64 points of the curve next to the corners
     places : (C, 3) the corners
     """
-    if len(curve) < 2 * round(SIGHT[1] / STEP) + 2:
+    step = STEP / coarser
+    if len(curve) < 2 * round(SIGHT[1] / step) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
-    turn = _turns(curve)
+    turn = _turns(curve, step)
     usual = max(SHARPER * float(np.median(turn)), WOBBLY * float(np.quantile(turn, 0.75)))
     enough = max(settings.corner_angle, min(usual, SHARP))
     found: list[tuple[float, int, np.ndarray]] = []
     peaks = _peaks(turn, enough)
-    for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve)), strict=True):
+    for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve), step), strict=True):
         for rounded in (ROUND, CUT) if turn[i] > SHARP else (ROUND,):
-            place, angle = _corner(curve, i, reaches, round(rounded / STEP))
+            place, angle = _corner(curve, i, reaches, round(rounded / step))
             if angle > enough and np.linalg.norm(place - curve[i]) < APART * settings.length:
                 found.append((angle, i, place))
                 break
@@ -65,19 +68,19 @@ def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
     return peaks[np.diff(peaks, append=peaks[:1] + len(turn)) > half]
 
 
-def _reaches(peaks: np.ndarray, count: int) -> list[tuple[int, int]]:
+def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]]:
     """Steps of the curve before and after each peak that tell its place: up to the next one."""
     reaches = []
     for k in range(len(peaks)):
         rooms = (peaks[k] - peaks[k - 1], peaks[(k + 1) % len(peaks)] - peaks[k])
         before, after = (int(room) % count if len(peaks) > 1 else count for room in rooms)
-        reaches.append((_reach(before, count), _reach(after, count)))
+        reaches.append((_reach(before, count, step), _reach(after, count, step)))
     return reaches
 
 
-def _reach(room: int, count: int) -> int:
+def _reach(room: int, count: int, step: float) -> int:
     """Steps of one side with so much room to the next corner, on a curve of so many steps."""
-    return min(max(room - round(ROUND / STEP), round(SHORTEST / STEP)), round(REACH / STEP), count // 2)
+    return min(max(room - round(ROUND / step), round(SHORTEST / step)), round(REACH / step), count // 2)
 
 
 def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -91,9 +94,9 @@ def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple
     return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
 
 
-def _turns(curve: np.ndarray) -> np.ndarray:
+def _turns(curve: np.ndarray, step: float) -> np.ndarray:
     """Angle (M,) between lines fitted to the curve before and after each place [degree]."""
-    offsets = np.arange(round(SIGHT[0] / STEP), round(SIGHT[1] / STEP) + 1)
+    offsets = np.arange(round(SIGHT[0] / step), round(SIGHT[1] / step) + 1)
     slope = (offsets - offsets.mean()) / ((offsets - offsets.mean()) ** 2).sum()
     count, most = len(curve), int(offsets[-1])
     around = np.concatenate([curve[-most:], curve, curve[:most]])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from .kernels import boundary as kernels
@@ -37,9 +39,24 @@ def heights_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
     return dots(before, _outward(surface, turns, span))
 
 
-def moved_out(surface: Surface, curve: np.ndarray, distance: float) -> np.ndarray:
-    """Return a closed curve of equal steps (M, 3), the surface to its left, moved away from the surface."""
-    return curve + distance * _outward(surface, curve, np.roll(curve, -AHEAD, axis=0) - np.roll(curve, AHEAD, axis=0))
+def outward(surface: Surface, curve: np.ndarray) -> np.ndarray:
+    """Unit vectors (M, 3) along the surface, away from it, square to a closed curve of equal steps (M, 3), the surface to its left."""
+    return _outward(surface, curve, np.roll(curve, -AHEAD, axis=0) - np.roll(curve, AHEAD, axis=0))
+
+
+def room_across(curve: np.ndarray, reach: float, step: float) -> np.ndarray:
+    """Distance (M,) from each place of a closed curve (M, 3) to another part of it, at most `reach`: `step` is that of the curve."""
+    room = np.full(len(curve), reach)
+    kernels.room_across(curve, round(3.0 * reach / step), room)
+    return room
+
+
+def runs_around(marks: np.ndarray) -> np.ndarray:
+    """Number of the run of equal marks that each place of a closed curve (M,) is in, from 0."""
+    run = np.cumsum(np.concatenate([[False], marks[1:] != marks[:-1]]))
+    if marks[0] == marks[-1]:
+        run[run == run[-1]] = 0
+    return run
 
 
 def _outward(surface: Surface, turns: np.ndarray, ahead: np.ndarray) -> np.ndarray:
@@ -79,10 +96,7 @@ def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: 
     smoothed : (M, 3)
     corner_at : (C,) indices of the corners in it
     """
-    offsets = np.arange(-half, half + 1)
-    weights = (1 - (np.abs(offsets) / (half + 1)) ** 3) ** 3
-    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
-    filter_ = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
+    filter_ = _quadratic(half)
     if len(at) == 0:
         return _filtered(curve[np.arange(-half, len(curve) + half) % len(curve)], filter_), at
     parts, corner_at, size = [], [], 0
@@ -94,8 +108,7 @@ def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: 
         n = len(part)
         reach = min(half, n - 1)
         mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
-        taken = filter_ if reach == half else _narrow(filter_, half - reach)
-        smooth = _filtered(mirrored, taken)
+        smooth = _filtered(mirrored, filter_ if reach == half else _quadratic(reach))
         smooth[0], smooth[-1] = part[0], part[-1]
         corner_at.append(size)
         parts.append(smooth[:-1])
@@ -108,10 +121,14 @@ def _filtered(places: np.ndarray, filter_: np.ndarray) -> np.ndarray:
     return np.stack([np.convolve(places[:, c], filter_, "valid") for c in range(3)], axis=1)
 
 
-def _narrow(filter_: np.ndarray, cut: int) -> np.ndarray:
-    """A smoothing filter cut at both ends, its sum kept at one."""
-    inner = filter_[cut : len(filter_) - cut]
-    return inner / inner.sum()
+@lru_cache(maxsize=256)
+def _quadratic(half: int) -> np.ndarray:
+    """The filter (2 half + 1,) of local quadratics."""
+    offsets = np.arange(-half, half + 1)
+    weights = (1 - (np.abs(offsets) / (half + 1)) ** 3) ** 3
+    terms = np.stack([np.ones(len(offsets)), offsets, offsets**2], axis=1)
+    found: np.ndarray = np.linalg.solve(terms.T @ (weights[:, None] * terms), (weights[:, None] * terms).T)[0]
+    return found
 
 
 def _drop_backsteps(part: np.ndarray) -> np.ndarray:

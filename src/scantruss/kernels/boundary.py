@@ -348,6 +348,21 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
 
 
 @kernel
+def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
+    """Lower the values (M,) to the distance of each place of a closed curve (M, 3) to any more than `low` steps away along it."""
+    count, longest = len(curve), 0.0
+    for i in range(count):
+        longest = max(longest, norm(subtract(row(curve, (i + 1) % count), row(curve, i))))
+    for i in range(count):
+        k = low + 1
+        while k < count - low:
+            away = norm(subtract(row(curve, (i + k) % count), row(curve, i)))
+            if away < room[i]:
+                room[i] = away
+            k += max(1, int((away - room[i]) / longest))  # so many steps on it may be nearer
+
+
+@kernel
 def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, site: int, radius: float) -> float:
     """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
 
