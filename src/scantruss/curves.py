@@ -45,7 +45,10 @@ def outward(surface: Surface, curve: np.ndarray) -> np.ndarray:
 
 
 def room_across(curve: np.ndarray, reach: float, step: float) -> np.ndarray:
-    """Distance (M,) from each place of a closed curve (M, 3) to another part of it, at most `reach`: `step` is that of the curve."""
+    """Distance (M,) from each place of a closed curve (M, 3) of steps `step` to another part of it, at most `reach`.
+
+    Another part is one more than three times `reach` away along the curve: nearer ones are bends, or were cut off as spikes.
+    """
     room = np.full(len(curve), reach)
     kernels.room_across(curve, round(3.0 * reach / step), room)
     return room

@@ -19,7 +19,8 @@ MOVED = 2.0  # inwards about so far at most, in `Chance.beyond`,
 BAY = 4.0  # and outwards over bays in which there would be so many points, by half over those with a half more
 ACROSS = 0.6  # where another part of the curve is nearer, in member lengths,
 SIDE = 0.25  # it moves outwards at most by this share of the distance
-BESIDE = 1.5  # a corner in a bay with fewer points is none; it is looked for so far to both sides, in member lengths
+EMPTY = 6.0  # a corner in a bay in which there would be no more points is none;
+BESIDE = 1.5  # the bay is that under a line from so far before to so far behind, in member lengths
 FLAT = 0.7  # cosine between the way into a bay and the surface
 BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `chance_of` says
 EXACT = 0.1  # in that distance, how far boundary points that were put on the edge lie over their neighbours at most,
@@ -65,25 +66,31 @@ def curve_of_edge(
     smoothed : (K, 3)
     corner_at : (C,) int64, points of it that are corners
     """
+    if chance.beyond == 0.0:
+        return smooth_between(curve, *find_corners(curve, settings), round(WINDOW / STEP))
     beyond, step = chance.beyond, STEP * settings.length
-    if beyond > 0.0:
-        room = SIDE * room_across(curve, ACROSS * settings.length, step)
-        curve = curve + np.minimum(OUT * beyond, room)[:, None] * outward(surface, curve)
-    coarser = min(max(beyond / (FINE * settings.length), 1.0), COARSEST)
-    at, places = find_corners(curve, settings, coarser)
-    if beyond > 0.0 and len(at):
-        kept = bays_at(curve, at, outward(surface, curve)) * chance.density > 1.5 * BAY
-        at, places = at[kept], places[kept]
-    smoothed, corner_at = smooth_between(curve, at, places, round(WINDOW / STEP))
-    if beyond > 0.0:
-        halves = [min(round(wide / STEP), len(curve) // ROUND) for wide in WIDER]
-        wider = [smooth_between(curve, at, places, half)[0] for half in halves]
-        narrow, out = smoothed, outward(surface, wider[-1])
-        room = SIDE * room_across(narrow, ACROSS * settings.length, step)
-        for one in wider:
-            share = explained(one - narrow, out, room, chance.density * step, MOVED * beyond)
-            smoothed = smoothed + share[:, None] * (one - smoothed)
+    room = SIDE * room_across(curve, ACROSS * settings.length, step)
+    curve = curve + np.minimum(OUT * beyond, room)[:, None] * outward(surface, curve)
+    at, places = _corners(curve, chance, settings, surface)
+    narrow, corner_at = smooth_between(curve, at, places, round(WINDOW / STEP))
+    halves = [min(round(wide / STEP), len(curve) // ROUND) for wide in WIDER]
+    wider = [smooth_between(curve, at, places, half)[0] for half in halves]
+    smoothed, out = narrow, outward(surface, wider[-1])
+    room = SIDE * room_across(narrow, ACROSS * settings.length, step)
+    for one in wider:
+        share = explained(one - narrow, out, room, chance.density * step, MOVED * beyond)
+        smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
+
+
+def _corners(curve: np.ndarray, chance: Chance, settings: Settings, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a curve along points that lie by chance has corners, and their places; those in bays that chance explains are none."""
+    coarser = min(max(chance.beyond / (FINE * settings.length), 1.0), COARSEST)
+    at, places = find_corners(curve, settings, coarser)
+    if len(at) == 0:
+        return at, places
+    kept = bays_at(curve, at, outward(surface, curve)) * chance.density > EMPTY
+    return at[kept], places[kept]
 
 
 def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:

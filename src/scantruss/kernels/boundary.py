@@ -318,6 +318,15 @@ def _beside(d: Vector, a: Vector, b: Vector) -> bool:
 
 
 @kernel
+def _longest_step(curve: np.ndarray) -> float:
+    """Longest distance from a place of a closed curve (M, 3) to the next."""
+    longest = 0.0
+    for i in range(len(curve)):
+        longest = max(longest, norm(subtract(row(curve, (i + 1) % len(curve)), row(curve, i))))
+    return longest
+
+
+@kernel
 def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int, high: int) -> tuple[int, int]:
     """Two places of a closed curve nearer than `width` with the most steps between them, more than `low`, at most `high`.
 
@@ -327,10 +336,8 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
     -------
     at, gap : the first place and the steps to the second; gap 0 where there are none
     """
-    count = len(curve)
-    at, gap, longest = 0, 0, 0.0
-    for i in range(count):
-        longest = max(longest, norm(subtract(row(curve, (i + 1) % count), row(curve, i))))
+    count, longest = len(curve), _longest_step(curve)
+    at, gap = 0, 0
     for i in range(count):
         k = high
         while k > max(low, gap):
@@ -350,9 +357,7 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
 @kernel
 def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
     """Lower the values (M,) to the distance of each place of a closed curve (M, 3) to any more than `low` steps away along it."""
-    count, longest = len(curve), 0.0
-    for i in range(count):
-        longest = max(longest, norm(subtract(row(curve, (i + 1) % count), row(curve, i))))
+    count, longest = len(curve), _longest_step(curve)
     for i in range(count):
         k = low + 1
         while k < count - low:
