@@ -1,5 +1,7 @@
 """Work in parts: all of it is done once, side by side, and what goes wrong comes out."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -50,6 +52,23 @@ def test_parts_that_no_thread_comes_to_are_done_by_who_asked(monkeypatch):
 
 
 @pytest.mark.parametrize("processors", [1, 2, 4])
+@pytest.mark.parametrize("count", range(5))
+def test_two_shares_are_done_at_once_and_the_rest_after_them(monkeypatch, processors, count):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+    begun, both = [], threading.Barrier(2 if processors > 1 and count > 1 else 1, timeout=20)
+
+    def work(share):
+        begun.append(share)
+        if share < 20:
+            both.wait()  # passes only when both wait at once
+        return 10 * share
+
+    shares = [10 + 5 * k for k in range(count)]
+    assert machine.two_at_once(work, shares) == [10 * share for share in shares]
+    assert sorted(begun) == shares and begun[2:] == shares[2:]
+
+
+@pytest.mark.parametrize("processors", [1, 2, 4])
 def test_work_alongside_is_done_once_and_its_result_kept(monkeypatch, processors):
     monkeypatch.setattr(machine, "processors", lambda: processors)
     done = []
@@ -96,6 +115,50 @@ def test_what_goes_wrong_in_a_part_comes_out(monkeypatch, processors):
 
     with pytest.raises(ValueError, match="in the last part"):
         machine.in_parts(40, 10, work)
+
+
+def test_parts_that_nobody_has_begun_are_left_when_one_goes_wrong(monkeypatch):
+    monkeypatch.setattr(machine, "processors", lambda: 2)
+    go_on, done = threading.Event(), []
+    busy = machine.alongside(lambda: go_on.wait(20))
+
+    def work(part, begin, end):
+        done.append(part)
+        raise ValueError("in the first part")
+
+    with pytest.raises(ValueError, match="in the first part"):
+        machine.in_parts(40, 10, work, each=2)
+    go_on.set()
+    assert busy() and done == [0]
+
+
+def test_who_waits_together_gets_one_result(monkeypatch):
+    monkeypatch.setattr(machine, "processors", lambda: 2)
+    go_on, done, found = threading.Event(), [], []
+
+    def work():
+        go_on.wait(20)
+        done.append(1)
+        return done
+
+    result = machine.alongside(work)
+    waiting = [threading.Thread(target=lambda: found.append(result())) for _ in range(3)]
+    for thread in waiting:
+        thread.start()
+    go_on.set()
+    for thread in waiting:
+        thread.join(20)
+    assert len(found) == 3 and all(each is done for each in found) and done == [1]
+
+
+def test_the_threads_end_with_the_program():
+    """Also where work is still on its way that nobody has asked for."""
+    program = (
+        "import time; from scantruss import machine; machine.processors = lambda: 2\n"
+        "machine.in_parts(10, 1, lambda *_: None); machine.alongside(lambda: time.sleep(0.2) or print('done'))"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert (ended.stdout, ended.stderr) in (("done\n", ""), ("", ""))
 
 
 def test_there_is_a_processor():

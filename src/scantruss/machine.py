@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from queue import SimpleQueue
+from threading import Lock, Thread
+from typing import TypeVar, cast
 
 Result = TypeVar("Result")
+Share = TypeVar("Share")
 
 UNKNOWN_MEMORY = 4e9  # bytes, where a machine tells nothing
 
 
+@cache
 def processors() -> int:
     """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -26,24 +31,53 @@ def in_parts(count: int, least: int, work: Callable[[int, int, int], object], ea
     """Call ``work(part, begin, end)`` for all of `count` items, in parts of at least `least` items side by side.
 
     The work must not depend on the parts. Kernels release the GIL, so threads do. There are `each` parts for a processor: several
-    where some take longer than others.
+    where some take longer than others. Who asks does the parts that no thread has come to.
     """
     parts = min(each * processors(), count // least)
     if parts < 2:
         work(0, 0, count)
         return
     bounds = [count * part // parts for part in range(parts + 1)]
-    others = {part: _pool(processors() - 1).submit(work, part, *bounds[part : part + 2]) for part in range(1, parts)}
+    takers: dict[int, object] = {}
+    done: SimpleQueue[BaseException | None] = SimpleQueue()
+
+    def help_out() -> None:
+        for part in _taken(takers, parts, object()):
+            try:
+                work(part, bounds[part], bounds[part + 1])
+                done.put(None)
+            except BaseException as error:
+                done.put(error)
+
+    for _ in range(min(parts, processors()) - 1):
+        _pool(processors() - 1).put(help_out)
+    own = object()
     try:
-        work(0, 0, bounds[1])
-        for part, other in others.items():
-            if other.cancel():  # no thread has come to it
-                work(part, *bounds[part : part + 2])
-    finally:
-        wait(other for other in others.values() if not other.cancel())
-    for other in others.values():
-        if not other.cancelled():
-            other.result()
+        for part in _taken(takers, parts, own):
+            work(part, bounds[part], bounds[part + 1])
+    finally:  # after an error: what nobody has begun is left
+        errors = [done.get() for part in range(parts) if takers.setdefault(part, own) is not own]
+    for error in errors:
+        if error is not None:
+            raise error
+
+
+def _taken(takers: dict[int, object], parts: int, taker: object) -> Iterator[int]:
+    """Parts that nobody has taken yet; each is the taker's from then on."""
+    return (part for part in range(parts) if takers.setdefault(part, taker) is taker)
+
+
+def two_at_once(work: Callable[[Share], Result], shares: Sequence[Share]) -> list[Result]:
+    """Return what the work returns for each share: the first two are done side by side, then the rest, which may see what both did."""
+    results: dict[int, Result] = {}
+
+    def part(_: int, begin: int, end: int) -> None:
+        results.update((k, work(shares[k])) for k in range(begin, end))
+
+    side_by_side = min(2, len(shares))
+    in_parts(side_by_side, 1, part)
+    part(0, side_by_side, len(shares))
+    return [results[k] for k in range(len(shares))]
 
 
 def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
@@ -53,14 +87,53 @@ def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
     """
     if processors() < 2:
         return cache(work)
-    begun = _pool(processors() - 1).submit(work)
-    return cache(lambda: work() if begun.cancel() else begun.result())
+    takers: dict[int, object] = {}
+    found: list[tuple[Result | None, BaseException | None]] = []
+    ended = Lock()
+    ended.acquire()
+
+    def do() -> None:
+        for _ in _taken(takers, 1, object()):
+            try:
+                found.append((work(), None))
+            except BaseException as error:
+                found.append((None, error))
+            finally:
+                ended.release()
+
+    def result() -> Result:
+        do()
+        with ended:
+            value, error = found[0]
+        if error is not None:
+            raise error
+        return cast(Result, value)
+
+    _pool(processors() - 1).put(do)
+    return result
 
 
 @cache
-def _pool(threads: int) -> ThreadPoolExecutor:
-    """Threads that are kept: starting some takes as long as many a kernel."""
-    return ThreadPoolExecutor(threads, thread_name_prefix="scantruss")
+def _pool(threads: int) -> SimpleQueue[Callable[[], object]]:
+    """Threads that are kept, as starting some takes as long as many a kernel, and do what is put here."""
+    jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()
+
+    def serve() -> None:
+        while True:
+            jobs.get()()
+
+    begun = [Thread(target=serve, name="scantruss", daemon=True) for _ in range(threads)]
+    for thread in begun:
+        thread.start()
+
+    def end() -> None:
+        for _ in begun:
+            jobs.put(sys.exit)  # which ends the thread that does it
+        for thread in begun:
+            thread.join()
+
+    atexit.register(end)
+    return jobs
 
 
 if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
