@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from ..kernels.flips import flip_by_angle
+import numpy as np
+
+from ..kernels import flips as kernels
+from ..kernels.grid import Net
 from .grid import Grid
 from .relief import close_net, open_net
 
@@ -26,5 +29,10 @@ def flip_edges(grid: Grid) -> tuple[Grid, int]:
     if len(grid.triangles) == 0:
         return grid, 0
     net, source = open_net(grid)
-    count = flip_by_angle(net, FOLD, ROUNDS)
-    return close_net(net, source, grid), int(count)
+    count = flip_by_angle(net)
+    return close_net(net, source, grid), count
+
+
+def flip_by_angle(net: Net) -> int:
+    """Flip the edges of an opened grid in place; returns the flips made."""
+    return int(kernels.flip_by_angle(net, FOLD, ROUNDS, np.full(len(net.arc), -1, np.int64)))

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.flips import flip_by_angle
 from .equalize import equalize, finish
 from .fixed import check_positions, fix_nearest_nodes, fix_nodes, hold_nodes
-from .flips import FOLD, ROUNDS
+from .flips import flip_by_angle
 from .grid import Grid
 from .kicks import search_widely
 from .on_lines import with_rim_members
@@ -92,10 +91,10 @@ def improve(
 ) -> None:
     """Improve an opened grid by the method of the settings, make nodes at the positions (K, 3) and land on the scan."""
     if settings.method == "paper":
-        flip_by_angle(relief.net, FOLD, ROUNDS)
+        flip_by_angle(relief.net)
         if len(positions):
             fix_nearest_nodes(relief, positions)
-            flip_by_angle(relief.net, FOLD, ROUNDS)
+            flip_by_angle(relief.net)
         smooth(relief, settings)
         land(relief, sites)
     else:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .compile import kernel
 from .grid import DEGREE, Net, flip, may_flip, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
@@ -43,19 +45,29 @@ def gain_of_flip(net: Net, a: int, b: int, fold: float) -> float:
 
 
 @kernel
-def flip_by_angle(net: Net, fold: float, rounds: int) -> int:
-    """Flip every edge whose flip makes the smallest angle of its two triangles larger, until none does; returns the flips."""
+def flip_by_angle(net: Net, fold: float, rounds: int, changed: np.ndarray) -> int:
+    """Flip every edge whose flip makes the smallest angle of its two triangles larger, until none does; returns the flips.
+
+    `changed` (C,) int64, -1 at the start, is the last round in which the ring of a node or of one beside it has changed: after the
+    first, only edges between such nodes are looked at again.
+    """
     count = 0
-    for _ in range(rounds):
+    for turn in range(rounds):
         before = count
         for v in range(net.free[-1]):
             i = 0
             while i < net.state[v, DEGREE]:
                 u = net.ring[v, i]
                 i += 1
-                if v < u and may_flip(net, v, u) and gain_of_flip(net, v, u, fold) > 1e-9:
-                    flip(net, v, u)
-                    count += 1
+                if v < u and changed[v] >= turn - 1 and changed[u] >= turn - 1:
+                    if may_flip(net, v, u) and gain_of_flip(net, v, u, fold) > 1e-9:
+                        right, left = wings(net, v, u)
+                        flip(net, v, u)
+                        count += 1
+                        for w in (v, u, right, left):
+                            changed[w] = turn
+                            for k in range(net.state[w, DEGREE]):
+                                changed[net.ring[w, k]] = turn
         if count == before:
             break
     return count
