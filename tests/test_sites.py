@@ -292,6 +292,16 @@ def test_a_rough_cloud_is_seen_as_a_sheet(noise):
     assert np.degrees(np.arccos(abs(surface.normals[inside, 2]))).mean() < 4
 
 
+def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough():
+    """They stay where they are: moved to the plane around them they would leave the ridges, and others would be chosen."""
+    shape = make("great_court", 100_000)
+    length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
+    sites = sites_of(shape.points, length)
+    thick = (sites.thickness > module.ROUGH * length).mean()
+    assert module.SOME_ROUGH < thick < module.MANY_ROUGH
+    assert shape.distance(sites.surface.mean + PointCloud.from_array(shape.points).origin).max() < module.ROUGH * length
+
+
 def test_the_area_is_about_right():
     assert sites_of(sheet(10, 8, 0.15)).area == pytest.approx(80, rel=0.2)
     assert sites_of(ball(3.0, 6000)).area == pytest.approx(36 * np.pi, rel=0.2)

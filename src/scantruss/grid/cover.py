@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.cover import lower_distances, nearest_distances, put_places
+from ..machine import alongside
 
 if TYPE_CHECKING:
     from ..scan.sites import Sites
@@ -16,14 +18,22 @@ if TYPE_CHECKING:
 NEAR = 0.1  #: the first reach of a search, in lengths; most of a scan lies nearer to its grid
 
 
-def scan_places(sites: Sites) -> np.ndarray:
-    """Return the parts of the scan that a grid must reach (P, 3): the sites of all pieces that are no debris [scan unit]."""
-    return np.ascontiguousarray(sites.surface.mean[np.isin(sites.piece, sites.pieces)])
+def begin_places(sites: Sites, length: float) -> Callable[[], tuple[np.ndarray, SearchBoxes]]:
+    """Begin to list, beside other work, the parts of the scan that a grid must reach: the sites of all pieces that are no debris.
 
+    Returns
+    -------
+    callable
+        Waits for the places (P, 3) [scan unit], and these by box; done once for a length.
+    """
 
-def scan_field(sites: Sites) -> np.ndarray:
-    """Return the desired length at these parts of the scan, in lengths (P,)."""
-    return sites.surface.field[np.isin(sites.piece, sites.pieces)]
+    def scan_places() -> tuple[np.ndarray, SearchBoxes]:
+        places = np.ascontiguousarray(sites.surface.mean[sites.kept])
+        return places, boxes_of(places, 0.5 * length)
+
+    if length not in sites.places:
+        sites.places[length] = alongside(scan_places)
+    return sites.places[length]
 
 
 def boxes_of(places: np.ndarray, box: float) -> SearchBoxes:

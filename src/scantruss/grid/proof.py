@@ -13,7 +13,7 @@ import numpy as np
 from ..kernels.figures import folds_of
 from ..machine import alongside
 from .certificate import Certificate, Fault, Worst, place_of
-from .cover import boxes_of, distances_to_grid, distances_to_scan, scan_field, scan_places
+from .cover import begin_places, distances_to_grid, distances_to_scan
 from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
@@ -51,8 +51,7 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
         fault = Fault("empty", empty or "has nodes that are nowhere")
         return replace(_topology(grid, boundary, settings), faults=(fault,))
     sites, length = boundary.sites, settings.length
-    places = scan_places(sites)
-    boxes = boxes_of(places, 0.5 * length)
+    places, boxes = begin_places(sites, length)()
     nearest = alongside(lambda: nodes_of_sites(grid, sites, length))  # kernels, which leave the interpreter to the rest
     left = alongside(lambda: distances_to_grid(places, boxes, grid, length))
     told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
@@ -102,7 +101,7 @@ def _from_scan(grid: Grid, length: float, places: np.ndarray, boxes: SearchBoxes
 
 def _from_grid(grid: Grid, sites: Sites, length: float, places: np.ndarray, left: np.ndarray) -> dict[str, Any]:
     """Return how far the scan lies from the grid; `left` (P,) is the distance of places (P, 3) of the scan from it."""
-    local = length * scan_field(sites)
+    local = length * sites.surface.field[sites.kept]
     return {
         "scan_within_reach": float((left <= REACH * local).mean()),
         "farthest_scan": _worst(left, places, grid, length / local),

@@ -30,8 +30,8 @@ def nodes_of_sites(grid: Grid, sites: Sites, length: float) -> np.ndarray:
 
 def faults_on_sheets(grid: Grid, sites: Sites, nearest: np.ndarray) -> list[Fault]:
     """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_sites`."""
-    left = np.flatnonzero((nearest < 0) & np.isin(sites.piece, sites.pieces))
-    share = len(left) / max(int(np.isin(sites.piece, sites.pieces).sum()), 1)
+    left = np.flatnonzero((nearest < 0) & sites.kept)
+    share = len(left) / max(int(sites.kept.sum()), 1)
     faults = []
     if share > LEFT_OUT:
         where = place_of(sites.surface.mean[left[0]] + grid.origin)

@@ -23,7 +23,8 @@ PART = 20_000  # fewest points for a thread of their own
 SITES = 1500  # the same for sites
 FINE = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
 ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
-SOME_ROUGH = 0.002  # share of such sites from which on that is done
+SOME_ROUGH = 0.002  # share of rough sites from which on a scan may be a thick layer,
+MANY_ROUGH = 0.007  # and from which on they are settled: fewer may lie along its ridges
 SHEETS = 0.12  # sites thicker than this may be several sheets
 FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
 FINEST = 1.0  # spacings between the finest sites
@@ -109,9 +110,9 @@ def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: fl
     return Linked(owner, found.chosen[chosen], grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
 
-def is_rough(found: Linked, rough: float) -> bool:
-    """Whether the sites form a thick layer, no sheet."""
-    return bool((found.thickness > rough).mean() > SOME_ROUGH)
+def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
+    """Whether the sites form a thick layer, no sheet: more than some of them, as a share, are thicker than `rough`."""
+    return bool((found.thickness > rough).mean() > some)
 
 
 def sites_of_points(points: np.ndarray, radius: float) -> Choice:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from .field import Wish, length_field, wish_of
 from .linked import (
     FINE,
     MANY,
+    MANY_ROUGH,
     PART,
     ROUGH,
     SHEETS,
@@ -66,6 +68,13 @@ class Sites:
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
     #: what waits for the posts for rows of a length: see `rows.posts_of`
     posts: dict[float, Callable[[], Any]] = field(default_factory=dict)
+    #: what waits for the places that a grid must reach: see `grid.cover.begin_places`
+    places: dict[float, Callable[[], Any]] = field(default_factory=dict)
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """Which sites are of pieces that are large enough for a grid (S,) bool."""
+        return np.isin(self.piece, self.pieces)
 
     @property
     def left_out(self) -> tuple[int, float]:
@@ -225,7 +234,9 @@ def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
 def with_own_scratch(surface: Surface) -> Surface:
     """Return the same surface with room of its own for look-ups, so that threads do not meet."""
     return surface._replace(
-        stamp=np.zeros_like(surface.stamp), queue=surface.queue.copy(), counter=np.zeros_like(surface.counter)
+        stamp=np.zeros(surface.stamp.shape, np.int64),
+        queue=np.empty_like(surface.queue),
+        counter=np.zeros_like(surface.counter),
     )
 
 
@@ -316,7 +327,7 @@ def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Ask
         fine = link_finer(points, radius, length, spacing)
         if fine is not None:
             some, (found, radius) = points, fine
-    if is_rough(found, ROUGH * length):
+    if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
     return _Chosen(found, radius, some, points, strays, False)
 
