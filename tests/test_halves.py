@@ -8,6 +8,7 @@ from scantruss import machine
 from scantruss.grid import equalize, kicks
 from scantruss.grid.halves import Halves
 from scantruss.kernels.halves import BETWEEN
+from scantruss.kernels.trial import TRIED
 
 MAKERS = {
     "disc": lambda seed: rough_disc(length=0.14, seed=seed, points=9000),
@@ -60,6 +61,75 @@ def test_a_grid_without_work_has_no_halves(make):
     net = make(0).relief().net
     halves = Halves(net, np.zeros(len(net.arc), bool))
     assert (halves.label[net.degree > 0] == BETWEEN).all()
+
+
+def in_shares(make, monkeypatch, seed=1):
+    """A relief small enough for a test that is settled and searched in halves all the same."""
+    monkeypatch.setattr(equalize, "MANY", 50)
+    monkeypatch.setattr(equalize, "ASKING", 10)
+    return make(seed)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(3))
+def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_once(make, seed, monkeypatch):
+    net = in_shares(make, monkeypatch, seed).relief().net
+    first, second, between = equalize.shares_of(net)
+    assert sorted([*first, *second, *between]) == np.flatnonzero(net.degree > 0).tolist()
+    assert min(len(first), len(second)) > 0.3 * (net.degree > 0).sum()
+    beside = {u for v in first.tolist() for u in net.ring[v, : net.degree[v]].tolist()}
+    assert not beside & set(second.tolist())
+    monkeypatch.setattr(equalize, "MANY", 10_000)
+    assert [some.tolist() for some in equalize.shares_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
+
+
+@pytest.mark.parametrize("processors", [1, 4])
+def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, processors, monkeypatch):
+    nets = []
+    for count in (2, processors):
+        monkeypatch.setattr(machine, "processors", lambda count=count: count)
+        rough = in_shares(make, monkeypatch)
+        relief = rough.relief()
+        equalize.equalize(relief)
+        equalize.finish(relief)
+        assert same_topology(rough.grid, relief.to_grid(rough.grid))
+        nets.append(relief.net)
+    for one, other in zip(*nets, strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
+    energies, sweeps = [], []
+    for many in (50, 10_000):
+        relief = make(seed).relief()
+        monkeypatch.setattr(equalize, "MANY", many)
+        sweeps.append(equalize.settle(relief, equalize.WEIGHT, 1e-7, 400))
+        energies.append(equalize.energy_of_node(relief))
+    assert max(sweeps) < 400
+    assert energies[0] == pytest.approx(energies[1], rel=0.01)
+
+
+def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
+    relief = in_shares(make, monkeypatch, 2).relief()
+    equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
+    net, scratch = relief.net, equalize.new_scratch(relief)
+    seen, run = [], Halves.run
+
+    def look(halves, work):
+        between = (halves.label == BETWEEN) & (net.degree > 0)
+        old = [array[between].copy() for array in (net.nodes, net.ring, net.state)]
+        run(halves, work)
+        seen.append([np.array_equal(array[between], was) for array, was in zip(net[:3], old, strict=True)])
+
+    monkeypatch.setattr(Halves, "run", look)
+    before = equalize.energy_of_node(relief)
+    kept = equalize.search_once(relief, scratch)
+    assert seen[0] == [True, True, True] and kept > 0 and equalize.energy_of_node(relief) < before
+    while kept:
+        kept = equalize.search_once(relief, scratch)
+    asking = (net.degree > 0) & (net.degree != net.ideal)
+    assert asking.any() and (scratch.note[asking, TRIED] == 1).all()
 
 
 @pytest.mark.parametrize("processors", [1, 4])

@@ -12,6 +12,7 @@ from shapes import make
 from small_clouds import ball, sheet
 
 import scantruss as st
+from scantruss import machine
 from scantruss import rows as laying
 from scantruss.kernels import rows as kernels
 from scantruss.rows import Rows, first_row, lay_rows, make_levels
@@ -71,6 +72,34 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
     assert abs((middle - p) @ n) < size + 1e-9 and abs((middle - q) @ m) < size + 1e-9
 
 
+@pytest.mark.parametrize("name", ["plate", "ball"])
+def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
+    monkeypatch.setattr(laying, "MANY", 300)
+    points = sheet(12.0, 8.0, 0.15, seed=1) if name == "plate" else ball(3.0, 8000)
+    _, boundary = boundary_of(points, 0.5)
+    levels, _, shares = make_levels(boundary.sites.surface, 0.5)
+    assert len(shares[0]) == 3 and len(shares[-1]) == 1
+    for posts, share in zip(levels, shares, strict=True):
+        assert sorted(np.concatenate(share).tolist()) == list(range(len(posts.mean)))
+        if len(share) == 3:
+            first, second, between = (set(some.tolist()) for some in share)
+            for p in first | second:
+                linked = set(posts.neighbors[p][posts.neighbors[p] >= 0].tolist())
+                assert not linked & (second if p in first else first)
+            assert len(between) < min(len(first), len(second))
+
+
+@pytest.mark.parametrize("processors", [1, 4])
+def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch):
+    monkeypatch.setattr(laying, "MANY", 40)
+    found = []
+    for count in (2, processors):
+        monkeypatch.setattr(machine, "processors", lambda count=count: count)
+        _, boundary = boundary_of(sheet(12.0, 8.0, 0.2, seed=3), 1.0)
+        found.append(lay_rows(boundary, 1.0, Rows(20.0)))
+    assert found[0].places.tobytes() == found[1].places.tobytes()
+
+
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125), (3, 0.125), (4, 0.0)])
 def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, left_out):
@@ -127,7 +156,7 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
     shape = make("cloth", 20_000)
     _, boundary = boundary_of(shape.points, shape.length)
     surface = boundary.sites.surface
-    levels, owners = make_levels(surface, shape.length)
+    levels, owners, _ = make_levels(surface, shape.length)
     assert len(levels) == len(owners) > 2
     places = surface.mean
     for level, (posts, owner) in enumerate(zip(levels, owners, strict=True)):
@@ -163,8 +192,8 @@ def test_posts_begun_ahead_are_those_of_the_rows():
     laying.begin_rows(cloud, asked)
     boundary = st.find_boundary(cloud, asked)
     (begun,) = boundary.sites.posts.values()
-    levels, owners = make_levels(boundary.sites.surface, shape.length)
-    for posts, owner, again, same in zip(*begun(), levels, owners, strict=True):
+    levels, owners, _ = make_levels(boundary.sites.surface, shape.length)
+    for posts, owner, again, same in zip(*begun()[:2], levels, owners, strict=True):
         assert owner.tolist() == same.tolist() and posts.neighbors.tolist() == again.neighbors.tolist()
         assert posts.mean.tobytes() == again.mean.tobytes()
     nodes = lay_rows(boundary, shape.length, Rows())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -91,36 +92,42 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
         curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
 
 
-def smooth_between(curve: np.ndarray, at: np.ndarray, places: np.ndarray, half: int) -> tuple[np.ndarray, np.ndarray]:
-    """Smooth a closed curve by local quadratics (Savitzky-Golay), corners kept exactly.
+def smooth_between(
+    curve: np.ndarray, at: np.ndarray, places: np.ndarray, halves: Sequence[int]
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Smooth a closed curve by local quadratics (Savitzky-Golay) of some half widths [steps], corners kept exactly.
 
     Returns
     -------
-    smoothed : (M, 3)
+    smoothed : (M, 3) for each width
     corner_at : (C,) indices of the corners in it
     """
-    filter_ = _quadratic(half)
     if len(at) == 0:
-        return _filtered(curve[np.arange(-half, len(curve) + half) % len(curve)], filter_), at
+        return [_filtered(curve[np.arange(-half, len(curve) + half) % len(curve)], half) for half in halves], at
     parts, corner_at, size = [], [], 0
     for i in range(len(at)):
         begin, end = at[i], at[(i + 1) % len(at)] + (len(curve) if i + 1 == len(at) else 0)
         middle = curve[np.arange(begin + 1, end) % len(curve)]
         part = np.concatenate([places[i : i + 1], middle, places[(i + 1) % len(at)][None]])
-        part = _drop_backsteps(part)
-        n = len(part)
-        reach = min(half, n - 1)
-        mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
-        smooth = _filtered(mirrored, filter_ if reach == half else _quadratic(reach))
-        smooth[0], smooth[-1] = part[0], part[-1]
+        parts.append(_drop_backsteps(part))
         corner_at.append(size)
-        parts.append(smooth[:-1])
-        size += n - 1
-    return np.concatenate(parts), np.array(corner_at, np.int64)
+        size += len(parts[-1]) - 1
+    smoothed = [np.concatenate([_smooth_inside(part, half)[:-1] for part in parts]) for half in halves]
+    return smoothed, np.array(corner_at, np.int64)
 
 
-def _filtered(places: np.ndarray, filter_: np.ndarray) -> np.ndarray:
-    """Mean of each place and those around it (M, 3), weighted by a symmetric filter (F,): M - F + 1 of them."""
+def _smooth_inside(part: np.ndarray, half: int) -> np.ndarray:
+    """Smooth a part of a curve (M, 3) whose ends stay: it is mirrored at both."""
+    reach = min(half, len(part) - 1)
+    mirrored = np.concatenate([2 * part[0] - part[reach:0:-1], part, 2 * part[-1] - part[-2 : -2 - reach : -1]])
+    smooth = _filtered(mirrored, reach)
+    smooth[0], smooth[-1] = part[0], part[-1]
+    return smooth
+
+
+def _filtered(places: np.ndarray, half: int) -> np.ndarray:
+    """Local quadratics at each place (M, 3) that has `half` others before and behind it."""
+    filter_ = _quadratic(half)
     return np.stack([np.convolve(places[:, c], filter_, "valid") for c in range(3)], axis=1)
 
 

@@ -67,14 +67,14 @@ def curve_of_edge(
     corner_at : (C,) int64, points of it that are corners
     """
     if chance.beyond == 0.0:
-        return smooth_between(curve, *find_corners(curve, settings), round(WINDOW / STEP))
+        (narrow,), corner_at = smooth_between(curve, *find_corners(curve, settings), [round(WINDOW / STEP)])
+        return narrow, corner_at
     beyond, step = chance.beyond, STEP * settings.length
     room = SIDE * room_across(curve, ACROSS * settings.length, step)
     curve = curve + np.minimum(OUT * beyond, room)[:, None] * outward(surface, curve)
     at, places = _corners(curve, chance, settings, surface)
-    narrow, corner_at = smooth_between(curve, at, places, round(WINDOW / STEP))
-    halves = [min(round(wide / STEP), len(curve) // ROUND) for wide in WIDER]
-    wider = [smooth_between(curve, at, places, half)[0] for half in halves]
+    halves = [round(WINDOW / STEP), *(min(round(wide / STEP), len(curve) // ROUND) for wide in WIDER)]
+    (narrow, *wider), corner_at = smooth_between(curve, at, places, halves)
     smoothed, out = narrow, outward(surface, wider[-1])
     room = SIDE * room_across(narrow, ACROSS * settings.length, step)
     for one in wider:

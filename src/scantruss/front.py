@@ -63,7 +63,7 @@ def advance_front(
     else:
         positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
         front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
-    members = line_members(front)
+    members = line_members(front) if boundary.lines.curves else np.zeros((0, 2), np.int64)
     numbers = np.array(
         [
             settings.length,

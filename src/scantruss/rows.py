@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
-from .machine import alongside
+from .machine import alongside, two_at_once
 from .scan.cloud import PointCloud
 from .scan.sites import Sites, prepare_sites
 from .settings import Settings
@@ -23,7 +24,8 @@ APART = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
 FEWEST = 12  # posts of the coarsest level
 LINKS = 12  # links of a post
-PASSES = 3  # of smoothing, on each level
+PASSES = 3  # of smoothing, on each level,
+MANY = 5000  # whose posts are divided where there are so many
 WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
 CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
 DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
@@ -38,13 +40,13 @@ class Rows:
 
 
 STRAIGHT = Rows()
-Levels = tuple[list[Posts], list[np.ndarray]]
+Levels = tuple[list[Posts], list[np.ndarray], list[tuple[np.ndarray, ...]]]
 
 
 def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
     """Return the nodes of rows of a length [scan unit], for a front to come to."""
     length *= rows.scale * (1.0 if boundary.loops else CLOSED)
-    levels, owners = posts_of(boundary.sites, length)
+    levels, owners, shares = posts_of(boundary.sites, length)
     start, direction, node = first_row(boundary, length, rows.turn)
     for owner in owners:
         start = int(owner[start])
@@ -53,12 +55,13 @@ def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
         for k in range(len(levels) - 1, -1, -1):
             if k < len(levels) - 1:
                 kernels.hand_down(levels[k + 1], owners[k + 1], levels[k], length)
-            smooth(levels[k], length, PASSES)
+            for _ in range(PASSES):
+                two_at_once(partial(smooth, levels[k], length), shares[k])
     return _chosen(levels[0], owners[0], length)
 
 
-def _smooth_directions(posts: Posts, _: float, passes: int) -> None:
-    kernels.smooth_directions(posts, passes)
+def _smooth_directions(posts: Posts, _: float, some: np.ndarray) -> None:
+    kernels.smooth_directions(posts, some)
 
 
 def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
@@ -89,13 +92,13 @@ def _begin_posts(sites: Sites, length: float) -> Callable[[], Levels]:
 
 def posts_of(sites: Sites, length: float) -> Levels:
     """Return `make_levels`, made once for all rows of a length [scan unit], with directions and lattices of one's own."""
-    levels, owners = _begin_posts(sites, length)()
+    levels, owners, shares = _begin_posts(sites, length)()
     own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in levels]
-    return own, owners
+    return own, owners, shares
 
 
 def make_levels(surface: Surface, length: float) -> Levels:
-    """Return posts from fine to coarse, and for each level the post of each place of the level below (sites at first)."""
+    """Return posts from fine to coarse, for each level the post of each place of the level below (sites at first), and its shares."""
     mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
     levels: list[Posts] = []
     owners: list[np.ndarray] = []
@@ -104,7 +107,7 @@ def make_levels(surface: Surface, length: float) -> Levels:
         owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
         count = kernels.choose_posts(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
         if levels and (count < FEWEST or count > 0.8 * len(mean)):
-            return levels, owners
+            return levels, owners, [_shares(posts) for posts in levels]
         posts = Posts(
             np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS), -1, np.int64),
             np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
@@ -114,6 +117,22 @@ def make_levels(surface: Surface, length: float) -> Levels:
         owners.append(owner)
         mean, normals, neighbors = posts.mean, posts.normals, posts.neighbors
         radius *= COARSER
+
+
+def _shares(posts: Posts) -> tuple[np.ndarray, ...]:
+    """Posts that two threads may smooth at once, and those between, which depend on both; few posts are not divided."""
+    count = len(posts.mean)
+    if count < MANY:
+        return (np.arange(count),)
+    away, queue = np.empty((2, count), np.int64), np.empty(count, np.int64)
+    end = kernels.links_away(posts.neighbors, 0, away[0], queue)  # of the links, not of where the scan lies
+    kernels.links_away(posts.neighbors, kernels.links_away(posts.neighbors, end, away[0], queue), away[1], queue)
+    ahead = away[0] - away[1]
+    late = ahead > np.median(ahead)
+    across = (posts.neighbors >= 0) & (late[posts.neighbors] != late[:, None])
+    between = across.any(axis=1)
+    between[posts.neighbors[across]] = True
+    return np.flatnonzero(~late & ~between), np.flatnonzero(late & ~between), np.flatnonzero(between)
 
 
 def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:

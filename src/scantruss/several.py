@@ -7,10 +7,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import FrontError
 from .front import advance_front
+from .grid.cover import begin_places
 from .grid.equalize import energy_of_node, equalize
 from .grid.fixed import check_positions, hold_nodes
 from .grid.on_lines import with_rim_members
@@ -103,6 +104,7 @@ def several_grids(
 
         return _passed(faults, number, work)
 
+    begin_places(boundary.sites, settings.length)  # for the certificate
     fronts = _side_by_side(
         advance, {number: (number,) for number in range(len(ways))}, _part(progress, "front", 0.0, 1.0)
     )
@@ -112,7 +114,7 @@ def several_grids(
     reliefs = _side_by_side(
         improve, {n: (front,) for n, front in fronts.items()}, _part(progress, "optimize", 0.0, 0.5)
     )
-    order = sorted(reliefs, key=lambda number: energy_of_node(reliefs[number]))
+    order = _in_order(reliefs, lambda number: energy_of_node(reliefs[number]))
     if order and settings.effort == "best":  # the first once more as normal ends it: on thin parts annealing may lose
         reliefs[order[0] + len(ways)] = improve(fronts[order[0]])
         order.insert(finalists - 1, order[0] + len(ways))
@@ -124,8 +126,14 @@ def several_grids(
             break
     if not grids:
         raise faults[order[0] if order else 0]
-    best = min(grids, key=lambda number: (grids[number].quality.shape_min < POOR, energy_of_node(reliefs[number])))
+    best = _in_order(grids, lambda number: (grids[number].quality.shape_min < POOR, energy_of_node(reliefs[number])))[0]
     return fronts[best % len(ways)], grids[best], advanced
+
+
+def _in_order(numbers: Iterable[int], key: Callable[[int], Any]) -> list[int]:
+    """Return the numbers in the order of their keys, which take time: that of a lone one is not asked for."""
+    listed = list(numbers)
+    return sorted(listed, key=key) if len(listed) > 1 else listed
 
 
 def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:

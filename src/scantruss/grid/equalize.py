@@ -14,12 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.equalize import STRIDE, settle_all
-from ..kernels.flips import flip_by_angle
+from ..kernels.equalize import STRIDE, settle_some
+from ..kernels.grid import Net
+from ..kernels.halves import BETWEEN
 from ..kernels.search import search, suit_nodes
-from ..kernels.trial import Scratch, total_energy
-from .flips import FOLD, ROUNDS
+from ..kernels.trial import OUT, TRIED, Scratch, total_energy
+from ..machine import two_at_once
+from .flips import flip_by_angle
 from .grid import Grid
+from .halves import Halves
 from .quality import shape_qualities
 from .relief import NEAR, Relief
 
@@ -30,15 +33,23 @@ LAST_STRIDE = 1.75  # and their steps: what is uneven in the large goes slowly (
 PRICE = 24.0  # of a mean length that is not the desired one
 SHARE = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
+MANY = 2500  # nodes from which on halves settle side by side (of fewer, threads would wait for each other as long as they gain),
+AT_ONCE = 2  # so many sweeps until those between follow
+ASKING = 200  # nodes asking for a move from which on halves of the grid are searched side by side
 FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
 def new_scratch(relief: Relief) -> Scratch:
     """Return room for the trials of the search, with the numbers of neighbours that suit the nodes."""
-    capacity, width = relief.net.ring.shape
     suit_nodes(relief.net)
+    return blank_scratch(relief)
+
+
+def blank_scratch(relief: Relief) -> Scratch:
+    """Return room for the trials of the search."""
+    capacity, width = relief.net.ring.shape
     return Scratch(
-        note=np.zeros((capacity, 2), np.int64),
+        note=np.zeros((capacity, 3), np.int64),
         around=np.zeros(capacity, np.int64),
         nodes=np.zeros((capacity, 4)),
         ring=np.zeros((capacity, width + 2), np.int64),
@@ -46,10 +57,41 @@ def new_scratch(relief: Relief) -> Scratch:
     )
 
 
-def settle(relief: Relief, weight: float, enough: float, sweeps: int, stride: float = STRIDE) -> int:
-    """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made."""
-    awake = np.ones(len(relief.net.degree), np.int64)
-    return settle_all(relief.net, relief.patches, relief.rim, awake, relief.length, weight, enough, sweeps, stride)
+def shares_of(net: Net) -> list[np.ndarray]:
+    """Return the nodes of a net to settle: those of both halves, which may move at once, and those between; all of a small one."""
+    live = net.degree > 0
+    every = np.flatnonzero(live)
+    if len(every) < MANY:
+        return [every]
+    label = Halves(net, live).label[every]
+    return [every[label == part] for part in (0, 1, BETWEEN)]
+
+
+def settle(
+    relief: Relief,
+    weight: float,
+    enough: float,
+    sweeps: int,
+    stride: float = STRIDE,
+    shares: list[np.ndarray] | None = None,
+) -> int:
+    """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made.
+
+    Halves of the net, or the `shares` that it has had since its members last changed, move side by side, a few sweeps at once.
+    """
+    shares = shares_of(relief.net) if shares is None else shares
+    awake, count = np.ones(len(relief.net.degree), np.int64), sum(map(len, shares))
+    at_once = sweeps if len(shares) == 1 else AT_ONCE
+
+    def move(some: np.ndarray) -> tuple[float, int]:
+        of_grid = relief.net, relief.patches, relief.rim, awake, some, relief.length
+        return settle_some(*of_grid, weight, enough, at_once, stride)
+
+    for made in range(0, sweeps, at_once):
+        gains, done = zip(*two_at_once(move, shares), strict=True)
+        if sum(gains) < enough * count:
+            return made + max(done)
+    return sweeps
 
 
 def settle_again(relief: Relief) -> None:
@@ -59,11 +101,34 @@ def settle_again(relief: Relief) -> None:
 
 
 def search_once(relief: Relief, scratch: Scratch) -> int:
-    """Try flips, collapses and splits where nodes ask for them; returns how many were kept."""
+    """Try flips, collapses and splits where nodes ask for them; returns how many were kept.
+
+    Where many ask, those of two halves of the grid are tried side by side, then those between.
+    """
+    net, kept = relief.net, 0
+    asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.note[:, TRIED] == 0)
+    if asking.sum() >= ASKING:
+        kept = _search_halves(relief, Halves(net, asking), scratch)
     terms = terms_of(relief, scratch)
-    return search(
-        relief.net, relief.patches, relief.rim, scratch, relief.length, WEIGHT, terms.strain, PRICE, terms.share
-    )
+    return kept + _search(relief, net, scratch, terms)
+
+
+def _search_halves(relief: Relief, halves: Halves, scratch: Scratch) -> int:
+    """Search in both halves at once, each with half of the nodes that bring the mean length to the desired one."""
+    terms = terms_of(relief, scratch)
+    terms = terms._replace(nodes=terms.nodes // 2)
+    own = [blank_scratch(relief), blank_scratch(relief)]
+    for side in (0, 1):
+        own[side].note[:, OUT] = halves.label != side
+    halves.run(lambda side: _search(relief, halves.nets[side], own[side], terms))
+    for side in (0, 1):
+        scratch.note[halves.label == side, TRIED] = own[side].note[halves.label == side, TRIED]
+    return sum(int(room.counter[2]) for room in own)
+
+
+def _search(relief: Relief, net: Net, scratch: Scratch, terms: Terms) -> int:
+    of_grid = relief.patches, relief.rim, scratch, relief.length
+    return search(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes)
 
 
 class Terms(NamedTuple):
@@ -96,7 +161,7 @@ def energy_of_node(relief: Relief) -> float:
 
 def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle, and search while it pays: the default way to improve a grid."""
-    flip_by_angle(relief.net, FOLD, ROUNDS)
+    flip_by_angle(relief.net)
     settle(relief, WEIGHT, 1e-3, 60)
     scratch = new_scratch(relief)
     for done in range(SEARCHES):
@@ -109,7 +174,8 @@ def equalize(relief: Relief, progress: Callable[[float], None] | None = None) ->
 
 def finish(relief: Relief, prefer: str = "balance") -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
+    shares = shares_of(relief.net)
     for sweeps in LAST_SWEEPS:
         relief.renew(NEAR)
-        settle(relief, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE)
+        settle(relief, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE, shares)
     relief.return_to_scan(NEAR)

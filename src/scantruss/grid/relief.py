@@ -200,7 +200,13 @@ class Relief:
 
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
-        return self.surface if part == 0 else with_own_scratch(self.surface)
+        if part not in self._scans:
+            self._scans[part] = self.surface if part == 0 else with_own_scratch(self.surface)
+        return self._scans[part]
+
+    @cached_property
+    def _scans(self) -> dict[int, Surface]:
+        return {}
 
     def renew(self, near: float) -> None:
         """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; renew the lengths desired there."""

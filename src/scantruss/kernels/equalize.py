@@ -121,25 +121,27 @@ def settle_node(
 
 
 @kernel
-def settle_all(
+def settle_some(
     net: Net,
     patches: np.ndarray,
     rim: Rim,
     awake: np.ndarray,
+    some: np.ndarray,
     length: float,
     weight: float,
     enough: float,
     sweeps: int,
     stride: float,
-) -> int:
-    """Settle all nodes again and again until a sweep gains less than `enough` a node; returns the sweeps made.
+) -> tuple[float, int]:
+    """Settle some nodes (K,) again and again until a sweep gains less than `enough` a node; returns the last gain and the sweeps.
 
     `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.
     """
-    used = net.free[-1]
+    gain = 0.0
     for sweep in range(sweeps):
         gain = 0.0
-        for v in range(used):
+        for k in range(len(some)):
+            v = some[k]
             if awake[v] == 1:
                 awake[v] = 0
                 gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length, stride)
@@ -148,6 +150,6 @@ def settle_all(
                     awake[v] = 1
                     for i in range(net.state[v, DEGREE]):
                         awake[net.ring[v, i]] = 1
-        if gain < enough * used:
-            return sweep + 1
-    return sweeps
+        if gain < enough * len(some):
+            return gain, sweep + 1
+    return gain, sweeps

@@ -11,7 +11,7 @@ from .vectors import Vector, along, dot, fill_row, norm, row, subtract
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
-ALIKE = 0.9  # patches of radii nearer to each other are as good as one
+ALIKE = 0.85  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
 TERMS = 6.0  # of a quadric: so many points it passes through
 FEW = 24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much

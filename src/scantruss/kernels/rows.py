@@ -96,6 +96,29 @@ def link_posts(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, own
 
 
 @kernel
+def links_away(neighbors: np.ndarray, start: int, away: np.ndarray, queue: np.ndarray) -> int:
+    """Fill in how many links each place is away from one (P,), -1 where none lead there; returns the last one reached.
+
+    queue : (P,) int64 scratch
+    """
+    away[:] = -1
+    queue[0], away[start] = start, 0
+    last, at = 1, 0
+    while at < last:
+        here = queue[at]
+        at += 1
+        for k in range(neighbors.shape[1]):
+            n = neighbors[here, k]
+            if n < 0:
+                break
+            if away[n] < 0:
+                away[n] = away[here] + 1
+                queue[last] = n
+                last += 1
+    return queue[last - 1]
+
+
+@kernel
 def sixth(direction: Vector, normal: Vector) -> Vector:
     """A direction turned by 60 degrees about a normal."""
     a = cross(normal, direction)
@@ -135,33 +158,33 @@ def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
 
 
 @kernel
-def smooth_directions(posts: Posts, passes: int) -> None:
-    """Turn every direction to the mean of those beside."""
-    for _ in range(passes):
-        for p in range(len(posts.mean)):
-            normal = row(posts.normals, p)
-            total = row(posts.direction, p)
-            weight = 0.0
-            for k in range(posts.neighbors.shape[1]):
-                q = posts.neighbors[p, k]
-                if q < 0:
-                    break
-                other = row(posts.normals, q)
-                # the pair of turns that agree best
-                b = row(posts.direction, q)
+def smooth_directions(posts: Posts, some: np.ndarray) -> None:
+    """Turn the direction of some posts (K,) to the mean of those beside."""
+    for i in range(len(some)):
+        p = some[i]
+        normal = row(posts.normals, p)
+        total = row(posts.direction, p)
+        weight = 0.0
+        for k in range(posts.neighbors.shape[1]):
+            q = posts.neighbors[p, k]
+            if q < 0:
+                break
+            other = row(posts.normals, q)
+            # the pair of turns that agree best
+            b = row(posts.direction, q)
+            a = nearest_turn(total, b, normal)
+            most, left, right = dot(a, b), a, b
+            for _turn in range(2):
+                b = sixth(b, other)
                 a = nearest_turn(total, b, normal)
-                most, left, right = dot(a, b), a, b
-                for _turn in range(2):
-                    b = sixth(b, other)
-                    a = nearest_turn(total, b, normal)
-                    if dot(a, b) > most:
-                        most, left, right = dot(a, b), a, b
-                total = flat(
-                    (weight * left[0] + right[0], weight * left[1] + right[1], weight * left[2] + right[2]), normal
-                )
-                weight += 1.0
-            for c in range(3):
-                posts.direction[p, c] = total[c]
+                if dot(a, b) > most:
+                    most, left, right = dot(a, b), a, b
+            total = flat(
+                (weight * left[0] + right[0], weight * left[1] + right[1], weight * left[2] + right[2]), normal
+            )
+            weight += 1.0
+        for c in range(3):
+            posts.direction[p, c] = total[c]
 
 
 @kernel
@@ -224,29 +247,29 @@ def agree(posts: Posts, p: int, q: int, node: Vector, length: float) -> tuple[Ve
 
 
 @kernel
-def smooth_lattice(posts: Posts, length: float, passes: int) -> None:
-    """Move the lattice of every post to the mean of those beside."""
-    for _ in range(passes):
-        for p in range(len(posts.mean)):
-            mean, normal = row(posts.mean, p), row(posts.normals, p)
-            total = row(posts.node, p)
-            weight = 0.0
-            for k in range(posts.neighbors.shape[1]):
-                q = posts.neighbors[p, k]
-                if q < 0:
-                    break
-                a, b = agree(posts, p, q, total, length)
-                share = 1.0 / (weight + 1.0)
-                total = (
-                    (weight * a[0] + b[0]) * share,
-                    (weight * a[1] + b[1]) * share,
-                    (weight * a[2] + b[2]) * share,
-                )
-                total = along(total, -dot(subtract(total, mean), normal), normal)
-                weight += 1.0
-            total = nearest_node(total, row(posts.direction, p), normal, mean, length)
-            for c in range(3):
-                posts.node[p, c] = total[c]
+def smooth_lattice(posts: Posts, length: float, some: np.ndarray) -> None:
+    """Move the lattice of some posts (K,) to the mean of those beside."""
+    for i in range(len(some)):
+        p = some[i]
+        mean, normal = row(posts.mean, p), row(posts.normals, p)
+        total = row(posts.node, p)
+        weight = 0.0
+        for k in range(posts.neighbors.shape[1]):
+            q = posts.neighbors[p, k]
+            if q < 0:
+                break
+            a, b = agree(posts, p, q, total, length)
+            share = 1.0 / (weight + 1.0)
+            total = (
+                (weight * a[0] + b[0]) * share,
+                (weight * a[1] + b[1]) * share,
+                (weight * a[2] + b[2]) * share,
+            )
+            total = along(total, -dot(subtract(total, mean), normal), normal)
+            weight += 1.0
+        total = nearest_node(total, row(posts.direction, p), normal, mean, length)
+        for c in range(3):
+            posts.node[p, c] = total[c]
 
 
 @kernel

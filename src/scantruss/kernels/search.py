@@ -28,7 +28,7 @@ from .grid import (
 )
 from .lines import arc_on_line, halfway
 from .rim import Rim, at_arc
-from .trial import MARK, TRIED, Scratch, gather, local_energy, put_back
+from .trial import MARK, OUT, TRIED, Scratch, gather, local_energy, may_change, put_back
 from .vectors import cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
@@ -239,17 +239,19 @@ def search(
     strain: float,
     price: float,
     share: float,
+    count: int,
 ) -> int:
     """One round over all nodes that ask for a move; returns how many moves were kept.
 
     Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`
-    is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added. The `share` of energy that any node has
-    does not count, or nodes would be taken away for being nodes.
+    is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added; V is `count`, the nodes within bounds. The
+    `share` of energy that any node has does not count, or nodes would be taken away for being nodes.
     """
     kept, free = scratch.counter[2], net.free[-2]
-    count = max(len(net.arc) - free, 1)
     for v in range(net.free[-1]):
-        i = 0
+        i, left = 0, scratch.note[v, OUT] == 1
+        if left:
+            continue
         while i < 4 * net.state[v, DEGREE] and scratch.counter[2] - kept < count:
             u, way = net.ring[v, i // 4], i % 4  # flip, draw u into v, draw v into u, split
             if i == 0 and scratch.note[v, TRIED] == 1:
@@ -274,10 +276,15 @@ def search(
             size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
             if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
                 continue
+            if not may_change(net, scratch, a, b):
+                left = True  # for those who may
+                continue
             half = 0.5 if move == SPLIT else -0.5
             worth = share + price * (strain - 0.5 * (free - net.free[-2] + half) / count)
             if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
                 i = 0
+        if left:
+            scratch.note[v, TRIED] = 0
     return scratch.counter[2] - kept
 
 

@@ -12,13 +12,13 @@ from .equalize import ROOT
 from .grid import DEGREE, LINE, OPEN, Net, target_length, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
 
-MARK, TRIED = 0, 1  # columns of `Scratch.note`
+MARK, TRIED, OUT = 0, 1, 2  # columns of `Scratch.note`
 
 
 class Scratch(NamedTuple):
     """Room for one trial: what is around, and how it was before."""
 
-    note: np.ndarray  #: (C, 2) int64 trial that holds the node; 1 where nothing has changed since it was tried
+    note: np.ndarray  #: (C, 3) int64 trial that holds the node; 1 where nothing has changed since it was tried; 1 where it must not change
     around: np.ndarray  #: (C,) int64 nodes that may move
     nodes: np.ndarray  #: (C, 4) their places and arcs before
     ring: np.ndarray  #: (C, W + 2) int64 their rings before; last but one the lines, last the number of neighbours
@@ -57,6 +57,20 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
         for j in range(net.state[v, DEGREE]):
             scratch.ring[i, j] = net.ring[v, j]
     scratch.counter[1] = count
+
+
+@kernel
+def may_change(net: Net, scratch: Scratch, a: int, b: int) -> bool:
+    """Whether all that a trial at the edge a-b may change is within bounds."""
+    right, left = wings(net, a, b)
+    for v in (a, b, right, left):
+        if v >= 0:
+            if scratch.note[v, OUT] == 1:
+                return False
+            for i in range(net.state[v, DEGREE]):
+                if scratch.note[net.ring[v, i], OUT] == 1:
+                    return False
+    return True
 
 
 @kernel
