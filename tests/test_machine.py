@@ -1,8 +1,10 @@
 """Work in parts: all of it is done once, side by side, and what goes wrong comes out."""
 
+import gc
 import subprocess
 import sys
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -103,6 +105,25 @@ def test_parts_run_side_by_side(monkeypatch):
     monkeypatch.setattr(machine, "processors", lambda: 3)
     all_there = threading.Barrier(3, timeout=20)
     machine.in_parts(30, 10, lambda *_: all_there.wait())  # passes only when three wait at once
+
+
+@pytest.mark.parametrize("processors", [1, 2])
+def test_what_keeps_a_result_goes_with_its_last_name(monkeypatch, processors):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+
+    class Sites:
+        points = range(10)
+
+    sites = Sites()
+    sites.count = machine.alongside(lambda sites=sites: len(sites.points))
+    assert sites.count() == 10
+    last = weakref.ref(sites)
+    gc.disable()  # a cycle would stay, and all the memory with it, until Python comes to look for some
+    try:
+        del sites
+        assert last() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("processors", [1, 4])

@@ -1,5 +1,6 @@
 """Sites: the scan at the scale of a member, with oriented normals and links that stay on one sheet."""
 
+import gc
 from functools import cache
 
 import naive
@@ -10,13 +11,30 @@ from hypothesis import strategies as st
 from shapes import make
 from small_clouds import ball, cap, sheet, sites_of, tire, turn_of
 
-from scantruss import InputError, PointCloud, Settings, find_boundary
+from scantruss import InputError, PointCloud, Settings, find_boundary, grid_from_points
 from scantruss.kernels.boxes import new_boxes
 from scantruss.kernels.normals import cut_steep_links, link_weights, orient_normals, site_normals, smooth_normals
 from scantruss.kernels.sites import choose_sites, group_points, nearest_sites, put_all, settle_points
 from scantruss.scan import linked as module
 from scantruss.scan.cloud import bounds_of
 from scantruss.scan.sites import prepare_sites
+
+
+@pytest.mark.parametrize("effort", ["quick", "normal"])
+def test_a_run_leaves_no_memory_to_be_collected(effort):
+    points, chosen = make("cloth", 4000).points, Settings(length=25.0, effort=effort)
+    grid_from_points(points, chosen)  # loading kernels leaves some
+    gc.collect()
+    gc.disable()
+    try:
+        grid_from_points(points, chosen)
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        gc.collect()
+        assert not [type(left) for left in gc.garbage if type(left).__module__.startswith("scantruss")]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
 
 
 def thinned(points, radius, capacity=None):

@@ -83,23 +83,26 @@ def two_at_once(work: Callable[[Share], Result], shares: Sequence[Share]) -> lis
 def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
     """Begin some work on another processor, if one is free; return what waits for its result, or does it where nobody has begun.
 
-    The result must not depend on when it is done; it is kept.
+    The result must not depend on when it is done; it is kept. The work is let go once it begins: what keeps the result may be what
+    the work looks at.
     """
-    if processors() < 2:
-        return cache(work)
-    takers: dict[int, object] = {}
+    waiting = [work]
     found: list[tuple[Result | None, BaseException | None]] = []
     ended = Lock()
     ended.acquire()
 
     def do() -> None:
-        for _ in _taken(takers, 1, object()):
-            try:
-                found.append((work(), None))
-            except BaseException as error:
-                found.append((None, error))
-            finally:
-                ended.release()
+        try:
+            begun = waiting.pop()
+        except IndexError:  # somebody has
+            return
+        try:
+            found.append((begun(), None))
+        except BaseException as error:
+            found.append((None, error))
+        finally:
+            del begun  # before anybody goes on
+            ended.release()
 
     def result() -> Result:
         do()
@@ -109,7 +112,8 @@ def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
             raise error
         return cast(Result, value)
 
-    _pool(processors() - 1).put(do)
+    if processors() > 1:
+        _pool(processors() - 1).put(do)
     return result
 
 
