@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import llvmlite.binding
 import numba
 import numpy as np
 import pytest
@@ -17,6 +19,10 @@ from rough import compiled_only
 
 from scantruss.kernels import compile as compiling
 from scantruss.kernels import linking
+
+handed_over = pytest.mark.skipif(
+    not linking.HANDS_OVER or bool(numba.config.DISABLE_JIT), reason="every kernel compiles by itself"
+)
 
 KERNELS = Path(compiling.__file__).parent
 
@@ -166,6 +172,60 @@ def test_a_fresh_process_keeps_its_machine_code_and_finds_it_again(tmp_path):
     assert again == files and [path.stat().st_mtime_ns for path in again] == stamps  # nothing was compiled again
 
 
+STORED = """
+import scantruss.kernels.vectors as v
+from scantruss.kernels import compile as c
+
+assert v.norm((3.0, 4.0, 0.0)) == 5.0  # found, not compiled
+
+@c.kernel
+def twice(a: float) -> float:
+    return v.norm((a, 0.0, 0.0)) + v.norm((0.0, a, 0.0))
+
+assert twice(2.0) == 4.0
+stats = v.norm.alone.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+
+@handed_over
+def test_a_kernel_that_is_found_again_still_becomes_a_part_though_only_machine_code_is_stored(tmp_path):
+    folder = run(NUMBA_CACHE_DIR=str(tmp_path))[0]
+    (file,) = Path(folder).rglob("vectors.norm-*.nbc")
+    (_, kind, (code, names)), *_ = pickle.loads(file.read_bytes())
+    assert kind == "object" and code and len(names) < 3000
+    module = str(llvmlite.binding.parse_bitcode(names))
+    assert module.count("define") == 2 and "norm" in module
+    again = tmp_path / "again.py"  # numba reads the file of a kernel
+    again.write_text(STORED)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, str(again)], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["1", "0"]
+
+
+BLAS = """
+import sys
+from scantruss import kernels
+kernels.of_command = {of_command}
+import scantruss.kernels.vectors as v
+assert v.norm((3.0, 4.0, 0.0)) == 5.0
+print("scipy.linalg" in sys.modules)
+import scipy.linalg.cython_blas
+"""
+
+
+@compiled_only
+@pytest.mark.parametrize("of_command", [True, False])
+def test_a_command_does_not_wait_for_products_of_matrices_and_other_processes_keep_them(of_command):
+    pytest.importorskip("scipy")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", BLAS.format(of_command=of_command)], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [str(not of_command)]
+
+
 def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path):
     """The home of the cache and the temporary folder are files: no folder can be made in them, not even by root."""
     file = tmp_path / "file"
@@ -208,7 +268,7 @@ def test_a_kernel_divides_by_zero_as_numpy_does():
     assert add_shares(np.array([1.0, 2.0]), 0.0) == np.inf and np.isnan(add_shares(np.array([0.0, 2.0]), 0.0))
 
 
-@pytest.mark.skipif(not linking.HANDS_OVER or bool(numba.config.DISABLE_JIT), reason="every kernel compiles by itself")
+@handed_over
 def test_a_part_of_a_kernel_is_no_machine_code_of_its_own():
     @compiling.kernel
     def part(x: float) -> float:

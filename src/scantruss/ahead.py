@@ -17,6 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from . import kernels
 from .machine import processors
 
 if TYPE_CHECKING:
@@ -176,6 +177,7 @@ def compile_last() -> None:
 def main(method: str) -> None:
     """Compile for a method, but no longer than the process lives that has started this one."""
     gc.disable()
+    kernels.of_command = True
     threading.Thread(target=_leave_at_end_of_input, daemon=True).start()
     from .settings import Settings
 

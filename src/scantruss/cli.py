@@ -6,13 +6,14 @@ A refusal is one line on stderr and an exit status of `HELP`; nothing is written
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
 from collections.abc import Sequence
 from types import FrameType
 
-from . import __version__
+from . import __version__, kernels
 from .errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
 
 HELP = f"""\
@@ -44,6 +45,8 @@ Exit status; one line says why it is not 0:
   143  stopped (SIGTERM)
 """
 
+RARELY = 50_000  # objects more until Python looks for some that nobody has
+
 
 def run(words: Sequence[str]) -> None:
     """Run one command."""
@@ -73,8 +76,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Words after the name of the program; `sys.argv` by default.
     """
-    kept = signal.getsignal(signal.SIGTERM)
+    kernels.of_command = True
+    kept, often = signal.getsignal(signal.SIGTERM), gc.get_threshold()
     try:
+        gc.set_threshold(
+            RARELY
+        )  # importing makes much that stays, and looking through it takes a tenth of a short command
         try_signal(signal.SIGTERM, _stop)
         run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
@@ -102,6 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(f"a fault of ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
     finally:
         try_signal(signal.SIGTERM, kept)
+        gc.set_threshold(*often)
     return 0
 
 

@@ -14,11 +14,13 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import event
 
+from . import of_command
 from .linking import compiled
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -60,15 +62,27 @@ def _folder() -> Path | None:
     return None
 
 
+def _without_blas() -> None:
+    """Let numba get ready without scipy.linalg: products of matrices need it, which no kernel has, and it takes a tenth of a command."""
+    if (name := "scipy.linalg.cython_blas") not in sys.modules:
+        sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
+        try:
+            import numba.np.arraymath  # noqa: F401
+        finally:
+            del sys.modules[name]
+
+
 FOLDER = _folder()
+if of_command:
+    _without_blas()
 
 
 def is_compiled(*kernels: Callable[..., object]) -> bool:
     """Whether machine code of these kernels is on disk already (False: their next call compiles)."""
     if numba.config.DISABLE_JIT:
         return True
-    names = (f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}-*.nbc" for kernel in kernels)
-    return FOLDER is not None and all(any(FOLDER.rglob(name)) for name in names)
+    stored = {path.name.partition("-")[0] for path in FOLDER.rglob("*.nbc")} if FOLDER else set()
+    return all(f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}" in stored for kernel in kernels)
 
 
 @contextmanager
@@ -103,11 +117,4 @@ def kernel(function: F) -> F:
     callable
         The compiled function; the plain one where NUMBA_DISABLE_JIT is set.
     """
-    kept = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(FOLDER or "")
-    try:
-        return cast(F, compiled(function, cache=FOLDER is not None))
-    except RuntimeError:  # numba: "cannot cache function"
-        return cast(F, compiled(function, cache=False))
-    finally:
-        numba.config.CACHE_DIR = kept
+    return cast(F, compiled(function, FOLDER))

@@ -6,13 +6,18 @@ every caller: the time grows with the depth of the calls. Here a kernel that ano
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import numba
 
 try:
+    import llvmlite.binding
     from numba.core import compiler, dispatcher, sigutils
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache
     from numba.core.codegen import JITCodeLibrary
     from numba.core.cpu import CPUTargetOptions
     from numba.core.event import trigger_event
@@ -29,11 +34,13 @@ try:
             (dispatcher, "_FunctionCompiler"),
             (CPUTargetOptions, "_nrt"),
             (CPUTargetOptions, "no_cfunc_wrapper"),
+            (FunctionCache, "_impl_class"),
+            (CompileResultCacheImpl, "reduce"),
         )
     )
 except ImportError:  # another numba: every kernel is compiled by itself, which only takes longer
     HANDS_OVER = False
-    JITCodeLibrary = CPUDispatcher = Options = object
+    JITCodeLibrary = CPUDispatcher = Options = CompileResultCacheImpl = FunctionCache = object
 
 ALLOCATES = {"empty", "zeros", "ones", "full", "copy"}  # names of what makes an array in a kernel
 
@@ -64,14 +71,50 @@ class Part(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
 
 
+class Machine(CompileResultCacheImpl):  # type: ignore[misc]
+    """What is stored of a kernel: its machine code, and names instead of all that numba would need to build it into another.
+
+    A part is compiled for that, so nobody asks; reading it was a third of the time to find a kernel again.
+    """
+
+    def reduce(self, result: Any) -> Any:
+        """Return what is written to the file of a kernel."""
+        (name, kind, content), *rest = super().reduce(result)
+        if kind == "object":
+            names = result.fndesc.llvm_func_name, result.fndesc.llvm_cpython_wrapper_name
+            empty = "\n".join(f'define void @"{name}"() {{ ret void }}' for name in names)
+            content = content[0], llvmlite.binding.parse_assembly(empty).as_bitcode()
+        return (name, kind, content), *rest
+
+
+class Store(FunctionCache):  # type: ignore[misc]
+    """Where the machine code of a kernel is looked for and kept."""
+
+    _impl_class = Machine
+
+
 class Kernel(CPUDispatcher):  # type: ignore[misc]
     """A kernel for both: Python gets its machine code (`alone`), a kernel that calls it a part."""
 
-    alone: Callable[..., Any]
+    folder: Path | None = None  #: where machine code is kept
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the machine code; compiled on the first call."""
         return self.alone(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        """Make what Python calls when it first does: of most kernels it never does."""
+        if name != "alone":
+            raise AttributeError(name)
+        with MAKING:
+            if name not in vars(self):
+                alone = numba.jit(**self.targetoptions)(self.py_func)
+                alone._compiler._customize_flags = Flags
+                if self.folder is not None:
+                    with stored_in(self.folder):
+                        alone._cache = Store(self.py_func)
+                self.alone = alone
+        return self.alone
 
     def compile(self, sig: Any) -> Any:
         """Make the part for a kernel that calls this one with arguments of these types."""
@@ -91,19 +134,36 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return self.overloads[arguments].entry_point
 
 
-def compiled(function: Callable[..., Any], *, cache: bool) -> Callable[..., Any]:
+MAKING = RLock()  # numba asks one name for the folder, and a kernel is made once
+
+
+@contextmanager
+def stored_in(folder: Path) -> Iterator[None]:
+    """Say to numba where it keeps machine code, while a block asks it to, which is left where numba cannot."""
+    with MAKING, suppress(RuntimeError):  # "cannot cache function"
+        kept, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+        try:
+            yield
+        finally:
+            numba.config.CACHE_DIR = kept
+
+
+def compiled(function: Callable[..., Any], folder: Path | None) -> Callable[..., Any]:
     """Return what `numba.njit` makes of a function, releasing the GIL; a `Kernel` where this numba lets us.
 
     It divides by zero as numpy does: a branch to an exception at every division costs a tenth of the time to compile.
     """
     options: dict[str, object] = {"nogil": True, "error_model": "numpy"}
+    if numba.config.DISABLE_JIT:
+        return function
     if HANDS_OVER:  # without arrays of its own a kernel need not count who uses its arguments
         allocates = not ALLOCATES.isdisjoint(function.__code__.co_names)
-        options |= {"no_cfunc_wrapper": True, "_nrt": allocates}
-    alone = numba.njit(cache=cache, **options)(function)
-    if not HANDS_OVER or not isinstance(alone, CPUDispatcher):  # plain where NUMBA_DISABLE_JIT is set
-        return alone
-    alone._compiler._customize_flags = Flags
-    kernel = Kernel(function, targetoptions=alone.targetoptions)
-    kernel.alone = alone
-    return kernel
+        options |= {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, "_nrt": allocates}
+        kernel = Kernel(function, targetoptions=options)
+        kernel.folder = folder
+        return kernel
+    alone = numba.njit(**options)(function)
+    if folder is not None:
+        with stored_in(folder):
+            alone.enable_caching()
+    return alone
