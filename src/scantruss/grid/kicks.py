@@ -17,6 +17,7 @@ KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (40, 0.2)}  # rounds of 
 MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
 HALVINGS, FEW = 2, 12  # times that it does so, as long as so many nodes wait
 HOT = 0.8  # part of the rounds in which they may cost anything
+DARING = 5.0  # of what they may cost, how much more than usual is left to hope while it is hot
 
 
 def new_area(relief: Relief, number: int = 0) -> Area:
@@ -50,8 +51,9 @@ def search_widely(relief: Relief, effort: str, progress: Callable[[float], None]
             if progress:
                 progress(0.6 + 0.2 * done / rounds)
             cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
+            hope = HOPE + DARING * cooled if heat else HOPELESS
             waiting = np.ones(len(relief.net.arc), np.bool_)
-            kick(relief, relief.net, room, waiting, terms_of(relief, room[0]), cooled, HOPELESS)
+            kick(relief, relief.net, room, waiting, terms_of(relief, room[0]), cooled, hope)
             relief.renew(FAR)
     settle_again(relief)
 
