@@ -16,6 +16,13 @@ from scantruss.commands.shared import STAGES, note_compiling
 from scantruss.kernels import compile as compiling
 from scantruss.report.terminal import Bars
 
+
+@pytest.fixture(autouse=True)
+def nothing_installed(monkeypatch):
+    """No machine code comes with the package."""
+    monkeypatch.setattr(compiling, "INSTALLED", None)
+
+
 needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
 

@@ -75,6 +75,22 @@ def test_another_numba_has_a_folder_of_its_own(monkeypatch):
     assert compiling._contents() != plain
 
 
+@pytest.mark.parametrize("setting", ["CPU_NAME", "CPU_FEATURES"])
+def test_another_processor_has_a_folder_of_its_own(setting, monkeypatch):
+    monkeypatch.setattr(numba.config, setting, None)
+    plain = compiling._contents()
+    monkeypatch.setattr(numba.config, setting, "another")
+    assert compiling._contents() != plain
+
+
+def test_a_processor_that_llvm_does_not_know_is_no_error(monkeypatch):
+    def unknown():
+        raise RuntimeError("target not available")
+
+    monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", unknown)
+    assert compiling._contents()
+
+
 @pytest.mark.parametrize("name", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
 def test_the_folder_is_where_the_environment_says(name, tmp_path, no_home, monkeypatch):
     monkeypatch.setenv(name, str(tmp_path / "cache"))
@@ -155,6 +171,7 @@ def run(**environment):
     """Run CODE in another process; return the words it prints."""
     kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     kept.pop("NUMBA_DISABLE_JIT", None)
+    kept["SCANTRUSS_INSTALLED"] = "0"
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", CODE], capture_output=True, text=True, env=kept | environment
     )
@@ -198,10 +215,58 @@ def test_a_kernel_that_is_found_again_still_becomes_a_part_though_only_machine_c
     assert module.count("define") == 2 and "norm" in module
     again = tmp_path / "again.py"  # numba reads the file of a kernel
     again.write_text(STORED)
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "SCANTRUSS_INSTALLED": "0"}
     done = subprocess.run([sys.executable, str(again)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["1", "0"]
+
+
+FOUND = """
+import scantruss.kernels.vectors as v
+from scantruss.kernels import compile as c
+assert v.norm((3.0, 4.0, 0.0)) == 5.0
+stats = v.norm.alone.stats
+print(sum(stats.cache_hits.values()), c.is_compiled(v.norm), v.__file__)
+"""
+
+
+@handed_over
+def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path):
+    made = Path(run(NUMBA_CACHE_DIR=str(tmp_path / "made"))[0])
+    (machine_code,) = made.iterdir()
+    package = tmp_path / "elsewhere" / "scantruss"
+    shutil.copytree(KERNELS.parent, package, ignore=shutil.ignore_patterns("__pycache__", "machine_code"))
+    installed = shutil.copytree(machine_code, package / "machine_code" / made.name)
+    stamps = {path: path.stat().st_mtime_ns for path in installed.iterdir()}
+
+    def find(name, **environment):
+        """Use a kernel of that package where nothing is stored yet; say whether it was found and what was stored."""
+        words = {"NUMBA_CACHE_DIR": str(tmp_path / name), "PYTHONPATH": str(package.parent)} | environment
+        kept = {key: value for key, value in os.environ.items() if key != "SCANTRUSS_INSTALLED"}
+        done = subprocess.run([sys.executable, "-c", FOUND], capture_output=True, text=True, env=kept | words)
+        assert done.returncode == 0, done.stderr
+        hits, known, file = done.stdout.split()
+        assert known == "True" and Path(file).is_relative_to(package)
+        return int(hits), len(list((tmp_path / name).rglob("*.nbc")))
+
+    assert find("fresh") == (1, 0)
+    assert {path: path.stat().st_mtime_ns for path in installed.iterdir()} == stamps
+    assert find("left aside", SCANTRUSS_INSTALLED="0") == (0, 1)
+    assert find("another processor", NUMBA_CPU_NAME="generic") == (0, 1)
+    with (package / "kernels" / "boxes.py").open("a") as file:
+        file.write("# a change\n")
+    assert find("another kernel") == (0, 1)
+
+
+def test_without_a_folder_of_ones_own_what_came_with_the_package_is_not_counted_on(tmp_path, monkeypatch):
+    """Machine code is read by numba only where it could also write some."""
+    (tmp_path / "vectors.norm-1.py311.1.nbc").write_bytes(b"")
+    monkeypatch.setattr(compiling, "INSTALLED", tmp_path)
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
+    norm = importlib.import_module("scantruss.kernels.vectors").norm
+    for folder in (tmp_path / "own", None):
+        monkeypatch.setattr(compiling, "FOLDER", folder)
+        assert compiling.is_compiled(norm) == (folder is not None)
 
 
 BLAS = """

@@ -79,9 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kernels.of_command = True
     kept, often = signal.getsignal(signal.SIGTERM), gc.get_threshold()
     try:
-        gc.set_threshold(
-            RARELY
-        )  # importing makes much that stays, and looking through it takes a tenth of a short command
+        # importing makes much that stays, and looking through it takes a tenth of a short command
+        gc.set_threshold(RARELY)
         try_signal(signal.SIGTERM, _stop)
         run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()

@@ -2,7 +2,8 @@
 
 numba looks only at the file of the kernel itself when it decides whether its stored machine code is still good, so after an
 edit of a callee in another file it would silently run old code. The machine code is therefore kept in a folder that is named
-after the contents of *all* kernel files. Where no folder can be written the kernels compile in memory.
+after the contents of *all* kernel files. Where no folder can be written the kernels compile in memory. What the demo needs is
+compiled when the package is installed (`hatch_build.py`) and comes with it; it is looked at first and never written to.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar, cast
 
+import llvmlite.binding
 import numba
 from numba.core import event
 
@@ -26,9 +28,18 @@ from .linking import compiled
 F = TypeVar("F", bound=Callable[..., object])
 
 
+def _processor() -> str:
+    """What numba compiles for: the processor that it finds, or that its settings name."""
+    try:
+        features = numba.config.CPU_FEATURES or llvmlite.binding.get_host_cpu_features().flatten()
+    except RuntimeError:  # which LLVM does not know of this one
+        features = ""
+    return f"{numba.config.CPU_NAME or llvmlite.binding.get_host_cpu_name()} {features}"
+
+
 def _contents() -> str:
-    """Digest of all kernel files and of what compiles them."""
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    """Digest of all kernel files, of what compiles them and of what for."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {_processor()}".encode())
     digest.update(os.environ.get("NUMBA_BOUNDSCHECK", "").encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
@@ -72,7 +83,19 @@ def _without_blas() -> None:
             del sys.modules[name]
 
 
+def _installed() -> Path | None:
+    """The folder of the machine code that came with the package; None where none did, or it is of other kernels.
+
+    SCANTRUSS_INSTALLED=0 leaves it aside: to measure a first run that compiles.
+    """
+    if os.environ.get("SCANTRUSS_INSTALLED") == "0":
+        return None
+    folder = Path(__file__).parents[1] / "machine_code" / f"kernels-{_contents()}"
+    return folder if folder.is_dir() else None
+
+
 FOLDER = _folder()
+INSTALLED = _installed()
 if of_command:
     _without_blas()
 
@@ -81,7 +104,8 @@ def is_compiled(*kernels: Callable[..., object]) -> bool:
     """Whether machine code of these kernels is on disk already (False: their next call compiles)."""
     if numba.config.DISABLE_JIT:
         return True
-    stored = {path.name.partition("-")[0] for path in FOLDER.rglob("*.nbc")} if FOLDER else set()
+    folders = [folder for folder in (FOLDER, INSTALLED) if folder and FOLDER]
+    stored = {path.name.partition("-")[0] for folder in folders for path in folder.rglob("*.nbc")}
     return all(f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}" in stored for kernel in kernels)
 
 
@@ -117,4 +141,4 @@ def kernel(function: F) -> F:
     callable
         The compiled function; the plain one where NUMBA_DISABLE_JIT is set.
     """
-    return cast(F, compiled(function, FOLDER))
+    return cast(F, compiled(function, FOLDER, INSTALLED))

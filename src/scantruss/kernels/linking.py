@@ -17,7 +17,7 @@ import numba
 try:
     import llvmlite.binding
     from numba.core import compiler, dispatcher, sigutils
-    from numba.core.caching import CompileResultCacheImpl, FunctionCache
+    from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
     from numba.core.codegen import JITCodeLibrary
     from numba.core.cpu import CPUTargetOptions
     from numba.core.event import trigger_event
@@ -35,12 +35,13 @@ try:
             (CPUTargetOptions, "_nrt"),
             (CPUTargetOptions, "no_cfunc_wrapper"),
             (FunctionCache, "_impl_class"),
+            (IndexDataCacheFile, "load"),
             (CompileResultCacheImpl, "reduce"),
         )
     )
 except ImportError:  # another numba: every kernel is compiled by itself, which only takes longer
     HANDS_OVER = False
-    JITCodeLibrary = CPUDispatcher = Options = CompileResultCacheImpl = FunctionCache = object
+    JITCodeLibrary = CPUDispatcher = Options = CompileResultCacheImpl = FunctionCache = IndexDataCacheFile = object
 
 ALLOCATES = {"empty", "zeros", "ones", "full", "copy"}  # names of what makes an array in a kernel
 
@@ -87,16 +88,35 @@ class Machine(CompileResultCacheImpl):  # type: ignore[misc]
         return (name, kind, content), *rest
 
 
+class Files(IndexDataCacheFile):  # type: ignore[misc]
+    """The files with the machine code of a kernel; those that came with the package are looked at first and never written to."""
+
+    def __init__(self, folder: str, name: str, stamp: object, installed: Path | None) -> None:
+        super().__init__(folder, name, stamp)
+        self._installed = None if installed is None else IndexDataCacheFile(str(installed), name, stamp)
+
+    def load(self, key: object) -> Any:
+        """Return what is stored under a key; None where nothing is."""
+        found = None if self._installed is None else self._installed.load(key)
+        return super().load(key) if found is None else found
+
+
 class Store(FunctionCache):  # type: ignore[misc]
     """Where the machine code of a kernel is looked for and kept."""
 
     _impl_class = Machine
+
+    def __init__(self, function: Callable[..., Any], installed: Path | None) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = Files(self.cache_path, self._impl.filename_base, stamp, installed)
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
     """A kernel for both: Python gets its machine code (`alone`), a kernel that calls it a part."""
 
     folder: Path | None = None  #: where machine code is kept
+    installed: Path | None = None  #: where machine code lies that came with the package
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the machine code; compiled on the first call."""
@@ -112,7 +132,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
                 alone._compiler._customize_flags = Flags
                 if self.folder is not None:
                     with stored_in(self.folder):
-                        alone._cache = Store(self.py_func)
+                        alone._cache = Store(self.py_func, self.installed)
                 self.alone = alone
         return self.alone
 
@@ -148,7 +168,7 @@ def stored_in(folder: Path) -> Iterator[None]:
             numba.config.CACHE_DIR = kept
 
 
-def compiled(function: Callable[..., Any], folder: Path | None) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], folder: Path | None, installed: Path | None) -> Callable[..., Any]:
     """Return what `numba.njit` makes of a function, releasing the GIL; a `Kernel` where this numba lets us.
 
     It divides by zero as numpy does: a branch to an exception at every division costs a tenth of the time to compile.
@@ -160,7 +180,7 @@ def compiled(function: Callable[..., Any], folder: Path | None) -> Callable[...,
         allocates = not ALLOCATES.isdisjoint(function.__code__.co_names)
         options |= {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, "_nrt": allocates}
         kernel = Kernel(function, targetoptions=options)
-        kernel.folder = folder
+        kernel.folder, kernel.installed = folder, installed
         return kernel
     alone = numba.njit(**options)(function)
     if folder is not None:

@@ -1,0 +1,90 @@
+"""Compile the kernels when the package is installed, as an extension in C would be, so that its first run need not.
+
+Runs the usual commands where nothing is stored yet and puts the machine code beside the package: in the wheel, or in `src` where
+the installation is editable. `scantruss.kernels.compile` looks there first; where the kernels have changed since, or another
+processor, Python or numba meets them, they compile on the first run instead, as they do where this fails. SCANTRUSS_COMPILE=0
+leaves it out, for a wheel that is to serve all machines.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PLACE = Path("scantruss") / "machine_code"
+PATIENCE = 600.0  # most that the commands may take [s]
+COMMANDS = (
+    "grid {bust} bust.obj --length 24",
+    "grid shell.npy shell.obj --length 1",
+    "clean shell.npy clean.ply",
+    "thin clean.ply -o thin.ply --spacing 0.2",
+)
+
+
+class CompileKernels(BuildHookInterface):
+    """The hook of the build."""
+
+    PLUGIN_NAME = "custom"
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, and add what came of it."""
+        if os.environ.get("SCANTRUSS_COMPILE") == "0":
+            return
+        source = Path(self.root) / "src"
+        folder = source / PLACE if version == "editable" else self._beside_the_wheel()
+        try:
+            compile_kernels(source, folder)
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
+            self.app.display_warning(f"the kernels are not compiled now but by the first run: {error}")
+            return
+        if version != "editable":
+            build_data["force_include"][str(folder)] = PLACE.as_posix()
+            build_data.update(pure_python=False, infer_tag=True)
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Leave nothing beside the wheel."""
+        shutil.rmtree(self._beside_the_wheel(), ignore_errors=True)
+
+    def _beside_the_wheel(self) -> Path:
+        return Path(self.directory) / PLACE.name
+
+
+def compile_kernels(source: Path, folder: Path, commands: tuple[str, ...] = COMMANDS) -> None:
+    """Run commands of the package in `source` and put the machine code they store into `folder`, in place of any there."""
+    with tempfile.TemporaryDirectory() as name:
+        environment = dict(os.environ, NUMBA_CACHE_DIR=name, NUMBA_DISABLE_JIT="0", SCANTRUSS_INSTALLED="0")
+        environment["PYTHONPATH"] = os.pathsep.join([str(source), *filter(None, [os.environ.get("PYTHONPATH")])])
+        words = [sys.executable, str(Path(__file__).resolve()), *commands]
+        subprocess.run(words, cwd=name, env=environment, check=True, timeout=PATIENCE, stdout=subprocess.DEVNULL)
+        (stored,) = Path(name, "scantruss").glob("kernels-*")
+        (machine_code,) = stored.iterdir()
+        fresh = folder.with_name(f"{folder.name}-{os.getpid()}")
+        shutil.copytree(machine_code, fresh / stored.name)
+        shutil.rmtree(folder, ignore_errors=True)
+        fresh.rename(folder)
+
+
+def run(commands: list[str]) -> None:
+    """Run commands of the package one after the other, in this process."""
+    import numpy as np
+
+    from scantruss.cli import main
+    from scantruss.demo import SCAN
+
+    chance = np.random.default_rng(1)
+    x, y = chance.uniform(-10.0, 10.0, (2, 20_000))
+    x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
+    np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + chance.normal(0.0, 0.02, len(x))]))
+    for command in commands:
+        words = [word.format(bust=SCAN) for word in command.split()]
+        if status := main(words):
+            sys.exit(status)
+
+
+if __name__ == "__main__":
+    run(sys.argv[1:])
