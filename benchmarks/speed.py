@@ -241,7 +241,7 @@ def section(command_line: str, quick: bool = False) -> Section:
     grows = [] if quick else growth()
     rooms = memory((100_000,) if quick else GROWTH_POINTS)
     if not quick:
-        rows += [more_effort(3, "best", 20.0), *first_runs(3)]
+        rows += [more_effort(9, "best", 20.0), *first_runs(3)]
     lost = [f"{row.what}: {row.ratio:.2f}, the aim is at most {row.aim:g}." for row in rows if row.lost]
     lost += [f"Time over {g.over}: exponent {g.exponent:.2f}, the aim is at most {g.aim:g}." for g in grows if g.lost]
     lost += [
