@@ -110,7 +110,11 @@ def parser() -> argparse.ArgumentParser:
                        help="all (the default), one section, own (our own figures as JSON) or compare (two of these)")  # fmt: skip
     whole.add_argument("files", nargs="*", type=Path, help="of own: where to write; of compare: OLD NEW")
     whole.add_argument("--quick", action="store_true", help="a small part, some three minutes")
-    whole.add_argument("--page", type=Path, help="the page to write instead of docs/numbers.md")
+    whole.add_argument(
+        "--page",
+        type=Path,
+        help="the page to write instead of docs/numbers.md; all else that is written goes beside it",
+    )
     whole.add_argument("--data", help="scans: their folder; SCANTRUSS_DATA if left out")
     whole.add_argument("--seeds", type=int, default=100, help="random: how many surfaces (default 100)")
     whole.add_argument(
@@ -157,7 +161,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write(section, **page)
         print(f"{section.finding}\n", flush=True)
     if options.part in ("all", "own"):
-        own.save(own.record(options.quick), options.files[0] if options.files else own.FILE)
+        beside = options.page.with_name(own.FILE.name) if options.page else own.FILE
+        own.save(own.record(options.quick), options.files[0] if options.files else beside)
     return 0
 
 

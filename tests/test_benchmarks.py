@@ -226,6 +226,18 @@ def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
     assert "python -m benchmarks scans --data DATA --page PAGE --ways 'a b,c'`" in text and str(tmp_path) not in text
 
 
+@pytest.mark.parametrize(
+    "given, written",
+    [(["own", "--page", "{folder}/page.md"], "numbers.json"), (["own", "{folder}/new.json"], "new.json")],
+)
+def test_our_own_figures_are_written_beside_the_page_or_where_it_is_said(given, written, tmp_path, monkeypatch):
+    saved = []
+    monkeypatch.setattr(own, "record", lambda quick: {"quick": quick})
+    monkeypatch.setattr(own, "save", lambda figures, file: saved.append((figures, file)))
+    assert benchmarks_main.main([word.format(folder=tmp_path) for word in given]) == 0
+    assert saved == [({"quick": False}, tmp_path / written)]
+
+
 def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys):
     old = {
         "format": 1, "machine": "m", "times": {"a": {"ratio": 1.0, "low": 0.9, "high": 1.1}},
