@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
-import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
 from scantruss import Grid, PointCloud, Settings
 from scantruss.grid.relief import Relief
 from scantruss.kernels.rim import Rim
 from scantruss.scan.sites import surface_of
-
-compiled_only = pytest.mark.skipif(
-    numba.config.DISABLE_JIT, reason="takes minutes without compiling; others run the same kernels"
-)
 
 
 class Rough(NamedTuple):

@@ -6,9 +6,9 @@ import subprocess
 import sys
 import time
 
-import numba
 import numpy as np
 import pytest
+from marks import needs_jit
 from shapes import make
 
 from scantruss import ahead
@@ -21,9 +21,6 @@ from scantruss.report.terminal import Bars
 def nothing_installed(monkeypatch):
     """No machine code comes with the package."""
     monkeypatch.setattr(compiling, "INSTALLED", None)
-
-
-needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
 
 class Process:

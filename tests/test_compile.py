@@ -15,14 +15,10 @@ import llvmlite.binding
 import numba
 import numpy as np
 import pytest
-from rough import compiled_only
+from marks import compiled_only, handed_over
 
 from scantruss.kernels import compile as compiling
 from scantruss.kernels import linking
-
-handed_over = pytest.mark.skipif(
-    not linking.HANDS_OVER or bool(numba.config.DISABLE_JIT), reason="every kernel compiles by itself"
-)
 
 KERNELS = Path(compiling.__file__).parent
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
-from rough import compiled_only, curve_of, rough_disc, rough_sphere, same_topology
+from marks import compiled_only
+from rough import curve_of, rough_disc, rough_sphere, same_topology
 
 from scantruss.grid.equalize import (
     LAST_STRIDE,

@@ -4,6 +4,8 @@ import csv
 import io
 import json
 import os
+import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from scantruss.export.files import write_files
 from scantruss.export.formats import FORMATS, check_output
 
 GRIDS = [fan, icosahedron, two_pieces, rich, dome]
+NOBODY = 65534  # user
 UTM = np.array([500000.1, 4500000.2, 100.3])
 
 
@@ -235,14 +238,31 @@ def test_places_where_nothing_can_be_written_are_refused(name, words, tmp_path):
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="the superuser may write everywhere")
-def test_a_protected_folder_is_refused_before_the_work(tmp_path):
-    tmp_path.chmod(0o500)
+@contextmanager
+def as_nobody(folder):
+    """Own a folder as a user who may not write everywhere, and be that user; as we are where we are not the superuser."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.chown(folder, NOBODY, -1)
+    os.setresuid(NOBODY, NOBODY, 0)
     try:
-        with pytest.raises(st.FormatError, match="no permission"):
-            check_output(tmp_path / "a.obj")
+        yield
     finally:
-        tmp_path.chmod(0o700)
+        os.setresuid(0, 0, 0)
+
+
+PROTECTS = hasattr(os, "geteuid") and (os.geteuid() != 0 or hasattr(os, "setresuid"))
+
+
+@pytest.mark.skipif(not PROTECTS, reason="here no folder is protected from us by its mode")
+def test_a_protected_folder_is_refused_before_the_work():
+    with tempfile.TemporaryDirectory() as name, as_nobody(name):  # not in tmp_path, which is the superuser's alone
+        assert check_output(Path(name) / "a.obj").parent == Path(name)
+        Path(name).chmod(0o500)
+        with pytest.raises(st.FormatError, match="no permission"):
+            check_output(Path(name) / "a.obj")
+        Path(name).chmod(0o700)
 
 
 @pytest.mark.parametrize("full_at", [1, 2])

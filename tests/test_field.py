@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as limits
 from hypothesis import strategies as some
-from rough import compiled_only, rough_disc
+from marks import compiled_only
+from rough import rough_disc
 from small_clouds import ball, cap, ring, sheet, sites_of
 
 import scantruss as st

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from rough import compiled_only
+from marks import compiled_only
 from small_clouds import ball, sheet, tire
 
 import scantruss as st

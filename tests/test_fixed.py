@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from rough import compiled_only, rough_disc, rough_sphere, same_topology
+from marks import compiled_only
+from rough import rough_disc, rough_sphere, same_topology
 
 from scantruss import InputError, Settings, optimize_grid
 from scantruss.boundary import find_boundary

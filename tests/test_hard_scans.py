@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from hard_scans import HARD, hard
-from rough import compiled_only
+from marks import compiled_only
 
 import scantruss as st
 

@@ -9,7 +9,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from test_compile import handed_over
+from marks import handed_over
 
 ROOT = Path(__file__).resolve().parents[1]
 THIN = ("thin", "shell.npy", "-o", "thin.ply", "--spacing", "1")

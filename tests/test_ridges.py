@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rough import compiled_only
+from marks import compiled_only
 from shapes import make
 
 from scantruss import PointCloud, Settings, find_boundary, grid_from_points, pipeline

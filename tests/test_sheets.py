@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hard_scans import hard
 from hypothesis import given, strategies
-from rough import compiled_only
+from marks import compiled_only
 from small_clouds import sheet
 
 import scantruss as st
