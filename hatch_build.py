@@ -54,12 +54,12 @@ class CompileKernels(BuildHookInterface):
         return Path(self.directory) / PLACE.name
 
 
-def compile_kernels(source: Path, folder: Path, commands: tuple[str, ...] = COMMANDS) -> None:
-    """Run commands of the package in `source` and put the machine code they store into `folder`, in place of any there."""
+def compile_kernels(source: Path, folder: Path) -> None:
+    """Run the commands of the package in `source` and put the machine code they store into `folder`, in place of any there."""
     with tempfile.TemporaryDirectory() as name:
         environment = dict(os.environ, NUMBA_CACHE_DIR=name, NUMBA_DISABLE_JIT="0", SCANTRUSS_INSTALLED="0")
         environment["PYTHONPATH"] = os.pathsep.join([str(source), *filter(None, [os.environ.get("PYTHONPATH")])])
-        words = [sys.executable, str(Path(__file__).resolve()), *commands]
+        words = [sys.executable, str(Path(__file__).resolve())]
         subprocess.run(words, cwd=name, env=environment, check=True, timeout=PATIENCE, stdout=subprocess.DEVNULL)
         (stored,) = Path(name, "scantruss").glob("kernels-*")
         (machine_code,) = stored.iterdir()
@@ -69,8 +69,8 @@ def compile_kernels(source: Path, folder: Path, commands: tuple[str, ...] = COMM
         fresh.rename(folder)
 
 
-def run(commands: list[str]) -> None:
-    """Run commands of the package one after the other, in this process."""
+def run() -> None:
+    """Run the commands one after the other, in this process."""
     import numpy as np
 
     from scantruss.cli import main
@@ -80,11 +80,11 @@ def run(commands: list[str]) -> None:
     x, y = chance.uniform(-10.0, 10.0, (2, 20_000))
     x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
     np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + chance.normal(0.0, 0.02, len(x))]))
-    for command in commands:
+    for command in COMMANDS:
         words = [word.format(bust=SCAN) for word in command.split()]
         if status := main(words):
             sys.exit(status)
 
 
 if __name__ == "__main__":
-    run(sys.argv[1:])
+    run()

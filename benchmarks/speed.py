@@ -42,8 +42,8 @@ points and asked for 16 neighbours of each by two threads. Both sides in turn, m
 the nodes: its stages read and boundary with the fewest nodes. Exponents: least squares over logarithms. Memory: what points
 and work together add to a process of their own at its peak, over the bytes of the points (24 each), so 1 is the points alone.
 First runs: nothing is stored in the user's folder. Installing the package compiles the kernels of the usual commands, which takes
-somewhat longer than a first run that compiles all; that one is left where the processor, Python or numba is another, or the
-kernels were changed."""
+somewhat longer than a first run that compiles all. Such a run is met where the processor, Python or numba is another than when it
+was installed, or the kernels were edited."""
 
 
 @lru_cache(maxsize=2)

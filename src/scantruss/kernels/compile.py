@@ -2,8 +2,8 @@
 
 numba looks only at the file of the kernel itself when it decides whether its stored machine code is still good, so after an
 edit of a callee in another file it would silently run old code. The machine code is therefore kept in a folder that is named
-after the contents of *all* kernel files. Where no folder can be written the kernels compile in memory. What the demo needs is
-compiled when the package is installed (`hatch_build.py`) and comes with it; it is looked at first and never written to.
+after the contents of *all* kernel files. Where no folder can be written the kernels compile in memory. What the usual commands
+need is compiled when the package is installed (`hatch_build.py`), lies beside it and is looked at first.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _folder() -> Path | None:
     except RuntimeError:  # no home folder
         homes = []
     for home in (*homes, Path(tempfile.gettempdir()) / f"scantruss-{os.getuid() if hasattr(os, 'getuid') else 'user'}"):
-        folder = home / "scantruss" / f"kernels-{_contents()}"
+        folder = home / "scantruss" / NAME
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -90,10 +90,11 @@ def _installed() -> Path | None:
     """
     if os.environ.get("SCANTRUSS_INSTALLED") == "0":
         return None
-    folder = Path(__file__).parents[1] / "machine_code" / f"kernels-{_contents()}"
+    folder = Path(__file__).parents[1] / "machine_code" / NAME
     return folder if folder.is_dir() else None
 
 
+NAME = f"kernels-{_contents()}"
 FOLDER = _folder()
 INSTALLED = _installed()
 if of_command:
