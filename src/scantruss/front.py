@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from .boundary import Boundary, boundary_nodes
+from .boundary import Boundary, characteristic_points
 from .errors import FrontError
 from .grid.grid import Grid
 from .kernels import advance as kernels
@@ -19,8 +19,9 @@ from .kernels.offers import RowNodes, add_still_nodes, offer_nodes
 from .kernels.seat import nearest_site
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
-from .rows import STRAIGHT, Rows, lay_rows, nodes_at
-from .scan.cloud import PointCloud
+from .lines.find import Constraints
+from .lines.network import Lines
+from .rows import nodes_at
 from .scan.sites import Sites, local_field
 from .settings import Settings
 from .slits import add_half_edges, chain_places, check_kept, line_members, link_around
@@ -36,34 +37,31 @@ BUDGET = 500  # segments advanced between two calls of `progress`
 
 
 def advance_front(
-    cloud: PointCloud,
+    sites: Sites,
     boundary: Boundary,
+    constraints: Constraints,
     settings: Settings,
+    rows: RowNodes | None = None,
     *,
-    rows: Rows | None = STRAIGHT,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4).
+    """Return the grid that a front leaves behind when it advances over a scan (Fig. 4).
 
     Parameters
     ----------
-    cloud : PointCloud
+    sites : Sites
+        The surface samples of the scan.
     boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges. Method "paper" makes the fixed nodes later.
     settings : Settings
-    rows : Rows, optional
-        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does, and as it does
-        where the desired length differs from place to place.
+    rows : RowNodes, optional
+        Nodes of rows for the front to come to; left out, it makes all nodes itself.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
-    sites = boundary.sites
-    front = new_front(sites, settings)
-    if settings.method == "paper":
-        front = start_front(front, boundary, settings)
-    else:
-        positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
-        front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
-    members = line_members(front) if boundary.lines.curves else np.zeros((0, 2), np.int64)
+    front = start_front(new_front(sites, settings), sites, boundary, constraints, settings, rows)
+    members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
     numbers = np.array(
         [
             settings.length,
@@ -95,8 +93,8 @@ def advance_front(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),
         np.zeros(len(used), np.bool_),
-        cloud.origin,
-        cloud.unit,
+        sites.origin,
+        sites.unit,
         desired=desired,
         lines=np.searchsorted(used, members),
         settings=settings,
@@ -163,33 +161,30 @@ def grown(front: lists.Front) -> lists.Front:
 
 def start_front(
     front: lists.Front,
+    sites: Sites,
     boundary: Boundary,
+    constraints: Constraints,
     settings: Settings,
-    rows: Rows | None = None,
-    positions: np.ndarray | None = None,
+    rows: RowNodes | None = None,
 ) -> lists.Front:
-    """Put the initial front into the lists: the boundary loops, the lines, nodes that it may come to, a seed triangle on closed pieces.
-
-    Those nodes are the appointed positions (K, 3) and the nodes of rows.
-    """
-    surface = boundary.sites.surface
+    """Put the initial front into the lists: boundary loops, lines, nodes that it may come to, a seed triangle on closed pieces."""
+    surface = sites.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
-        nodes, _ = boundary_nodes(loop, settings.length)
+        nodes, _ = characteristic_points(loop, settings.length)
         rim = np.array(add_nodes(front, surface, nodes), np.int64)
         lists.add_chain(front, rim, lists.ACTIVE if active else lists.INACTIVE)
-    add_lines(front, boundary, settings)
-    for place in positions if positions is not None else ():
+    add_lines(front, surface, constraints.lines, settings)
+    for place in constraints.positions if settings.method != "paper" else ():
         length = settings.length * local_field(surface, place)
         front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
     if rows is not None:
-        front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
+        front = offer(front, surface, rows, CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
-    piece = boundary.sites.piece
-    bounded |= {int(piece[nearest_site(surface, *curve[0].tolist())]) for curve in boundary.lines.curves}
-    for number in boundary.sites.pieces:
+    bounded |= {int(sites.piece[nearest_site(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
+    for number in sites.pieces:
         if number not in bounded:
-            site = int(np.flatnonzero(piece == number)[0])
+            site = int(np.flatnonzero(sites.piece == number)[0])
             length = settings.length * local_field(surface, surface.mean[site])
             ids = seed_of_rows(front, surface, site, length)
             add_seed(front, ids or new_seed(front, surface, site, length))
@@ -204,9 +199,8 @@ def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -
     return front
 
 
-def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> None:
+def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Settings) -> None:
     """Add the lines to a front that holds the boundary loops."""
-    lines, surface = boundary.lines, boundary.sites.surface
     if not lines.curves:
         return
     count = int(front.count[lists.NODES])
