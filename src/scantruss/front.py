@@ -24,7 +24,7 @@ from .lines.network import Lines
 from .rows import nodes_at
 from .scan.sites import Sites, local_field
 from .settings import Settings
-from .slits import add_half_edges, chain_places, check_kept, line_members, link_around
+from .slits import add_half_edges, chain_places, check_kept, check_links, line_members, link_around
 
 Progress = Callable[[str, float], None]
 
@@ -104,7 +104,8 @@ def advance_front(
 def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
-    Loops of the boundary of which the front has reached no segment are left out.
+    Loops of the boundary of which the front has reached no segment are left out. Each turn takes the segments of one loop off the
+    front, at least one, so it ends after no more turns than there are segments.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
     for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
@@ -114,11 +115,7 @@ def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
             length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
             if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
-                before, after = front.previous[segments[0]], front.next[segments[-1]]
-                for t in segments:
-                    lists.remove_segment(front, t)
-                if before != segments[-1]:
-                    lists.link(front, before, after)
+                gaps.cut_out(front, segments)
 
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
@@ -224,6 +221,7 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
         chains.append(chain)
     for node in sorted({node for chain in chains for node in chain}):
         link_around(front, node)
+    check_links(front)
 
 
 def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
