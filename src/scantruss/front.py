@@ -106,7 +106,8 @@ def advance_front(
 def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
-    Loops of the boundary of which the front has reached no segment are left out.
+    Loops of the boundary of which the front has reached no segment are left out. Each turn takes a loop of segments out of the
+    front and adds none, so the number of those that are not GONE falls to 0.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
     for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
@@ -286,7 +287,10 @@ def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 def run(
     front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
-    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
+    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed.
+
+    It ends: what a kernel takes from the queue waits from then on or gets a triangle, and the number of triangles is limited.
+    """
     expected = sites.graded_area / (0.433 * numbers[lists.REFERENCE] ** 2)
     while True:
         status = step(sites.surface, front, numbers, BUDGET)

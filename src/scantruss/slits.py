@@ -15,6 +15,7 @@ from .kernels import front as lists
 from .kernels.field import lengths_along
 from .kernels.surface import Surface
 from .kernels.triangles import angle_from
+from .kernels.vectors import Vector
 from .lines.network import Lines
 from .scan.sites import is_graded
 
@@ -60,18 +61,28 @@ def add_half_edges(front: lists.Front, chain: list[int]) -> None:
 
 
 def link_around(front: lists.Front, node: int) -> None:
-    """Link every segment that comes to a node to the one that leaves it next, the unmeshed area being to the left of both."""
+    """Link every segment that comes to a node to the one that leaves it next, the unmeshed area being to the left of both.
+
+    The segments are put in order around the node once, from that of the rim on, and each that comes is followed by another one.
+    So each has one segment before it and one after it, also where two lines leave a node in one direction, or one of them
+    leaves it across the rim.
+    """
     count = int(front.count[lists.SEGMENTS])
     leaving = np.flatnonzero((front.tail[:count] == node) & (front.state[:count] != lists.GONE)).tolist()
     coming = np.flatnonzero((front.head[:count] == node) & (front.state[:count] != lists.GONE)).tolist()
     place, normal = front.nodes[node], tuple(front.normals[node].tolist())
-    for s in coming:
-        back = tuple((front.nodes[front.tail[s]] - place).tolist())
-        angles = []
-        for t in leaving:
-            angle = angle_from(tuple((front.nodes[front.head[t]] - place).tolist()), back, normal)
-            angles.append(2.0 * np.pi if front.head[t] == front.tail[s] else angle)
-        lists.link(front, s, leaving[int(np.argmin(angles))])
+
+    def arm(t: int) -> Vector:
+        x, y, z = (front.nodes[front.head[t]] - place).tolist()
+        return x, y, z
+
+    first = leaving[0]  # that of the rim, which was in the lists before the lines
+    around = [first, *sorted(leaving[1:], key=lambda t: angle_from(arm(first), arm(t), normal))]
+    for before, line in pairwise(around):
+        back = next(s for s in coming if front.tail[s] == front.head[line])
+        coming.remove(back)
+        lists.link(front, back, before)
+    lists.link(front, coming[0], around[-1])
 
 
 def line_members(front: lists.Front) -> np.ndarray:

@@ -14,7 +14,8 @@ from .vectors import cross, dot, norm, row, subtract, unit
 def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
     """Segments of the shortest closed walk along the front from a segment back to a node it has met; returns their number.
 
-    A loop that meets a node twice is taken apart there, so that the node keeps one fan.
+    A loop that meets a node twice is taken apart there, so that the node keeps one fan. There is at least one segment in it: each
+    turn meets another node, or ends; `loop` has room for all segments and one more.
     """
     count = 0
     at = s
