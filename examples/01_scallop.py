@@ -8,14 +8,17 @@ import scantruss as st
 
 
 def main(folder: Path = Path()) -> st.Grid:
-    """Make the grid of the valve in its four steps, save it and a picture of it over its scan."""
+    """Make the grid of the valve step by step, save it and a picture of it over its scan."""
     shell = make("scallop")
     cloud = st.PointCloud.from_array(shell.points, unit="mm")
     settings = st.Settings(length=4.7, unit="mm")  # l_e, the desired length of the members
-    boundary = st.find_boundary(cloud, settings)  # one loop; the corners of the ears become nodes
-    front = st.advance_front(cloud, boundary, settings)
-    grid = st.optimize_grid(front, cloud, settings)
-    print(f"before {front.quality}")
+    surface = st.sample_surface(cloud, settings)  # samples with normals
+    surface, boundary = st.find_boundary(surface, settings)  # one loop; the corners of the ears become nodes
+    boundary, constraints = st.find_constraints(surface, boundary, settings)  # no fixed nodes, no lines
+    fields = st.orientation_fields(surface, boundary, settings)  # rows for the front to come to
+    fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
+    grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)  # the best, with its certificate
+    print(f"before {grid.before}")
     print(f"after  {grid.quality}")
     st.write(grid, folder / "scallop.obj")
     st.write(grid, folder / "scallop.png", cloud=cloud)

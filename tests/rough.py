@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from scantruss import Grid, PointCloud, Settings
 from scantruss.grid.relief import Relief
 from scantruss.kernels.rim import Rim
-from scantruss.scan.sites import surface_of
+from scantruss.scan.sites import sample_surface
 
 
 class Rough(NamedTuple):
@@ -24,7 +24,7 @@ class Rough(NamedTuple):
 
     def relief(self) -> Relief:
         """The grid taken apart."""
-        surface = surface_of(self.cloud, self.settings)
+        surface = sample_surface(self.cloud, self.settings).surface
         return Relief.from_grid(self.grid, surface, self.rim, self.corners, self.settings.length)
 
 

@@ -7,7 +7,7 @@ from scantruss.front import new_front
 from scantruss.kernels import front as lists
 from scantruss.kernels.fits import near_nodes
 from scantruss.kernels.surface import PATCH
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 
 def sheet(width, depth, spacing, *, keep=None, noise=0.0, seed=0):
@@ -72,7 +72,7 @@ def turn_of(seed):
 
 def sites_of(points, length=1.0, **settings):
     """The scan prepared for a member length."""
-    return prepare_sites(PointCloud.from_array(points), Settings(length=length, **settings))
+    return sample_surface(PointCloud.from_array(points), Settings(length=length, **settings))
 
 
 class HandFront:

@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 from shapes import make
 from small_clouds import ball, cap, ring, sheet, tire, turn_of
+from steps import boundary_of
 
 import scantruss as st
 from scantruss.boundary import _onwards as onwards
-from scantruss.boundary import boundary_nodes
+from scantruss.boundary import characteristic_points
 
 
 def found(points, length=1.0, **settings):
     """Boundary of points, and the origin its places are relative to."""
     cloud = st.PointCloud.from_array(points)
-    return st.find_boundary(cloud, st.Settings(length=length, **settings)), cloud.origin
+    return boundary_of(cloud, st.Settings(length=length, **settings)), cloud.origin
 
 
 def in_hole(x, y):
@@ -53,7 +54,8 @@ def perimeter(corners):
 
 def assert_surface_on_the_left(boundary, origin, points, length=1.0):
     """0.3 members to the left of the loops there are points, to the right there are none; but for places near a corner."""
-    surface = boundary.sites.surface
+    cloud = st.PointCloud.from_array(points)
+    surface = st.sample_surface(cloud, st.Settings(length=length)).surface
     for loop in boundary.loops:
         ahead = np.roll(loop.points, -2, axis=0) - np.roll(loop.points, 2, axis=0)
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
@@ -86,7 +88,7 @@ def test_corners_of_a_plate_are_found_within_a_tenth_of_a_member(corners, seed):
 @pytest.mark.parametrize("corners", [RECTANGLE, ELL, RHOMBUS], ids=["rectangle", "ell", "rhombus"])
 def test_nodes_divide_every_side_equally_and_corners_are_nodes(corners):
     boundary, _ = found(polygon(corners))
-    nodes, is_corner = boundary_nodes(boundary.loops[0], 1.0)
+    nodes, is_corner = characteristic_points(boundary.loops[0], 1.0)
     assert is_corner.sum() == len(corners)
     assert is_corner[0]
     steps = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)
@@ -108,7 +110,7 @@ def test_a_disc_has_one_loop_without_corners(length):
     assert loop.external and len(loop.corners) == 0
     assert loop.length == pytest.approx(12 * np.pi, rel=0.01)
     assert np.linalg.norm(loop.points + origin, axis=1) == pytest.approx(6.0, abs=0.05)
-    nodes, is_corner = boundary_nodes(loop, length)
+    nodes, is_corner = characteristic_points(loop, length)
     assert len(nodes) == round(loop.length / length) and not is_corner.any()
     steps = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)
     assert np.ptp(steps) < 0.02 * length
@@ -312,7 +314,8 @@ class Cancelled(Exception):
 def test_progress_is_reported_and_may_stop_the_search():
     said = []
     cloud, settings = st.PointCloud.from_array(sheet(6, 4, 0.2)), st.Settings(length=1.0)
-    st.find_boundary(cloud, settings, progress=lambda stage, share: said.append((stage, share)))
+    sites = st.sample_surface(cloud, settings)
+    st.find_boundary(sites, settings, progress=lambda stage, share: said.append((stage, share)))
     assert {stage for stage, _ in said} == {"boundary"}
     assert [share for _, share in said] == sorted(share for _, share in said) and said[-1][1] == 1.0
 
@@ -320,7 +323,7 @@ def test_progress_is_reported_and_may_stop_the_search():
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        st.find_boundary(cloud, settings, progress=stop)
+        st.find_boundary(sites, settings, progress=stop)
 
 
 @pytest.mark.parametrize("seed", range(4))

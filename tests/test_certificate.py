@@ -11,10 +11,11 @@ from rough import strip_of
 from shapes import make
 from small_clouds import ring
 from small_grids import dome, fan, icosahedron
+from steps import steps_of
 
 import scantruss as st
 from scantruss import pipeline
-from scantruss.errors import CertificateError, FrontError
+from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate
 from scantruss.grid.faults import FOLDED
 from scantruss.grid.irregular import count_irregular
@@ -35,13 +36,14 @@ def made():
     """A ring on a barrel far from the origin, its boundary, and its grid: two loops."""
     cloud = st.PointCloud.from_array(bent(ring(2.0, 5.0, 0.15)) + SHIFT)
     grid = pipeline.grid_from_cloud(cloud, SETTINGS)
-    return grid, st.find_boundary(cloud, SETTINGS)
+    steps = steps_of(cloud, SETTINGS)
+    return grid, (steps.sites, steps.boundary)
 
 
 def kinds(made, **changes):
     """Kinds of the faults of the grid after some changes."""
-    grid, boundary = made
-    return {fault.kind for fault in certify(grid.replace(**changes), boundary, SETTINGS).faults}
+    grid, scan = made
+    return {fault.kind for fault in certify(grid.replace(**changes), *scan, SETTINGS).faults}
 
 
 def inner_node(grid, loops=2):
@@ -51,9 +53,9 @@ def inner_node(grid, loops=2):
 
 
 def test_a_right_grid_passes_and_carries_its_certificate(made):
-    grid, boundary = made
+    grid, scan = made
     found = grid.certificate
-    assert found == certify(grid, boundary, SETTINGS) and found.passed
+    assert found == certify(grid, *scan, SETTINGS) and found.passed
     assert (found.pieces, found.boundary_loops, found.euler, found.handles, found.crossings) == (1, 2, 0, 0, 0)
     assert (found.scan_pieces, found.scan_loops, found.scan_within_reach, found.grid_within_reach) == (1, 2, 1.0, 1.0)
     assert str(found).startswith("passed, oriented manifold")
@@ -84,8 +86,8 @@ def test_worst_places_are_those_of_plain_loops(made):
 
 
 def test_places_are_in_the_scans_own_frame(made):
-    grid, boundary = made
-    far = boundary.sites.surface.mean + grid.origin
+    grid, (sites, _) = made
+    far = sites.surface.mean + grid.origin
     for worst in (grid.certificate.farthest_scan, grid.certificate.farthest_triangle, grid.certificate.node_deviation):
         assert np.linalg.norm(far - worst.where, axis=1).min() < 0.5
 
@@ -107,23 +109,23 @@ def test_an_edge_of_three_triangles_and_a_pinch_are_found(made):
 
 
 def test_one_sided_grids_are_found(made):
-    _, boundary = made
-    assert "orientable" in {fault.kind for fault in certify(strip_of(13, 1), boundary, SETTINGS).faults}
+    _, scan = made
+    assert "orientable" in {fault.kind for fault in certify(strip_of(13, 1), *scan, SETTINGS).faults}
 
 
 def test_a_hole_and_a_loose_piece_and_a_lost_loop_are_found(made):
-    grid, boundary = made
+    grid, scan = made
     v = inner_node(grid)
     holed = grid.triangles[~(grid.triangles == v).any(axis=1)]
     assert kinds(made, triangles=holed) == {"loops", "torn"}
-    certificate = certify(grid.replace(triangles=holed), boundary, SETTINGS)
+    certificate = certify(grid.replace(triangles=holed), *scan, SETTINGS)
     assert np.linalg.norm(np.subtract(certificate.faults[0].where, grid.nodes[v] + grid.origin)) < 1.6
     loose = np.vstack([grid.triangles, fan().triangles + len(grid.nodes)])
     more = np.vstack([grid.nodes, fan(1.0).nodes + grid.nodes[v] + [0, 0, 0.3]])
     assert {"pieces", "loops"} <= kinds(
         made, nodes=more, triangles=loose, fixed=np.zeros(len(more), bool), deviation=None
     )
-    found = certify(grid.replace(nodes=more, triangles=loose, deviation=None), boundary, SETTINGS)
+    found = certify(grid.replace(nodes=more, triangles=loose, deviation=None), *scan, SETTINGS)
     place = next(fault.where for fault in found.faults if fault.kind == "pieces")
     assert np.linalg.norm(more[-7:] + grid.origin - place, axis=1).min() < 1e-6
     lost = min(grid.boundary_loops, key=len)
@@ -134,9 +136,9 @@ def test_a_hole_and_a_loose_piece_and_a_lost_loop_are_found(made):
 
 
 def test_a_part_of_the_scan_left_out_and_triangles_off_it_are_found(made):
-    grid, boundary = made
+    grid, scan = made
     part = grid.nodes[grid.triangles].mean(axis=1)[:, 0] < 2.0
-    found = certify(grid.replace(triangles=grid.triangles[part]), boundary, SETTINGS)
+    found = certify(grid.replace(triangles=grid.triangles[part]), *scan, SETTINGS)
     assert "cover" in {fault.kind for fault in found.faults} and 0.5 < found.scan_within_reach < 0.8
     assert found.farthest_scan.value > 2.0 and found.farthest_scan.where[0] - SHIFT[0] > 4.0
     assert "astray" in kinds(made, nodes=grid.nodes + [0, 0, 2.0])
@@ -144,11 +146,11 @@ def test_a_part_of_the_scan_left_out_and_triangles_off_it_are_found(made):
 
 
 def test_cuts_and_folds_are_found_with_their_place(made):
-    grid, boundary = made
+    grid, scan = made
     v = inner_node(grid)
     nodes = grid.nodes.copy()
     nodes[v] += 2.2 * (nodes[min(naive.neighbors(grid)[v])] - nodes[v])
-    found = certify(grid.replace(nodes=nodes), boundary, SETTINGS)
+    found = certify(grid.replace(nodes=nodes), *scan, SETTINGS)
     (cut,) = (fault for fault in found.faults if fault.kind == "crossing")
     assert np.linalg.norm(np.subtract(cut.where, grid.nodes[v] + grid.origin)) < 3.0
     assert found.crossings > 0
@@ -168,31 +170,31 @@ def test_fold_angles_are_those_between_triangles():
 
 
 def test_a_fold_onto_itself_is_a_fault(made):
-    grid, boundary = made
+    grid, scan = made
     edge = np.flatnonzero(grid.edge_uses == 2)[40]
     t, u = grid.edge_triangles[edge]
     a, b = grid.edges[edge]
     c, d = (next(v for v in grid.triangles[k].tolist() if v not in (a, b)) for k in (t, u))
     nodes = grid.nodes.copy()
     nodes[c] = nodes[d] + [0, 0, 0.02]
-    found = certify(grid.replace(nodes=nodes), boundary, SETTINGS)
+    found = certify(grid.replace(nodes=nodes), *scan, SETTINGS)
     assert found.sharpest_fold.value < FOLDED and "folded" in {fault.kind for fault in found.faults}
 
 
 def test_uneven_members_no_triangles_and_lost_fixed_nodes_are_found(made):
-    grid, boundary = made
+    grid, scan = made
     nodes = grid.nodes * [1.0, 8.0, 1.0]
     assert "uneven" in kinds(made, nodes=nodes)
-    nothing = certify(grid.replace(triangles=np.zeros((0, 3), np.int64)), boundary, SETTINGS)
+    nothing = certify(grid.replace(triangles=np.zeros((0, 3), np.int64)), *scan, SETTINGS)
     assert [fault.kind for fault in nothing.faults] == ["empty"]
-    assert [fault.kind for fault in certify(grid.replace(nodes=grid.nodes * np.nan), boundary, SETTINGS).faults] == [
+    assert [fault.kind for fault in certify(grid.replace(nodes=grid.nodes * np.nan), *scan, SETTINGS).faults] == [
         "empty"
     ]
     v = inner_node(grid)
     wanted = SETTINGS.replace(fixed=[grid.nodes[v] + grid.origin + [1e-3, 0, 0]])
-    missed = certify(grid, boundary, wanted)
+    missed = certify(grid, *scan, wanted)
     assert [fault.kind for fault in missed.faults] == ["fixed"] and missed.fixed_error.value == pytest.approx(1e-3)
-    hit = certify(grid, boundary, SETTINGS.replace(fixed=[grid.nodes[v] + grid.origin]))
+    hit = certify(grid, *scan, SETTINGS.replace(fixed=[grid.nodes[v] + grid.origin]))
     assert hit.passed and hit.fixed_error.value < 1e-8
 
 
@@ -245,8 +247,8 @@ def test_a_grid_that_is_changed_loses_its_certificate(made):
 
 
 def test_a_certificate_is_written_and_read_back_whole(made, tmp_path):
-    grid, boundary = made
-    failed = certify(grid.replace(nodes=grid.nodes + [0, 0, 2.0]), boundary, SETTINGS)
+    grid, scan = made
+    failed = certify(grid.replace(nodes=grid.nodes + [0, 0, 2.0]), *scan, SETTINGS)
     for certificate in (grid.certificate, failed):
         values = json.loads(json.dumps(certificate.to_dict(), allow_nan=False))
         assert Certificate.from_dict(values) == certificate
@@ -262,59 +264,6 @@ def test_a_certificate_is_written_and_read_back_whole(made, tmp_path):
 def plate():
     rng = np.random.default_rng(3)
     return np.column_stack([rng.uniform(0, 20, 6000), rng.uniform(0, 15, 6000), np.zeros(6000)])
-
-
-def damaged(monkeypatch, attempts):
-    """Let rows fail, and the optimization of the first attempts leave out a good half; returns the lengths of the fronts."""
-    from scantruss import front as fronts
-    from scantruss import several
-    from scantruss.grid import optimize
-
-    def no_rows(*_):
-        raise FrontError("rows do not come out")
-
-    real, advance, lengths = optimize.optimize_grid, fronts.advance_front, []
-
-    def half(grid, *arguments, **others):
-        good = real(grid, *arguments, **others)
-        if len(lengths) > attempts:
-            return good
-        left = good.nodes[good.triangles].mean(axis=1)[:, 0] < np.median(good.nodes[:, 0])
-        return good.replace(triangles=good.triangles[left])
-
-    def noted(cloud, boundary, settings, **others):
-        lengths.append(settings.length)
-        return advance(cloud, boundary, settings, **others)
-
-    monkeypatch.setattr(several, "several_grids", no_rows)
-    monkeypatch.setattr(optimize, "optimize_grid", half)
-    monkeypatch.setattr(fronts, "advance_front", noted)
-    return lengths
-
-
-@pytest.mark.parametrize("method", ["default", "paper"])
-def test_the_front_is_tried_again_with_another_length_where_a_grid_fails(plate, monkeypatch, method):
-    lengths = damaged(monkeypatch, 2)
-    grid = st.grid_from_points(plate, st.Settings(length=1.5, method=method))
-    assert lengths == pytest.approx([1.5 * share for share in pipeline.ATTEMPTS])
-    assert grid.certificate.passed and grid.settings.length == 1.5
-
-
-def test_where_no_attempt_passes_the_fault_of_the_first_whole_grid_is_told(plate, monkeypatch):
-    """Three attempts without rows, three with each other look at the scan (the usual one, three coarser), three by the paper."""
-    lengths = damaged(monkeypatch, 18)
-    with pytest.raises(FrontError, match=r"the grid leaves out .* of the scan") as refused:
-        st.grid_from_points(plate, st.Settings(length=1.5))
-    assert isinstance(refused.value, CertificateError) and len(lengths) == 18
-    assert refused.value.where == refused.value.grid.certificate.faults[0].where
-    assert not refused.value.grid.certificate.passed
-
-
-def test_where_the_default_method_fails_that_of_the_paper_is_tried(plate, monkeypatch):
-    lengths = damaged(monkeypatch, 15)
-    grid = st.grid_from_points(plate, st.Settings(length=1.5))
-    assert len(lengths) == 16 and grid.certificate.passed
-    assert grid.settings == st.Settings(length=1.5, method="paper")
 
 
 @pytest.mark.parametrize("effort", ["quick", "best"])

@@ -16,7 +16,7 @@ from scantruss.clean.pieces import find_loose_pieces
 from scantruss.clean.thinning import thin_to
 from scantruss.cli import main
 from scantruss.kernels import tree as trees
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 
 def spacing_of(shape, count):
@@ -332,16 +332,16 @@ def test_an_e57_file_of_an_unknown_unit_is_said_to_be_in_metres(tmp_path, monkey
 def test_repeats_are_left_out_of_a_grid_where_there_are_many():
     shape = make("scallop", 10_000, duplicates=0.5)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)
-    assert prepare_sites(cloud, own).repeated == 5000
+    assert sample_surface(cloud, own).repeated == 5000
     for kept in (own.replace(clean=False), own.replace(drop_repeated=False)):
-        assert prepare_sites(cloud, kept).repeated == 0
-        assert len(prepare_sites(cloud, kept).surface.points) == 15_000
+        assert sample_surface(cloud, kept).repeated == 0
+        assert len(sample_surface(cloud, kept).surface.points) == 15_000
 
 
 def test_without_cleaning_a_grid_keeps_strays():
     shape = make("scallop", 10_000, outliers=0.1)
     cloud = st.PointCloud.from_array(shape.points)
-    assert prepare_sites(cloud, st.Settings(length=shape.length)).strays > 900
-    assert prepare_sites(cloud, st.Settings(length=shape.length, clean=False)).strays == 0
+    assert sample_surface(cloud, st.Settings(length=shape.length)).strays > 900
+    assert sample_surface(cloud, st.Settings(length=shape.length, clean=False)).strays == 0
     with pytest.raises(st.InputError, match="clean"):
         st.Settings(length=1.0, clean="no")

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 import scantruss as st
-from scantruss import cli, pipeline
+from scantruss import cli
 from scantruss.cli import main
 from scantruss.commands import gridding, showing
 from scantruss.errors import CertificateError, FrontError, words_of_place
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
 from scantruss.options import option_of
+from scantruss.scan import member_length
 from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 
 LENGTH = "4"
@@ -221,11 +222,11 @@ def test_a_length_of_less_than_three_spacings_is_refused_with_one_that_does(plac
     line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
     smallest = float(line.split("at least")[1].split()[0])
     cloud = PointCloud.from_array(plate())
-    pipeline.check_length(cloud, st.Settings(length=smallest))
+    member_length.check_length(cloud, st.Settings(length=smallest))
     spacing = measure_spacing(cloud.points)
-    pipeline.check_length(cloud, st.Settings(length=3.01 * spacing))
+    member_length.check_length(cloud, st.Settings(length=3.01 * spacing))
     with pytest.raises(st.InputError, match="too small"):
-        pipeline.check_length(cloud, st.Settings(length=2.99 * spacing))
+        member_length.check_length(cloud, st.Settings(length=2.99 * spacing))
 
 
 def test_the_gap_is_that_of_a_known_pattern():
@@ -237,9 +238,9 @@ def test_the_gap_is_that_of_a_known_pattern():
 
 @pytest.mark.parametrize("value", [1e-7, 0.0123, 0.99, 1.0, 9.99, 12345.6, 8e9])
 def test_rounding_keeps_two_digits_and_its_direction(value):
-    assert pipeline.round_length(value, "down") <= value * (1 + 1e-9)
-    assert pipeline.round_length(value, "up") >= value * (1 - 1e-9)
-    assert pipeline.round_length(value, "nearest") == pytest.approx(value, rel=0.05)
+    assert member_length.round_length(value, "down") <= value * (1 + 1e-9)
+    assert member_length.round_length(value, "up") >= value * (1 - 1e-9)
+    assert member_length.round_length(value, "nearest") == pytest.approx(value, rel=0.05)
 
 
 def test_a_one_sided_surface_is_refused(place, capsys):
@@ -542,5 +543,5 @@ def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised():
     odd = points.copy()
     odd[np.random.default_rng(0).random(len(odd)) < 0.01] = 0.0
     as_it_is, with_zeros = PointCloud.from_array(points), PointCloud.from_array(odd)
-    assert pipeline.suggest_length(with_zeros) == pytest.approx(pipeline.suggest_length(as_it_is), rel=0.05)
-    assert pipeline.length_range(with_zeros)[1] == pytest.approx(pipeline.length_range(as_it_is)[1], rel=0.05)
+    assert member_length.suggest_length(with_zeros) == pytest.approx(member_length.suggest_length(as_it_is), rel=0.05)
+    assert member_length.length_range(with_zeros)[1] == pytest.approx(member_length.length_range(as_it_is)[1], rel=0.05)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from shapes import make
 from small_clouds import sheet
+from steps import steps_of
 
 import scantruss as st
 from scantruss import boundary
@@ -11,7 +12,7 @@ from scantruss import edge as module
 from scantruss.corners import STEP, find_corners
 from scantruss.curves import heights_along, outward, resample, room_across, runs_around
 from scantruss.edge import ON_THE_EDGE, Chance
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 RADIUS = 8.0
 
@@ -26,7 +27,7 @@ def disc(density, seed=0):
 
 def boundary_of(points, length=1.0, **settings):
     cloud = st.PointCloud.from_array(points)
-    return st.find_boundary(cloud, st.Settings(length=length, **settings)), cloud.origin
+    return steps_of(cloud, st.Settings(length=length, **settings)).boundary, cloud.origin
 
 
 def short_of(places, origin, radius=RADIUS):
@@ -102,7 +103,7 @@ def circle(count, radius=5.0, wave=0.0, waves=0):
 @pytest.fixture(scope="module")
 def plane():
     """The surface of a plate whose normals look up."""
-    surface = prepare_sites(st.PointCloud.from_array(sheet(14, 14, 0.1)), st.Settings(length=1.0)).surface
+    surface = sample_surface(st.PointCloud.from_array(sheet(14, 14, 0.1)), st.Settings(length=1.0)).surface
     return surface._replace(normals=np.tile([0.0, 0.0, 1.0], (len(surface.normals), 1)))
 
 

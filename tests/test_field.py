@@ -10,9 +10,10 @@ from hypothesis import strategies as some
 from marks import compiled_only
 from rough import rough_disc
 from small_clouds import ball, cap, ring, sheet, sites_of
+from steps import boundary_of
 
 import scantruss as st
-from scantruss.boundary import boundary_nodes
+from scantruss.boundary import characteristic_points
 from scantruss.grid.equalize import new_scratch
 from scantruss.kernels import field as kernels
 from scantruss.kernels.boxes import new_boxes
@@ -220,8 +221,8 @@ def test_the_energy_goes_by_the_lengths_desired_at_both_ends():
 def test_boundary_nodes_are_equally_far_apart_in_desired_lengths():
     points = sheet(12.0, 6.0, 0.2)
     settings = Settings(length_field=rows_of(points, across(points, 0.8, 2.0), 300))
-    (loop,) = st.find_boundary(st.PointCloud.from_array(points), settings).loops
-    nodes, is_corner = boundary_nodes(loop, settings.length)
+    (loop,) = boundary_of(st.PointCloud.from_array(points), settings).loops
+    nodes, is_corner = characteristic_points(loop, settings.length)
     assert is_corner.sum() == 4
     sides = np.split(np.arange(len(nodes) + 1), np.flatnonzero(is_corner)[1:])
     for i, side in enumerate(sides):

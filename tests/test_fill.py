@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from marks import compiled_only
 from small_clouds import ball, sheet, tire
+from steps import boundary_of, steps_of
 
 import scantruss as st
-from scantruss.boundary import find_boundary
 from scantruss.fill import _lattice as lattice
 from scantruss.fill import _thin_plate as thin_plate
 from scantruss.fill import fill_holes
@@ -46,11 +46,9 @@ def test_the_surface_goes_on_over_a_hole_of_fifteen_members(name):
     points, middle = opened(name)
     cloud, settings = st.PointCloud.from_array(points), st.Settings(length=1.0)
     holes = [
-        p.points
-        for p in find_boundary(cloud, settings).loops
-        if np.linalg.norm(p.points[0] + cloud.origin - middle) < 4
+        p.points for p in boundary_of(cloud, settings).loops if np.linalg.norm(p.points[0] + cloud.origin - middle) < 4
     ]
-    made_up = fill_holes(find_boundary(cloud, settings).sites, holes) + cloud.origin
+    made_up = fill_holes(steps_of(cloud, settings).sites, holes) + cloud.origin
     _, _, distance, most = SURFACES[name]
     assert np.abs(distance(made_up)).max() < most * 2 * RADIUS
     assert np.linalg.norm(made_up - middle, axis=1).max() < 1.4 * RADIUS
@@ -81,10 +79,10 @@ def test_a_closed_hole_is_covered_and_its_nodes_have_no_deviation(name, method):
 def test_a_hole_longer_than_asked_keeps_its_loop_and_what_is_around_stays():
     points, _ = opened("dome")
     cloud = st.PointCloud.from_array(points)
-    kept, same = (find_boundary(cloud, st.Settings(length=1.0, fill_holes=rim)) for rim in (14.0, None))
-    closed = find_boundary(cloud, st.Settings(length=1.0, fill_holes=17.0))
-    assert len(kept.loops) == 2 and len(closed.loops) == 1
-    for one, other in zip(kept.loops, same.loops, strict=True):
+    kept, same = (steps_of(cloud, st.Settings(length=1.0, fill_holes=rim)) for rim in (14.0, None))
+    closed = steps_of(cloud, st.Settings(length=1.0, fill_holes=17.0))
+    assert len(kept.boundary.loops) == 2 and len(closed.boundary.loops) == 1
+    for one, other in zip(kept.boundary.loops, same.boundary.loops, strict=True):
         assert np.array_equal(one.points, other.points)
     assert closed.sites.measured < len(closed.sites.surface.mean)
     assert kept.sites.measured == len(kept.sites.surface.mean)
@@ -93,9 +91,9 @@ def test_a_hole_longer_than_asked_keeps_its_loop_and_what_is_around_stays():
 def test_the_outer_rim_of_a_small_piece_is_no_hole():
     """A patch whose rim is shorter than the holes that are closed stays what it is; a nearly closed ball closes."""
     patch = st.PointCloud.from_array(sheet(5, 5, 0.12))
-    assert len(find_boundary(patch, st.Settings(length=1.0, fill_holes=30.0)).loops) == 1
+    assert len(boundary_of(patch, st.Settings(length=1.0, fill_holes=30.0)).loops) == 1
     points, _ = opened("sphere")
-    assert len(find_boundary(st.PointCloud.from_array(points), st.Settings(length=1.0, fill_holes=30.0)).loops) == 0
+    assert len(boundary_of(st.PointCloud.from_array(points), st.Settings(length=1.0, fill_holes=30.0)).loops) == 0
 
 
 @pytest.mark.parametrize("reach", [40, 100])
@@ -106,9 +104,9 @@ def test_a_hole_around_a_bend_is_filled(reach):
     points = np.column_stack([3 * np.cos(turn), 3 * np.sin(turn), z])
     points = points[(turn / np.radians(reach)) ** 2 + (z / 3) ** 2 > 1]
     cloud = st.PointCloud.from_array(points)
-    boundary = find_boundary(cloud, st.Settings(length=1.0))
+    sites, boundary, _ = steps_of(cloud, st.Settings(length=1.0))
     hole = [loop.points for loop in boundary.loops if np.abs(loop.points[:, 2] + cloud.origin[2]).max() < 4]
-    made_up = fill_holes(boundary.sites, hole) + cloud.origin
+    made_up = fill_holes(sites, hole) + cloud.origin
     off = np.abs(np.hypot(made_up[:, 0], made_up[:, 1]) - 3)
     assert len(hole) == 1
     assert off.max() < (0.03 if reach == 40 else 0.2) * 6

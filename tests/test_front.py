@@ -8,16 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as strategies
 from small_clouds import HandFront, ball, cap, ring, sheet, tire, turn_of
+from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
 from scantruss import front as driver
-from scantruss.boundary import boundary_nodes
+from scantruss.boundary import characteristic_points
 from scantruss.kernels import front as lists
 from scantruss.kernels import gaps
 from scantruss.kernels.boxes import new_boxes
 from scantruss.kernels.cases import choose_by_case
 from scantruss.kernels.fits import near_nodes
 from scantruss.kernels.triangles import shape_quality
+from scantruss.rows import Rows
 
 METHODS = ("default", "paper")
 
@@ -25,8 +27,7 @@ METHODS = ("default", "paper")
 def advanced(points, length=1.0, **others):
     """Grid and boundary of points; the nodes of the grid relative to its origin."""
     cloud, own = st.PointCloud.from_array(points), st.Settings(length=length, **others)
-    boundary = st.find_boundary(cloud, own)
-    return st.advance_front(cloud, boundary, own), boundary
+    return front_of(cloud, own, Rows() if own.method == "default" else None), boundary_of(cloud, own)
 
 
 def jittered(points, amount=0.02, seed=7):
@@ -110,7 +111,7 @@ def test_every_boundary_segment_is_an_edge_with_one_triangle(name, method):
     rim = {e for e in edges if (e[1], e[0]) not in edges}
     expected = set()
     for loop in boundary.loops:
-        nodes, _ = boundary_nodes(loop, 1.0)
+        nodes, _ = characteristic_points(loop, 1.0)
         ids = [int(((grid.nodes - place) ** 2).sum(axis=1).argmin()) for place in nodes]
         assert grid.nodes[ids] == pytest.approx(nodes, abs=1e-9)
         expected |= set(zip(ids, ids[1:] + ids[:1], strict=True))
@@ -159,7 +160,7 @@ def test_the_step_budget_makes_no_difference(budget, method, monkeypatch):
 def test_the_growth_of_the_arrays_makes_no_difference(name, method, monkeypatch):
     """A front with hardly more room than its boundary needs grows on the way."""
     grid, boundary, points = example(name, method)
-    need = 6 + sum(len(boundary_nodes(loop, 1.0)[0]) for loop in boundary.loops)
+    need = 6 + sum(len(characteristic_points(loop, 1.0)[0]) for loop in boundary.loops)
     large, grow, grown = driver.new_front, driver.grown, []
 
     def small(sites, own):
@@ -405,8 +406,8 @@ class Cancelled(Exception):
 def test_progress_is_reported_and_may_stop_the_front():
     said = []
     cloud, own = st.PointCloud.from_array(sheet(9, 7, 0.2)), st.Settings(length=1.0)
-    boundary = st.find_boundary(cloud, own)
-    st.advance_front(cloud, boundary, own, progress=lambda stage, share: said.append((stage, share)))
+    steps = steps_of(cloud, own)
+    st.advance_front(*steps, own, progress=lambda stage, share: said.append((stage, share)))
     assert {stage for stage, _ in said} == {"front"}
     assert all(0 <= share <= 1 for _, share in said)
 
@@ -414,4 +415,4 @@ def test_progress_is_reported_and_may_stop_the_front():
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        st.advance_front(cloud, boundary, own, progress=stop)
+        st.advance_front(*steps, own, progress=stop)

@@ -1,10 +1,8 @@
 """Work in parts: all of it is done once, side by side, and what goes wrong comes out."""
 
-import gc
 import subprocess
 import sys
 import threading
-import weakref
 
 import numpy as np
 import pytest
@@ -46,11 +44,10 @@ def test_a_processor_may_have_several_parts(monkeypatch, each):
 def test_parts_that_no_thread_comes_to_are_done_by_who_asked(monkeypatch):
     monkeypatch.setattr(machine, "processors", lambda: 2)
     go_on, threads = threading.Event(), []
-    busy = machine.alongside(lambda: go_on.wait(20))
+    machine._pool(1).put(lambda: go_on.wait(20))  # the only other thread is busy
     machine.in_parts(30, 10, lambda *_: threads.append(threading.current_thread()))
     assert threads == 2 * [threading.current_thread()]
     go_on.set()
-    assert busy()
 
 
 @pytest.mark.parametrize("processors", [1, 2, 4])
@@ -70,60 +67,10 @@ def test_two_shares_are_done_at_once_and_the_rest_after_them(monkeypatch, proces
     assert sorted(begun) == shares and begun[2:] == shares[2:]
 
 
-@pytest.mark.parametrize("processors", [1, 2, 4])
-def test_work_alongside_is_done_once_and_its_result_kept(monkeypatch, processors):
-    monkeypatch.setattr(machine, "processors", lambda: processors)
-    done = []
-    results = [machine.alongside(lambda i=i: done.append(i) or 10 * i) for i in range(5)]
-    assert [result() for result in results] == [result() for result in results] == [0, 10, 20, 30, 40]
-    assert sorted(done) == [0, 1, 2, 3, 4]
-
-
-@pytest.mark.parametrize("processors", [1, 2, 4])
-def test_work_alongside_may_have_parts_and_work_alongside_of_its_own(monkeypatch, processors):
-    monkeypatch.setattr(machine, "processors", lambda: processors)
-
-    def work(depth):
-        done = np.zeros(40, int)
-        inner = machine.alongside(lambda: work(depth - 1)) if depth else lambda: 0
-        machine.in_parts(40, 10, lambda part, begin, end: done.__setitem__(slice(begin, end), 1))
-        return done.sum() + inner()
-
-    assert machine.alongside(lambda: work(6))() == 7 * 40
-
-
-@pytest.mark.parametrize("processors", [1, 3])
-def test_what_goes_wrong_alongside_comes_out_when_it_is_asked_for(monkeypatch, processors):
-    monkeypatch.setattr(machine, "processors", lambda: processors)
-    result = machine.alongside(lambda: 1 // 0)
-    for _ in range(2):
-        with pytest.raises(ZeroDivisionError):
-            result()
-
-
 def test_parts_run_side_by_side(monkeypatch):
     monkeypatch.setattr(machine, "processors", lambda: 3)
     all_there = threading.Barrier(3, timeout=20)
     machine.in_parts(30, 10, lambda *_: all_there.wait())  # passes only when three wait at once
-
-
-@pytest.mark.parametrize("processors", [1, 2])
-def test_what_keeps_a_result_goes_with_its_last_name(monkeypatch, processors):
-    monkeypatch.setattr(machine, "processors", lambda: processors)
-
-    class Sites:
-        points = range(10)
-
-    sites = Sites()
-    sites.count = machine.alongside(lambda sites=sites: len(sites.points))
-    assert sites.count() == 10
-    last = weakref.ref(sites)
-    gc.disable()  # a cycle would stay, and all the memory with it, until Python comes to look for some
-    try:
-        del sites
-        assert last() is None
-    finally:
-        gc.enable()
 
 
 @pytest.mark.parametrize("processors", [1, 4])
@@ -141,7 +88,7 @@ def test_what_goes_wrong_in_a_part_comes_out(monkeypatch, processors):
 def test_parts_that_nobody_has_begun_are_left_when_one_goes_wrong(monkeypatch):
     monkeypatch.setattr(machine, "processors", lambda: 2)
     go_on, done = threading.Event(), []
-    busy = machine.alongside(lambda: go_on.wait(20))
+    machine._pool(1).put(lambda: go_on.wait(20))  # the only other thread is busy
 
     def work(part, begin, end):
         done.append(part)
@@ -150,37 +97,28 @@ def test_parts_that_nobody_has_begun_are_left_when_one_goes_wrong(monkeypatch):
     with pytest.raises(ValueError, match="in the first part"):
         machine.in_parts(40, 10, work, each=2)
     go_on.set()
-    assert busy() and done == [0]
-
-
-def test_who_waits_together_gets_one_result(monkeypatch):
-    monkeypatch.setattr(machine, "processors", lambda: 2)
-    go_on, done, found = threading.Event(), [], []
-
-    def work():
-        go_on.wait(20)
-        done.append(1)
-        return done
-
-    result = machine.alongside(work)
-    waiting = [threading.Thread(target=lambda: found.append(result())) for _ in range(3)]
-    for thread in waiting:
-        thread.start()
-    go_on.set()
-    for thread in waiting:
-        thread.join(20)
-    assert len(found) == 3 and all(each is done for each in found) and done == [1]
+    assert done == [0]
 
 
 def test_the_threads_end_with_the_program():
-    """Also where work is still on its way that nobody has asked for."""
     program = (
         "import time; from scantruss import machine; machine.processors = lambda: 2\n"
-        "machine.in_parts(10, 1, lambda *_: None); machine.alongside(lambda: time.sleep(0.2) or print('done'))"
+        "machine.in_parts(10, 1, lambda *_: time.sleep(0.01)); print('done')"
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
-    assert (ended.stdout, ended.stderr) in (("done\n", ""), ("", ""))
+    assert (ended.stdout, ended.stderr) == ("done\n", "")
 
 
-def test_there_is_a_processor():
-    assert machine.processors() >= 1
+@pytest.mark.parametrize("processors", [1, 2, 4])
+def test_works_side_by_side_return_their_results_in_order_and_may_have_parts(monkeypatch, processors):
+    monkeypatch.setattr(machine, "processors", lambda: processors)
+
+    def work(depth):
+        done = np.zeros(40, int)
+        machine.in_parts(40, 10, lambda part, begin, end: done.__setitem__(slice(begin, end), 1))
+        inner = machine.side_by_side(lambda: work(depth - 1), lambda: 2) if depth else (0, 0)
+        return done.sum() + sum(inner)
+
+    assert machine.side_by_side(lambda: work(3), lambda: "b", lambda: work(0)) == (40 * 4 + 2 * 3, "b", 40)
+    with pytest.raises(ZeroDivisionError):
+        machine.side_by_side(lambda: 1, lambda: 1 // 0)

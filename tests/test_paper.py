@@ -11,9 +11,10 @@ import naive
 import numpy as np
 import pytest
 from small_clouds import HandFront, cap, ring, sheet
+from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
-from scantruss.boundary import boundary_nodes
+from scantruss.boundary import characteristic_points
 from scantruss.front import new_front, start_front
 from scantruss.grid.flips import flip_edges
 from scantruss.kernels import cases, fits
@@ -28,7 +29,7 @@ from scantruss.kernels.triangles import (
     shape_quality,
     size_quality,
 )
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 ROOT3 = math.sqrt(3.0)
 A, B = (0.0, 0.0), (1.0, 0.0)  # the candidate segment AB; the unmeshed area is above it
@@ -45,7 +46,7 @@ def three(*place):
 def test_equation_1_a_box_is_larger_than_the_spacing_and_smaller_than_the_smallest_hole():
     settings = st.Settings(length=1.0)
     cloud = st.PointCloud.from_array(sheet(5, 4, 0.2))
-    size = prepare_sites(cloud, settings).boxes.size
+    size = sample_surface(cloud, settings).boxes.size
     assert cloud.spacing < size.max()
     assert size.max() < settings.closed_rim / math.pi  # the diameter of a hole with that rim
 
@@ -401,8 +402,8 @@ def plate_with_hole():
 
 def test_section_3_3_characteristic_points_at_the_desired_length():
     cloud, ways = plate_with_hole()
-    for loop in st.find_boundary(cloud, ways["external"]).loops:
-        nodes, _ = boundary_nodes(loop, 1.0)
+    for loop in boundary_of(cloud, ways["external"]).loops:
+        nodes, _ = characteristic_points(loop, 1.0)
         steps = np.linalg.norm(np.roll(nodes, -1, axis=0) - nodes, axis=1)
         assert steps == pytest.approx(1.0, abs=0.08)
 
@@ -410,9 +411,9 @@ def test_section_3_3_characteristic_points_at_the_desired_length():
 @pytest.mark.parametrize("way", ["external", "all"])
 def test_section_3_6_internal_boundaries_are_active_or_inactive(way):
     cloud, ways = plate_with_hole()
-    boundary = st.find_boundary(cloud, ways[way])
+    sites, boundary, constraints = steps_of(cloud, ways[way])
     assert (len(boundary.external), len(boundary.internal)) == (1, 1)
-    front = start_front(new_front(boundary.sites, ways[way]), boundary, ways[way])
+    front = start_front(new_front(sites, ways[way]), sites, boundary, constraints, ways[way])
     count = front.count[lists.SEGMENTS]
     away = np.linalg.norm(front.nodes[front.tail[:count], :2], axis=1)
     assert (front.state[:count][away > 4] == lists.ACTIVE).all()
@@ -424,7 +425,7 @@ def test_section_3_6_internal_boundaries_are_active_or_inactive(way):
 def test_section_3_6_where_the_front_starts(way):
     """The first triangles lie at the external boundary, or at both; in the end both boundaries are those of the grid."""
     cloud, ways = plate_with_hole()
-    grid = st.advance_front(cloud, st.find_boundary(cloud, ways[way]), ways[way])
+    grid = front_of(cloud, ways[way])
     away = np.linalg.norm(grid.nodes + grid.origin, axis=1)
     first = away[grid.triangles[:50]].min(axis=1)
     assert (first < 2.1).any() == (way == "all")
@@ -437,7 +438,7 @@ def test_section_3_6_where_the_front_starts(way):
 def test_figure_4_the_front_advances_until_nothing_is_left_to_advance():
     cloud = st.PointCloud.from_array(cap(5.0, 1.2, 0.2))
     settings = st.Settings(length=1.0, method="paper")
-    grid = st.advance_front(cloud, st.find_boundary(cloud, settings), settings)
+    grid = front_of(cloud, settings)
     assert naive.faults(grid.triangles) == []
     assert naive.topology(grid.triangles) == (1, 1, 1)
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
@@ -449,8 +450,7 @@ def test_section_3_5_nodes_are_points_of_the_cloud():
     """In the paper's own method every node that is not of the boundary is a measured point."""
     cloud = st.PointCloud.from_array(ring(0.0, 6.0, 0.2))
     settings = st.Settings(length=1.0, method="paper")
-    boundary = st.find_boundary(cloud, settings)
-    grid = st.advance_front(cloud, boundary, settings)
+    grid = front_of(cloud, settings)
     inner = np.setdiff1d(np.arange(len(grid.nodes)), np.concatenate(grid.boundary_loops))
     measured = {tuple(p) for p in cloud.points.tolist()}
     share = np.mean([tuple(p) in measured for p in grid.nodes[inner].tolist()])
@@ -498,7 +498,7 @@ def test_section_4_2_the_front_does_not_know_of_fixed_nodes():
     cloud = st.PointCloud.from_array(scan_of_a_dome())
     plain = st.Settings(length=1.0, method="paper")
     fixing = plain.replace(fixed=[tuple(cloud.points[5] + cloud.origin)])
-    a, b = (st.advance_front(cloud, st.find_boundary(cloud, s), s) for s in (plain, fixing))
+    a, b = (front_of(cloud, s) for s in (plain, fixing))
     assert a.nodes.tobytes() == b.nodes.tobytes() and a.triangles.tobytes() == b.triangles.tobytes()
 
 

@@ -6,13 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from marks import compiled_only
 from shapes import make
+from steps import steps_of
 
-from scantruss import PointCloud, Settings, find_boundary, grid_from_points, pipeline
+from scantruss import PointCloud, Settings, candidates, grid_from_points
 from scantruss.errors import FrontError
 from scantruss.kernels.quadric import COLUMNS, WEIGHT
 from scantruss.kernels.ridges import FOUND, TERMS, fit_fold, fold_error, turned_frame
 from scantruss.lines.ridges import Tracer, find_ridges, is_ridge, join_ends
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
 
@@ -35,7 +36,7 @@ def box(count=40_000, half=15.0, noise=0.02):
 
 def ridges_of(points, length=SIZE, **others):
     settings = Settings(length=length, **others)
-    return find_ridges(prepare_sites(PointCloud.from_array(points), settings), settings)
+    return find_ridges(sample_surface(PointCloud.from_array(points), settings), settings)
 
 
 def line_nodes(grid):
@@ -101,7 +102,7 @@ def test_without_a_ridge_nothing_changes_and_zero_turns_the_search_off():
     assert np.array_equal(first.nodes, second.nodes) and np.array_equal(first.triangles, second.triangles)
     gable = PointCloud.from_array(make("gable", 20_000).points)
     for others in ({"ridge_angle": 0.0}, {"ridge_angle": 100.0}, {"method": "paper"}):
-        assert len(find_boundary(gable, Settings(length=5.0, **others)).lines.curves) == 0
+        assert len(steps_of(gable, Settings(length=5.0, **others)).constraints.lines.curves) == 0
 
 
 def test_a_ridge_is_found_through_noise_and_in_any_pose():
@@ -122,14 +123,14 @@ def _origin(points):
 @compiled_only
 def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch):
     shape = make("gable", 20_000)
-    real = pipeline.certified
+    real = candidates.certified
 
     def refuse_lines(grid, *others):
         if len(grid.lines):
             raise FrontError("no", grid)
         return real(grid, *others)
 
-    monkeypatch.setattr(pipeline, "certified", refuse_lines)
+    monkeypatch.setattr(candidates, "certified", refuse_lines)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
     assert len(grid.lines) == 0 and grid.settings.ridge_angle == 0.0
 
@@ -198,7 +199,7 @@ def test_a_fold_is_measured_where_it_is():
         points = np.column_stack([xy, -slope * np.abs(xy[:, 0])])
         settings = Settings(length=1.0)
         cloud = PointCloud.from_array(points)
-        tracer = Tracer(prepare_sites(cloud, settings), settings)
+        tracer = Tracer(sample_surface(cloud, settings), settings)
         found = np.zeros(FOUND)
         for x in (-0.2, 0.0, 0.25):
             place = np.array([x, 0.3, -slope * abs(x)]) - cloud.origin

@@ -1,7 +1,5 @@
 """Rows: a lattice of one length along a smooth direction field, which turns and moves with the scan."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,21 +8,23 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from shapes import make
 from small_clouds import ball, sheet
+from steps import front_of, rows_of, steps_of
 
 import scantruss as st
 from scantruss import machine
 from scantruss import rows as laying
 from scantruss.kernels import rows as kernels
-from scantruss.rows import Rows, first_row, lay_rows, make_levels
+from scantruss.rows import Rows, first_row, make_levels, orientation_fields
 
 UP = (0.0, 0.0, 1.0)
 angles = some.floats(0.0, 6.3)
 places = some.tuples(some.floats(-5, 5), some.floats(-5, 5))
 
 
-def boundary_of(points, length):
+def scanned(points, length):
+    """The cloud of some points, and the steps before the front."""
     cloud = st.PointCloud.from_array(points)
-    return cloud, st.find_boundary(cloud, st.Settings(length=length))
+    return cloud, steps_of(cloud, st.Settings(length=length))
 
 
 def direction(angle):
@@ -76,8 +76,8 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
 def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
     monkeypatch.setattr(laying, "MANY", 300)
     points = sheet(12.0, 8.0, 0.15, seed=1) if name == "plate" else ball(3.0, 8000)
-    _, boundary = boundary_of(points, 0.5)
-    levels, _, shares = make_levels(boundary.sites.surface, 0.5)
+    _, scan = scanned(points, 0.5)
+    levels, _, shares = make_levels(scan.sites.surface, 0.5)
     assert len(shares[0]) == 3 and len(shares[-1]) == 1
     for posts, share in zip(levels, shares, strict=True):
         assert sorted(np.concatenate(share).tolist()) == list(range(len(posts.mean)))
@@ -95,8 +95,8 @@ def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch)
     found = []
     for count in (2, processors):
         monkeypatch.setattr(machine, "processors", lambda count=count: count)
-        _, boundary = boundary_of(sheet(12.0, 8.0, 0.2, seed=3), 1.0)
-        found.append(lay_rows(boundary, 1.0, Rows(20.0)))
+        _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=3), 1.0)
+        found.append(rows_of(scan, 1.0, Rows(20.0)))
     assert found[0].places.tobytes() == found[1].places.tobytes()
 
 
@@ -104,8 +104,8 @@ def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch)
 @pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125), (3, 0.125), (4, 0.0)])
 def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, left_out):
     """All lie on it. Up to an eighth of its nodes are nearest to no post and are left out: the front makes these itself."""
-    _, boundary = boundary_of(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)
-    nodes = lay_rows(boundary, 1.0, Rows())
+    _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)
+    nodes = rows_of(scan, 1.0, Rows())
     away, near = cKDTree(nodes.places).query(nodes.places, k=7)
     inside = (np.abs(nodes.places[:, :2]) < [4.5, 2.5]).all(axis=1)
     assert inside.sum() > 40
@@ -121,9 +121,9 @@ def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, 
 
 @pytest.mark.parametrize("turn", [10.0, 30.0])
 def test_rows_turn_as_they_are_told(turn):
-    _, boundary = boundary_of(sheet(12.0, 8.0, 0.2), 1.0)
-    _, straight, node = first_row(boundary, 1.0, 0.0)
-    _, turned, same = first_row(boundary, 1.0, turn)
+    _, scan = scanned(sheet(12.0, 8.0, 0.2), 1.0)
+    _, straight, node = first_row(scan.sites, scan.boundary, 1.0, 0.0)
+    _, turned, same = first_row(scan.sites, scan.boundary, 1.0, turn)
     assert node == same
     cosine = np.dot(straight, turned) / np.linalg.norm(straight) / np.linalg.norm(turned)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(turn, abs=1e-6)
@@ -132,11 +132,11 @@ def test_rows_turn_as_they_are_told(turn):
 @pytest.mark.parametrize("name", ["scallop", "sphere", "torus", "two_holes", "saddle"])
 def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
     shape = make(name, 20_000)
-    _, boundary = boundary_of(shape.points, shape.length)
+    _, scan = scanned(shape.points, shape.length)
     found = {}
     keep, laying._chosen = laying._chosen, lambda posts, owner, length: found.update(posts=posts)
     try:
-        lay_rows(boundary, shape.length, Rows())
+        rows_of(scan, shape.length, Rows())
     finally:
         laying._chosen = keep
     posts = found["posts"]
@@ -154,8 +154,8 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
 
 def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
     shape = make("cloth", 20_000)
-    _, boundary = boundary_of(shape.points, shape.length)
-    surface = boundary.sites.surface
+    _, scan = scanned(shape.points, shape.length)
+    surface = scan.sites.surface
     levels, owners, _ = make_levels(surface, shape.length)
     assert len(levels) == len(owners) > 2
     places = surface.mean
@@ -172,50 +172,36 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
         places = posts.mean
 
 
-def test_rows_laid_side_by_side_on_the_same_posts_are_those_laid_alone():
+def test_fields_made_together_are_those_made_alone():
     shape = make("cloth", 20_000)
-    _, boundary = boundary_of(shape.points, shape.length)
-    ways = [Rows(10.0 * turn) for turn in range(4)]
-    with ThreadPoolExecutor(4) as pool:
-        together = list(pool.map(lambda way: lay_rows(boundary, shape.length, way), ways))
-    assert list(boundary.sites.posts) == [shape.length]
-    for way, nodes in zip(ways, together, strict=True):
-        alone = lay_rows(boundary_of(shape.points, shape.length)[1], shape.length, way)
-        assert nodes.places.tobytes() == alone.places.tobytes()
-    assert len({nodes.places.tobytes() for nodes in together}) == 4
+    _, scan = scanned(shape.points, shape.length)
+    ways = [Rows(10.0 * turn, scale) for turn in range(3) for scale in (1.0, 1.02)]
+    together = orientation_fields(scan.sites, scan.boundary, st.Settings(length=shape.length), ways)
+    for way, field in zip(ways, together, strict=True):
+        assert field.way == way
+        alone = rows_of(scanned(shape.points, shape.length)[1], shape.length, way)
+        assert field.nodes.places.tobytes() == alone.places.tobytes()
+    assert len({field.nodes.places.tobytes() for field in together}) == len(ways)
 
 
-def test_posts_begun_ahead_are_those_of_the_rows():
-    shape = make("cloth", 20_000)
-    cloud = st.PointCloud.from_array(shape.points)
-    asked = st.Settings(length=shape.length)
-    laying.begin_rows(cloud, asked)
-    boundary = st.find_boundary(cloud, asked)
-    (begun,) = boundary.sites.posts.values()
-    levels, owners, _ = make_levels(boundary.sites.surface, shape.length)
-    for posts, owner, again, same in zip(*begun()[:2], levels, owners, strict=True):
-        assert owner.tolist() == same.tolist() and posts.neighbors.tolist() == again.neighbors.tolist()
-        assert posts.mean.tobytes() == again.mean.tobytes()
-    nodes = lay_rows(boundary, shape.length, Rows())
-    assert list(boundary.sites.posts.values()) == [begun]
-    alone = lay_rows(boundary_of(shape.points, shape.length)[1], shape.length, Rows())
-    assert nodes.places.tobytes() == alone.places.tobytes()
-
-
-def test_no_posts_are_begun_where_no_rows_are_laid():
-    shape = make("cloth", 20_000)
-    cloud, asked = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length, method="paper")
-    laying.begin_rows(cloud, asked)
-    assert not st.find_boundary(cloud, asked).sites.posts
+@pytest.mark.parametrize("effort", ["quick", "normal", "best"])
+def test_no_rows_are_laid_by_the_paper_or_where_lengths_differ(effort):
+    points = sheet(12.0, 8.0, 0.2)
+    for asked in (
+        st.Settings(length=1.0, method="paper", effort=effort),
+        st.Settings(length_field=[(x, 0.0, 0.0, 1.0 + abs(x) / 8) for x in (-5.0, 0.0, 5.0)], effort=effort),
+    ):
+        scan = steps_of(st.PointCloud.from_array(points), asked)
+        assert all(field.nodes is None for field in orientation_fields(scan.sites, scan.boundary, asked))
 
 
 def test_nodes_of_rows_keep_apart_and_lie_near_the_scan():
     points = ball(5.0, 20_000)
-    _, boundary = boundary_of(points, 1.0)
-    nodes = lay_rows(boundary, 1.0, Rows())
+    _, scan = scanned(points, 1.0)
+    nodes = rows_of(scan, 1.0, Rows())
     assert len(nodes.places) == pytest.approx(4 * np.pi * 25 / (0.866 * 1.02**2), rel=0.1)
     assert cKDTree(nodes.places).query(nodes.places, k=2)[0][:, 1].min() >= 0.6 * 1.02 - 1e-9
-    assert abs(np.linalg.norm(nodes.places + boundary_of(points, 1.0)[0].origin, axis=1) - 5.0).max() < 0.2
+    assert abs(np.linalg.norm(nodes.places + scanned(points, 1.0)[0].origin, axis=1) - 5.0).max() < 0.2
     assert (nodes.normals * (nodes.places / 5.0)).sum(axis=1).min() > 0.9
 
 
@@ -223,18 +209,18 @@ def test_rows_turn_and_move_with_the_scan():
     shape = make("clam", 20_000)
     turn = Rotation.from_rotvec([0.3, -0.8, 0.5])
     moved = turn.apply(shape.points) + [10.0, 20.0, -30.0]
-    (one, first), (two, second) = (boundary_of(points, shape.length) for points in (shape.points, moved))
-    a, b = (lay_rows(boundary, shape.length, Rows(10.0)) for boundary in (first, second))
+    (one, first), (two, second) = (scanned(points, shape.length) for points in (shape.points, moved))
+    a, b = (rows_of(scan, shape.length, Rows(10.0)) for scan in (first, second))
     expected = turn.apply(a.places + one.origin) + [10.0, 20.0, -30.0]
     assert np.abs(b.places + two.origin - expected).max() < 1e-7 * shape.length
 
 
 def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
     shape = make("scallop")
-    cloud, boundary = boundary_of(shape.points, shape.length)
+    cloud, scan = scanned(shape.points, shape.length)
     own = st.Settings(length=shape.length)
-    nodes = lay_rows(boundary, shape.length, Rows())
-    with_rows, without = (st.advance_front(cloud, boundary, own, rows=rows) for rows in (Rows(), None))
+    nodes = rows_of(scan, shape.length, Rows())
+    with_rows, without = (front_of(cloud, own, way) for way in (Rows(), None))
     away = cKDTree(with_rows.nodes).query(nodes.places)[0]
     assert (away < 1e-9).mean() > 0.8
     assert with_rows.quality.valence6 > without.quality.valence6
@@ -242,11 +228,11 @@ def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
 
 
 def test_a_closed_surface_begins_with_a_triangle_of_rows():
-    cloud, boundary = boundary_of(ball(5.0, 20_000), 1.0)
-    grid = st.advance_front(cloud, boundary, st.Settings(length=1.0))
+    cloud, scan = scanned(ball(5.0, 20_000), 1.0)
+    grid = front_of(cloud, st.Settings(length=1.0), Rows())
     first = np.linalg.norm(np.diff(grid.nodes[grid.triangles[0]][[0, 1, 2, 0]], axis=0), axis=1)
     assert first == pytest.approx(1.02, abs=0.1)
-    nodes = lay_rows(boundary, 1.0, Rows())
+    nodes = rows_of(scan, 1.0, Rows())
     assert cKDTree(nodes.places).query(grid.nodes[grid.triangles[0]])[0].max() < 1e-9
 
 
@@ -254,5 +240,5 @@ def test_appointed_positions_are_nodes_of_the_front():
     cloud = st.PointCloud.from_array(sheet(12.0, 8.0, 0.2))
     wanted = [(0.3, 0.2, 0.0), (3.1, -1.7, 0.0), (-4.4, 2.2, 0.0)]
     own = st.Settings(length=1.0, fixed=wanted)
-    grid = st.advance_front(cloud, st.find_boundary(cloud, own), own)
+    grid = front_of(cloud, own, Rows())
     assert cKDTree(grid.nodes + grid.origin).query(wanted)[0].max() < 1e-12

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from steps import boundary_of
 
 import scantruss as st
 from scantruss import ahead
@@ -135,7 +136,7 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     for grid in (found, whole):
         for loop, true in zip(grid.boundary_loops, (140 / 4, 2 * np.pi * HOLE[2] / 4), strict=True):
             assert abs(len(loop) - true) <= 1.5
-    rims = [st.find_boundary(*each).loops for each in ((cloud, thinned), (st.PointCloud.from_array(points), settings))]
+    rims = [boundary_of(*each).loops for each in ((cloud, thinned), (st.PointCloud.from_array(points), settings))]
     for one, other in zip(*rims, strict=True):
         assert one.length == pytest.approx(other.length, rel=0.002) and len(one.corners) == len(other.corners)
     assert abs(rim_of(whole)) < 0.003  # of the true rim

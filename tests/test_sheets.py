@@ -6,15 +6,15 @@ from hard_scans import hard
 from hypothesis import given, strategies
 from marks import compiled_only
 from small_clouds import sheet
+from steps import steps_of
 
 import scantruss as st
-from scantruss.boundary import find_boundary
 from scantruss.grid.proof import certify
 from scantruss.grid.sheets import faults_on_sheets, nodes_of_sites
 from scantruss.kernels import boundary as kernels
 from scantruss.kernels import normals as facing
 from scantruss.pipeline import grid_from_cloud
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -22,8 +22,8 @@ def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed):
     """Turns .5 to .9 members apart."""
     shape = hard("rolled", seed)
     cloud = st.PointCloud.from_array(shape.points)
-    boundary = find_boundary(cloud, st.Settings(length=shape.length))
-    surface = boundary.sites.surface
+    sites, boundary, _ = steps_of(cloud, st.Settings(length=shape.length))
+    surface = sites.surface
     site, place = np.nonzero(surface.neighbors >= 0)
     middle = 0.5 * (surface.mean[site] + surface.mean[surface.neighbors[site, place]]) + cloud.origin
     assert shape.distance(middle[::7]).max() < 0.1 * shape.length
@@ -51,7 +51,7 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next():
     settings = st.Settings(length=1.0, effort="quick")
     both = grid_from_cloud(cloud, settings)
     assert both.topology.components == 2
-    sites = prepare_sites(cloud, settings)
+    sites = sample_surface(cloud, settings)
     assert faults_on_sheets(both, sites, nodes_of_sites(both, sites, 1.0)) == []
     lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
     used, numbered = np.unique(lower, return_inverse=True)
@@ -111,7 +111,7 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     """The members across a line are gone; nodes on both sides are near in space, far in the grid."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
-    grid, sites = grid_from_cloud(cloud, settings), prepare_sites(cloud, settings)
+    grid, sites = grid_from_cloud(cloud, settings), sample_surface(cloud, settings)
     assert faults_on_sheets(grid, sites, nodes_of_sites(grid, sites, 1.0)) == []
     x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
     slit = (abs(x) < 0.6) & (y < 1.5)
@@ -124,9 +124,9 @@ def test_certificates_of_one_scan_can_be_made_side_by_side():
     """They leave alone what look-ups write to: two threads in one queue had led to nowhere."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(6, 6, 0.15, seed=3))
-    grid, boundary = grid_from_cloud(cloud, settings), find_boundary(cloud, settings)
-    surface = boundary.sites.surface
+    grid, (sites, boundary, _) = grid_from_cloud(cloud, settings), steps_of(cloud, settings)
+    surface = sites.surface
     before = [array.copy() for array in (surface.stamp, surface.queue, surface.counter)]
-    assert certify(grid, boundary, settings).passed
+    assert certify(grid, sites, boundary, settings).passed
     for array, kept in zip((surface.stamp, surface.queue, surface.counter), before, strict=True):
         assert (array == kept).all()

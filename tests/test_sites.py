@@ -10,14 +10,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import make
 from small_clouds import ball, cap, sheet, sites_of, tire, turn_of
+from steps import boundary_of
 
-from scantruss import InputError, PointCloud, Settings, find_boundary, grid_from_points
+from scantruss import InputError, PointCloud, Settings, grid_from_points
 from scantruss.kernels.boxes import new_boxes
 from scantruss.kernels.normals import cut_steep_links, link_weights, orient_normals, site_normals, smooth_normals
 from scantruss.kernels.sites import choose_sites, group_points, nearest_sites, put_all, settle_points
 from scantruss.scan import linked as module
 from scantruss.scan.cloud import bounds_of
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal"])
@@ -205,20 +206,20 @@ def test_all_normals_of_a_two_sided_surface_are_on_one_side(name):
     surface, pairs = linked(shape.points, shape.length)
     agree = (surface.normals[pairs[:, 0]] * surface.normals[pairs[:, 1]]).sum(axis=1)
     assert (agree > 0).all()
-    find_boundary(PointCloud.from_array(shape.points), Settings(length=shape.length))  # is not refused
+    boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))  # is not refused
 
 
 def test_one_sided_surfaces_are_refused():
     shape = make("moebius", 20_000)
     with pytest.raises(InputError, match="one-sided"):
-        find_boundary(PointCloud.from_array(shape.points), Settings(length=shape.length))
+        boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed):
     shape = make("moebius", 12_000, seed=seed, pose=True, scale=0.01)
     with pytest.raises(InputError, match="one-sided"):
-        find_boundary(PointCloud.from_array(shape.points), Settings(length=1.2 * shape.length))
+        boundary_of(PointCloud.from_array(shape.points), Settings(length=1.2 * shape.length))
 
 
 @pytest.mark.kernels
@@ -328,10 +329,10 @@ def test_the_area_is_about_right():
 @pytest.mark.kernels
 def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay():
     cloud = PointCloud.from_array(sheet(4, 3, 0.25))
-    first = prepare_sites(cloud, Settings(length=1.0))
-    assert prepare_sites(cloud, Settings(length=1.0, method="paper")) is first
-    assert prepare_sites(cloud, Settings(length=1.5)) is not first
-    assert prepare_sites(PointCloud.from_array(sheet(4, 3, 0.25)), Settings(length=1.0)) is not first
+    first = sample_surface(cloud, Settings(length=1.0))
+    assert sample_surface(cloud, Settings(length=1.0, method="paper")) is first
+    assert sample_surface(cloud, Settings(length=1.5)) is not first
+    assert sample_surface(PointCloud.from_array(sheet(4, 3, 0.25)), Settings(length=1.0)) is not first
 
 
 @pytest.mark.kernels

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies
 from small_clouds import ball, cap, sheet, sites_of
+from steps import steps_of
 
 import scantruss as st
 from scantruss.kernels.boundary import come_nearer
 from scantruss.kernels.normals import mark_uneven
-from scantruss.scan import linked
-from scantruss.scan import sites as sites_module
 from scantruss.scan.linked import link_sites
-from scantruss.scan.sites import SPARSE, begin_sites, prepare_sites, sites_with, with_whole_rim
+from scantruss.scan.sites import SPARSE, sample_surface, sites_with, with_whole_rim
 from scantruss.settings import SITE, SMOOTH_SITE
 
 
@@ -66,34 +65,12 @@ def test_any_other_scan_has_the_usual_ones(name):
     assert sites.strays == asked.strays
 
 
-@pytest.mark.parametrize("name", [*SMOOTH, *OTHER])
-def test_sites_begun_before_the_spacing_is_known_are_the_same(name, monkeypatch):
-    points, asked, chosen = (SMOOTH | OTHER)[name](), st.Settings(length=1.0), []
-    choose, alone = linked.sites_of_points, sites_of(points)
-    for module in (sites_module, linked):
-        monkeypatch.setattr(module, "sites_of_points", lambda *words: chosen.append(words) or choose(*words))
-    cloud = st.PointCloud.from_array(points)
-    begin_sites(cloud, asked)
-    begun = prepare_sites(cloud, asked)
-    assert begun.surface.mean.tobytes() == alone.surface.mean.tobytes()
-    assert begun.surface.points.tobytes() == alone.surface.points.tobytes()
-    assert begun.smooth == alone.smooth and begun.strays == alone.strays
-    assert name not in SMOOTH or len(chosen) == 1  # what was begun is what was used
-
-
-def test_no_sites_are_begun_of_a_sparse_scan_or_where_their_size_is_asked_for():
-    for step, asked in ((4 * SPARSE, st.Settings(length=1.0)), (0.05, st.Settings(length=1.0, box_size=0.2))):
-        cloud = st.PointCloud.from_array(sheet(8, 8, step))
-        begin_sites(cloud, asked)
-        assert cloud not in sites_module._BEGUN
-
-
 @pytest.mark.parametrize("angle", [42, 50, 70, 110])
 @pytest.mark.parametrize("seed", range(3))
 def test_no_ridge_is_missed_because_a_scan_looks_smooth(angle, seed):
     """One as long as the shortest that is looked for, in a plain scan."""
-    boundary = st.find_boundary(st.PointCloud.from_array(roof(angle, 3.5, 300, seed)), st.Settings(length=1.0))
-    assert not boundary.sites.smooth and boundary.lines.sharp.sum() == 1
+    steps = steps_of(st.PointCloud.from_array(roof(angle, 3.5, 300, seed)), st.Settings(length=1.0))
+    assert not steps.sites.smooth and steps.constraints.lines.sharp.sum() == 1
 
 
 def test_flatter_ridges_that_are_asked_for_are_seen():
@@ -154,11 +131,11 @@ def test_places_find_the_site_nearest_to_them_from_any_near_by():
 def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned():
     """A dense plate; what is added is no smooth surface. All points near the rim are still found, and no larger sites tried."""
     cloud, settings = st.PointCloud.from_array(sheet(8, 8, 0.015)), st.Settings(length=1.0)
-    sites = prepare_sites(cloud, settings)
+    sites = sample_surface(cloud, settings)
     assert sites.smooth and sites.whole is not None and len(sites.surface.points) < 0.1 * len(cloud.points)
     rng = np.random.default_rng(1)
     rough = rng.uniform(-0.5, 0.5, (4000, 3)) * [1, 1, 0.6]
-    filled = sites_with(sites, rough, cloud, settings)
+    filled = sites_with(sites, rough, settings)
     assert not filled.smooth and filled.apart == sites.apart
     rim = np.column_stack([np.full(80, 4.0), np.linspace(-4, 4, 80), np.zeros(80)]) - cloud.origin
     taken = set(map(tuple, with_whole_rim(filled, filled.surface, rim).points.tolist()))

@@ -11,7 +11,7 @@ from scantruss.kernels import sites as kernels
 from scantruss.kernels import strays as kernels_of_strays
 from scantruss.kernels.boxes import new_boxes
 from scantruss.scan.cloud import measure_gap
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 
 
 def marked(name, count, **options):
@@ -76,16 +76,16 @@ def test_a_scan_without_strays_is_not_searched(monkeypatch):
 
     monkeypatch.setattr("scantruss.scan.sites.find_strays", never)
     shape = make("scallop", 20_000)
-    assert prepare_sites(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).strays == 0
+    assert sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).strays == 0
 
 
 def test_strays_are_counted_left_out_and_kept_if_asked():
     shape = make("scallop", 20_000, outliers=0.05)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)
-    cleaned = prepare_sites(cloud, own)
+    cleaned = sample_surface(cloud, own)
     assert 0.9 * 1000 < cleaned.strays < 1010
     assert len(cleaned.surface.points) == len(shape.points) - cleaned.strays
-    kept = prepare_sites(cloud, own.replace(stray_distance=0.0))
+    kept = sample_surface(cloud, own.replace(stray_distance=0.0))
     assert kept.strays == 0 and len(kept.surface.points) == len(shape.points)
 
 

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st_
 from shapes import make
+from steps import boundary_of
 
 import scantruss as st
 from scantruss import machine
-from scantruss.boundary import find_boundary
 from scantruss.scan import streamline
 from scantruss.scan.cloud import bounds_of
-from scantruss.scan.sites import prepare_sites
+from scantruss.scan.sites import sample_surface
 from scantruss.scan.streamline import is_dense, points_near, streamlined
 
 
@@ -50,7 +50,7 @@ def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
 def test_a_scan_as_dense_as_its_patches_need_is_taken_whole():
     assert not is_dense(0.5, 1.0) and is_dense(0.3, 1.0) and not is_dense(0.0, 1.0)
     shape = make("cloth", 20_000, seed=0)
-    sites = prepare_sites(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
+    sites = sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
     assert len(sites.surface.points) == 20_000
 
 
@@ -59,7 +59,7 @@ def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
     shape = make("l_plate", 300_000, seed=2)
     settings = st.Settings(length=1.5 * shape.length, effort="quick")
     cloud = st.PointCloud.from_array(shape.points)
-    sites = prepare_sites(cloud, settings)
+    sites = sample_surface(cloud, settings)
     assert len(sites.surface.points) < 100_000
     grid = st.grid_from_points(shape.points, settings)
     assert (grid.topology.boundary_loops, grid.topology.euler) == (len(shape.loops), shape.euler)
@@ -75,9 +75,9 @@ def test_the_rim_of_a_dense_scan_is_found_with_all_its_points():
     angle, radius = rng.uniform(0, 2 * np.pi, 400_000), 10.0 * np.sqrt(rng.uniform(0, 1, 400_000))
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(400_000)])
     cloud, settings = st.PointCloud.from_array(points), st.Settings(length=2.0)
-    sites = prepare_sites(cloud, settings)
+    sites = sample_surface(cloud, settings)
     assert sites.whole is not None and len(sites.surface.points) < 60_000
-    (loop,) = find_boundary(cloud, settings).loops
+    (loop,) = boundary_of(cloud, settings).loops
     inside = 10.0 - np.linalg.norm((loop.points + cloud.origin)[:, :2], axis=1)
     assert -0.001 < inside.mean() < 0.012  # a spacing is .016
 

@@ -1,4 +1,4 @@
-"""Boundary of a point cloud: ordered loops, corners and the nodes on them (Sec. 3.3, 3.6)."""
+"""Boundary of a point cloud: ordered loops, corners and the characteristic points on them (Sec. 3.3, 3.6)."""
 
 from __future__ import annotations
 
@@ -17,17 +17,13 @@ from .kernels.field import lengths_along
 from .kernels.rim import Rim
 from .kernels.seat import nearest_site
 from .kernels.surface import Surface, walk
-from .lines.find import find_lines
-from .lines.network import NO_LINES, Lines
 from .machine import in_parts
 from .rolls import boundary_loops
-from .scan.cloud import PointCloud
 from .scan.orientation import check_two_sided
 from .scan.sites import (
     Sites,
     broad_normals,
     is_graded,
-    prepare_sites,
     sites_with,
     with_own_scratch,
     with_whole_rim,
@@ -70,11 +66,9 @@ class Loop:
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """All boundary loops of a cloud, the lines between them, and the sites they were found in."""
+    """All boundary loops of a cloud."""
 
     loops: tuple[Loop, ...]
-    sites: Sites
-    lines: Lines = NO_LINES  #: fixed lines and ridges
 
     @property
     def external(self) -> tuple[Loop, ...]:
@@ -111,12 +105,13 @@ class Boundary:
         )
 
 
-def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress | None = None) -> Boundary:
-    """Return the ordered boundary loops of a cloud (Sec. 3.3).
+def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None = None) -> tuple[Sites, Boundary]:
+    """Return the ordered boundary loops of a scan (Sec. 3.3), and its samples with small holes closed (Sec. 3.6).
 
     Parameters
     ----------
-    cloud : PointCloud
+    sites : Sites
+        The surface samples of the scan.
     settings : Settings
         `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`.
     progress : callable, optional
@@ -124,7 +119,9 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
 
     Returns
     -------
-    Boundary
+    sites : Sites
+        Those given, with made-up ones over the holes that are closed.
+    boundary : Boundary
         External loops first, each piece's longest loop being external; empty for a closed surface.
 
     Raises
@@ -132,7 +129,6 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     InputError
         The scan falls apart into pieces that are all smaller than a member.
     """
-    sites = prepare_sites(cloud, settings)
     if sites.area == 0.0:
         raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
     check_two_sided(sites.surface, sites.thickness)
@@ -142,13 +138,11 @@ def find_boundary(cloud: PointCloud, settings: Settings, *, progress: Progress |
     holes = [loop for loop in loops if loop.length < settings.closed_rim and _is_hole(loop, sites)]
     if holes:
         made_up = fill_holes(sites, [loop.points for loop in holes])
-        sites = sites_with(sites, made_up, cloud, settings)
+        sites = sites_with(sites, made_up, settings)
         loops = _external_first([loop for loop in _find_loops(sites, settings) if not _over_filling(loop, sites)])
     if progress:
         progress("boundary", 1.0)
-    lines = find_lines(cloud, [(loop.points, loop.corner_at) for loop in loops], sites, settings)
-    with_stops = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(loops))
-    return Boundary(with_stops, sites, lines)
+    return sites, Boundary(loops)
 
 
 def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
@@ -314,8 +308,8 @@ def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
     return tuple(sorted(marked, key=lambda p: (not p.external, -p.length)))
 
 
-def boundary_nodes(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Characteristic points of a loop: nodes about `length` apart, equally between corners, corners being nodes.
+def characteristic_points(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the characteristic points of a loop (Sec. 3.3): about `length` apart, equally between corners, corners among them.
 
     With a length field they are equally far apart in desired lengths: in the integral of ds / l. The ends of lines are nodes too.
 

@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from .boundary import Boundary, boundary_nodes
+from .boundary import Boundary, characteristic_points
 from .errors import FrontError
 from .grid.grid import Grid
 from .kernels import advance as kernels
@@ -19,11 +19,12 @@ from .kernels.offers import RowNodes, add_still_nodes, offer_nodes
 from .kernels.seat import nearest_site
 from .kernels.surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .kernels.triangles import quality
-from .rows import STRAIGHT, Rows, lay_rows, nodes_at
-from .scan.cloud import PointCloud
+from .lines.find import Constraints
+from .lines.network import Lines
+from .rows import nodes_at
 from .scan.sites import Sites, local_field
 from .settings import Settings
-from .slits import add_half_edges, chain_places, check_kept, line_members, link_around
+from .slits import add_half_edges, chain_places, check_kept, check_links, line_members, link_around
 
 Progress = Callable[[str, float], None]
 
@@ -36,34 +37,31 @@ BUDGET = 500  # segments advanced between two calls of `progress`
 
 
 def advance_front(
-    cloud: PointCloud,
+    sites: Sites,
     boundary: Boundary,
+    constraints: Constraints,
     settings: Settings,
+    rows: RowNodes | None = None,
     *,
-    rows: Rows | None = STRAIGHT,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the grid that a front leaves behind when it advances over a cloud (Fig. 4).
+    """Return the grid that a front leaves behind when it advances over a scan (Fig. 4).
 
     Parameters
     ----------
-    cloud : PointCloud
+    sites : Sites
+        The surface samples of the scan.
     boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges. Method "paper" makes the fixed nodes later.
     settings : Settings
-    rows : Rows, optional
-        The rows that the front of method "default" comes to; None: it makes all nodes itself, as "paper" does, and as it does
-        where the desired length differs from place to place.
+    rows : RowNodes, optional
+        Nodes of rows for the front to come to; left out, it makes all nodes itself.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
-    sites = boundary.sites
-    front = new_front(sites, settings)
-    if settings.method == "paper":
-        front = start_front(front, boundary, settings)
-    else:
-        positions = np.array(settings.fixed, float).reshape(-1, 3) - cloud.origin
-        front = start_front(front, boundary, settings, None if sites.graded else rows, positions)
-    members = line_members(front) if boundary.lines.curves else np.zeros((0, 2), np.int64)
+    front = start_front(new_front(sites, settings), sites, boundary, constraints, settings, rows)
+    members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
     numbers = np.array(
         [
             settings.length,
@@ -95,8 +93,8 @@ def advance_front(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),
         np.zeros(len(used), np.bool_),
-        cloud.origin,
-        cloud.unit,
+        sites.origin,
+        sites.unit,
         desired=desired,
         lines=np.searchsorted(used, members),
         settings=settings,
@@ -106,8 +104,8 @@ def advance_front(
 def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
-    Loops of the boundary of which the front has reached no segment are left out. Each turn takes a loop of segments out of the
-    front and adds none, so the number of those that are not GONE falls to 0.
+    Loops of the boundary of which the front has reached no segment are left out. Each turn takes the segments of one loop off the
+    front, at least one, so it ends after no more turns than there are segments.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
     for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
@@ -117,11 +115,7 @@ def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
             length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
             if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
-                before, after = front.previous[segments[0]], front.next[segments[-1]]
-                for t in segments:
-                    lists.remove_segment(front, t)
-                if before != segments[-1]:
-                    lists.link(front, before, after)
+                gaps.cut_out(front, segments)
 
 
 def new_front(sites: Sites, settings: Settings) -> lists.Front:
@@ -164,33 +158,30 @@ def grown(front: lists.Front) -> lists.Front:
 
 def start_front(
     front: lists.Front,
+    sites: Sites,
     boundary: Boundary,
+    constraints: Constraints,
     settings: Settings,
-    rows: Rows | None = None,
-    positions: np.ndarray | None = None,
+    rows: RowNodes | None = None,
 ) -> lists.Front:
-    """Put the initial front into the lists: the boundary loops, the lines, nodes that it may come to, a seed triangle on closed pieces.
-
-    Those nodes are the appointed positions (K, 3) and the nodes of rows.
-    """
-    surface = boundary.sites.surface
+    """Put the initial front into the lists: boundary loops, lines, nodes that it may come to, a seed triangle on closed pieces."""
+    surface = sites.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
-        nodes, _ = boundary_nodes(loop, settings.length)
+        nodes, _ = characteristic_points(loop, settings.length)
         rim = np.array(add_nodes(front, surface, nodes), np.int64)
         lists.add_chain(front, rim, lists.ACTIVE if active else lists.INACTIVE)
-    add_lines(front, boundary, settings)
-    for place in positions if positions is not None else ():
+    add_lines(front, surface, constraints.lines, settings)
+    for place in constraints.positions if settings.method != "paper" else ():
         length = settings.length * local_field(surface, place)
         front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
     if rows is not None:
-        front = offer(front, surface, lay_rows(boundary, settings.length, rows), CLEAR * settings.length)
+        front = offer(front, surface, rows, CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
-    piece = boundary.sites.piece
-    bounded |= {int(piece[nearest_site(surface, *curve[0].tolist())]) for curve in boundary.lines.curves}
-    for number in boundary.sites.pieces:
+    bounded |= {int(sites.piece[nearest_site(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
+    for number in sites.pieces:
         if number not in bounded:
-            site = int(np.flatnonzero(piece == number)[0])
+            site = int(np.flatnonzero(sites.piece == number)[0])
             length = settings.length * local_field(surface, surface.mean[site])
             ids = seed_of_rows(front, surface, site, length)
             add_seed(front, ids or new_seed(front, surface, site, length))
@@ -205,9 +196,8 @@ def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -
     return front
 
 
-def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> None:
+def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Settings) -> None:
     """Add the lines to a front that holds the boundary loops."""
-    lines, surface = boundary.lines, boundary.sites.surface
     if not lines.curves:
         return
     count = int(front.count[lists.NODES])
@@ -231,6 +221,7 @@ def add_lines(front: lists.Front, boundary: Boundary, settings: Settings) -> Non
         chains.append(chain)
     for node in sorted({node for chain in chains for node in chain}):
         link_around(front, node)
+    check_links(front)
 
 
 def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
@@ -287,10 +278,7 @@ def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 def run(
     front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
-    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed.
-
-    It ends: what a kernel takes from the queue waits from then on or gets a triangle, and the number of triangles is limited.
-    """
+    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = sites.graded_area / (0.433 * numbers[lists.REFERENCE] ** 2)
     while True:
         status = step(sites.surface, front, numbers, BUDGET)

@@ -10,8 +10,8 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock, Thread
-from typing import TypeVar, cast
+from threading import Thread
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 Share = TypeVar("Share")
@@ -80,41 +80,15 @@ def two_at_once(work: Callable[[Share], Result], shares: Sequence[Share]) -> lis
     return [results[k] for k in range(len(shares))]
 
 
-def alongside(work: Callable[[], Result]) -> Callable[[], Result]:
-    """Begin some work on another processor, if one is free; return what waits for its result, or does it where nobody has begun.
+def side_by_side(*works: Callable[[], Any]) -> tuple[Any, ...]:
+    """Return what each of a few independent works returns; they run side by side where processors are free."""
+    results: dict[int, Any] = {}
 
-    The result must not depend on when it is done; it is kept. The work is let go once it begins: what keeps the result may be what
-    the work looks at.
-    """
-    waiting = [work]
-    found: list[tuple[Result | None, BaseException | None]] = []
-    ended = Lock()
-    ended.acquire()
+    def part(_: int, begin: int, end: int) -> None:
+        results.update((k, works[k]()) for k in range(begin, end))
 
-    def do() -> None:
-        try:
-            begun = waiting.pop()
-        except IndexError:  # somebody has
-            return
-        try:
-            found.append((begun(), None))
-        except BaseException as error:
-            found.append((None, error))
-        finally:
-            del begun  # before anybody goes on
-            ended.release()
-
-    def result() -> Result:
-        do()
-        with ended:
-            value, error = found[0]
-        if error is not None:
-            raise error
-        return cast(Result, value)
-
-    if processors() > 1:
-        _pool(processors() - 1).put(do)
-    return result
+    in_parts(len(works), 1, part, len(works))
+    return tuple(results[k] for k in range(len(works)))
 
 
 @cache

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from .boundary import Boundary, Loop, boundary_nodes
+from .boundary import Boundary, Loop, characteristic_points
 from .kernels import rows as kernels
 from .kernels.offers import RowNodes
 from .kernels.rows import Posts
 from .kernels.surface import Surface
 from .kernels.vectors import Vector
-from .machine import alongside, two_at_once
-from .scan.cloud import PointCloud
-from .scan.sites import Sites, prepare_sites
+from .machine import side_by_side, two_at_once
+from .scan.sites import Sites
 from .settings import Settings
 from .vectors import dots
 
@@ -33,21 +33,91 @@ DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
 
 @dataclass(frozen=True)
 class Rows:
-    """How rows are laid."""
+    """How the nodes of one front are laid out."""
 
     turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
     scale: float = 1.0  #: length of their members, in desired lengths
+    laid: bool = True  #: False: no rows are laid, the front makes all of its nodes itself
 
 
-STRAIGHT = Rows()
-Levels = tuple[list[Posts], list[np.ndarray], list[tuple[np.ndarray, ...]]]
+TURNS = {  # directions of the rows of several fronts
+    "quick": (Rows(),),
+    "normal": tuple(Rows(10.0 * turn) for turn in range(6)),
+    "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
+}
+SCALES = {  # lengths of the fronts instead, where the desired length differs from place to place: no rows can be laid
+    "quick": (1.0,),
+    "normal": (1.0, 0.97, 1.03),
+    "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
+}
+SMALL = 600.0  # area up to which `normal` tries all its directions, in squares of the desired length: the boundary decides there
 
 
-def lay_rows(boundary: Boundary, length: float, rows: Rows) -> RowNodes:
-    """Return the nodes of rows of a length [scan unit], for a front to come to."""
-    length *= rows.scale * (1.0 if boundary.loops else CLOSED)
-    levels, owners, shares = posts_of(boundary.sites, length)
-    start, direction, node = first_row(boundary, length, rows.turn)
+class Field(NamedTuple):
+    """What one front comes to."""
+
+    way: Rows
+    nodes: RowNodes | None  #: of its rows; None where the front makes all of its nodes itself
+
+
+class Hierarchy(NamedTuple):
+    """The multiresolution hierarchy of a scan, from fine to coarse; see `make_levels`."""
+
+    levels: list[Posts]
+    owners: list[np.ndarray]  #: for each level the post of each place of the level below (sites at first)
+    shares: list[tuple[np.ndarray, ...]]  #: posts of each level that are smoothed at once
+
+    def copy(self) -> Hierarchy:
+        """Return it with directions and lattices of its own."""
+        own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in self.levels]
+        return self._replace(levels=own)
+
+
+def usual_ways(sites: Sites, settings: Settings) -> tuple[Rows, ...]:
+    """Return how the fronts are laid out that the effort allows."""
+    if settings.method == "paper":
+        return (Rows(laid=False),)
+    if sites.graded:
+        return tuple(Rows(scale=scale, laid=False) for scale in SCALES[settings.effort])
+    large = sites.graded_area > SMALL * settings.length**2
+    return TURNS[settings.effort][: 1 if settings.effort == "normal" and large else None]
+
+
+def orientation_fields(
+    sites: Sites, boundary: Boundary, settings: Settings, ways: Sequence[Rows] | None = None
+) -> list[Field]:
+    """Return for each front the nodes of rows that it may come to: an orientation and a position field (Jakob et al. 2015).
+
+    Both are smoothed over a hierarchy of levels from coarse to fine, from a start at the boundary on.
+
+    Parameters
+    ----------
+    sites : Sites
+        The surface samples of the scan.
+    boundary : Boundary
+    settings : Settings
+        `length`; `effort` decides how many fields there are.
+    ways : sequence of Rows, optional
+        How they are laid out; left out, as the effort allows.
+    """
+    ways = usual_ways(sites, settings) if ways is None else ways
+    closed = 1.0 if boundary.loops else CLOSED
+    scales = {way.scale for way in ways if way.laid}
+    hierarchies = {scale: make_levels(sites.surface, closed * scale * settings.length) for scale in scales}
+
+    def field_of(way: Rows) -> Field:
+        if not way.laid:
+            return Field(way, None)
+        length = closed * way.scale * settings.length
+        return Field(way, lay_rows(hierarchies[way.scale].copy(), sites, boundary, length, way.turn))
+
+    return list(side_by_side(*(partial(field_of, way) for way in ways)))
+
+
+def lay_rows(hierarchy: Hierarchy, sites: Sites, boundary: Boundary, length: float, turn: float) -> RowNodes:
+    """Return the nodes of rows of a length [scan unit] that start at an angle [degree] to the longest side of the boundary."""
+    levels, owners, shares = hierarchy
+    start, direction, node = first_row(sites, boundary, length, turn)
     for owner in owners:
         start = int(owner[start])
     kernels.lay_first(levels[-1], start, direction, node, length, np.empty(len(levels[-1].mean), np.int64))
@@ -77,28 +147,8 @@ def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
     return RowNodes(posts.node[chosen], posts.normals[chosen], first[chosen], length)
 
 
-def begin_rows(cloud: PointCloud, settings: Settings) -> None:
-    """Begin to make the posts for the rows of a scan, if it gets any, beside the search for its boundary."""
-    if settings.method == "default" and not (sites := prepare_sites(cloud, settings)).graded:
-        _begin_posts(sites, settings.length)
-
-
-def _begin_posts(sites: Sites, length: float) -> Callable[[], Levels]:
-    surface = sites.surface
-    if length not in sites.posts:
-        sites.posts[length] = alongside(lambda: make_levels(surface, length))
-    return sites.posts[length]
-
-
-def posts_of(sites: Sites, length: float) -> Levels:
-    """Return `make_levels`, made once for all rows of a length [scan unit], with directions and lattices of one's own."""
-    levels, owners, shares = _begin_posts(sites, length)()
-    own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in levels]
-    return own, owners, shares
-
-
-def make_levels(surface: Surface, length: float) -> Levels:
-    """Return posts from fine to coarse, for each level the post of each place of the level below (sites at first), and its shares."""
+def make_levels(surface: Surface, length: float) -> Hierarchy:
+    """Return the posts of a surface for members of a length [scan unit], level by level from fine to coarse."""
     mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
     levels: list[Posts] = []
     owners: list[np.ndarray] = []
@@ -107,7 +157,7 @@ def make_levels(surface: Surface, length: float) -> Levels:
         owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
         count = kernels.choose_posts(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
         if levels and (count < FEWEST or count > 0.8 * len(mean)):
-            return levels, owners, [_shares(posts) for posts in levels]
+            return Hierarchy(levels, owners, [_shares(posts) for posts in levels])
         posts = Posts(
             np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS), -1, np.int64),
             np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
@@ -135,19 +185,19 @@ def _shares(posts: Posts) -> tuple[np.ndarray, ...]:
     return np.flatnonzero(~late & ~between), np.flatnonzero(late & ~between), np.flatnonzero(between)
 
 
-def first_row(boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:
+def first_row(sites: Sites, boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:
     """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
 
     On a closed surface they start anywhere.
     """
-    surface = boundary.sites.surface
+    surface = sites.surface
     if not boundary.loops:
-        site = int(np.flatnonzero(boundary.sites.piece == boundary.sites.pieces[0])[0])
+        site = int(np.flatnonzero(sites.piece == sites.pieces[0])[0])
         ahead, place = surface.mean[max(surface.neighbors[site, 0], 0)] - surface.mean[site], surface.mean[site]
     else:
         loop, at = longest_side(boundary.loops)
         count = len(loop.points)
-        nodes, _ = boundary_nodes(loop, length)
+        nodes, _ = characteristic_points(loop, length)
         middle = loop.points[at]
         place = nodes[((nodes - middle) ** 2).sum(axis=1).argmin()]
         half = min(round(length / np.linalg.norm(loop.points[(at + 1) % count] - middle)), count // 4)

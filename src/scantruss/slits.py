@@ -15,7 +15,6 @@ from .kernels import front as lists
 from .kernels.field import lengths_along
 from .kernels.surface import Surface
 from .kernels.triangles import angle_from
-from .kernels.vectors import Vector
 from .lines.network import Lines
 from .scan.sites import is_graded
 
@@ -61,28 +60,58 @@ def add_half_edges(front: lists.Front, chain: list[int]) -> None:
 
 
 def link_around(front: lists.Front, node: int) -> None:
-    """Link every segment that comes to a node to the one that leaves it next, the unmeshed area being to the left of both.
+    """Link every segment that comes to a node to one that leaves it, each to another: the next clockwise around the node.
 
-    The segments are put in order around the node once, from that of the rim on, and each that comes is followed by another one.
-    So each has one segment before it and one after it, also where two lines leave a node in one direction, or one of them
-    leaves it across the rim.
+    The segments stand around the node in the order of their angles. At the boundary the one that comes along it stands last,
+    whatever its angle: lines lie between both, also where the surface is folded so that its normal does not show it.
     """
     count = int(front.count[lists.SEGMENTS])
-    leaving = np.flatnonzero((front.tail[:count] == node) & (front.state[:count] != lists.GONE)).tolist()
-    coming = np.flatnonzero((front.head[:count] == node) & (front.state[:count] != lists.GONE)).tolist()
+    live = front.state[:count] != lists.GONE
+    leaving = {int(front.head[t]): t for t in np.flatnonzero((front.tail[:count] == node) & live).tolist()}
+    coming = {int(front.tail[s]): s for s in np.flatnonzero((front.head[:count] == node) & live).tolist()}
     place, normal = front.nodes[node], tuple(front.normals[node].tolist())
+    only_coming = sorted(set(coming) - set(leaving))
+    first = min(set(leaving) - set(coming), default=min(leaving))
 
-    def arm(t: int) -> Vector:
-        x, y, z = (front.nodes[front.head[t]] - place).tolist()
-        return x, y, z
+    def turn_of(other: int) -> float:
+        base, arm = ((front.nodes[end] - place).tolist() for end in (first, other))
+        return 0.0 if other == first else angle_from(tuple(base), tuple(arm), normal)
 
-    first = leaving[0]  # that of the rim, which was in the lists before the lines
-    around = [first, *sorted(leaving[1:], key=lambda t: angle_from(arm(first), arm(t), normal))]
-    for before, line in pairwise(around):
-        back = next(s for s in coming if front.tail[s] == front.head[line])
-        coming.remove(back)
-        lists.link(front, back, before)
-    lists.link(front, coming[0], around[-1])
+    around = sorted(leaving, key=lambda other: (turn_of(other), other)) + only_coming
+    waiting: list[int] = []  # segments that have come
+    unmet: list[int] = []  # segments that leave before any has come
+    for other in reversed(around):
+        if other in leaving:
+            if waiting:
+                lists.link(front, waiting.pop(), leaving[other])
+            else:
+                unmet.append(leaving[other])
+        if other in coming:
+            waiting.append(coming[other])
+    for s, t in zip(waiting, unmet, strict=True):
+        lists.link(front, s, t)
+
+
+def check_links(front: lists.Front) -> None:
+    """Refuse an initial front whose segments are not closed loops, each followed by one of its own: lines have met where they cannot.
+
+    All that takes segments off the front leaves closed loops closed, so every loop over them ends.
+
+    Raises
+    ------
+    FrontError
+        Names a place.
+    """
+    count = int(front.count[lists.SEGMENTS])
+    live = np.flatnonzero(front.state[:count] != lists.GONE)
+    following = front.next[live]
+    broken = (following < 0) | (front.previous[following] != live) | (front.tail[following] != front.head[live])
+    if broken.any():
+        x, y, z = front.nodes[front.head[live[broken][0]]].tolist()
+        raise FrontError(
+            "two lines meet where no member has room between them; use a smaller length, or --ridge-angle 0",
+            where=(x, y, z),
+        )
 
 
 def line_members(front: lists.Front) -> np.ndarray:

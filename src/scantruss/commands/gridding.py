@@ -102,7 +102,8 @@ def make_grid(
 ) -> Grid:
     """Run the chain, and say so where kernels must be compiled."""
     from ..ahead import CompileAhead
-    from ..pipeline import check_length, grid_from_cloud
+    from ..pipeline import grid_from_cloud
+    from ..scan.member_length import check_length
 
     check_length(cloud, settings)
     said = note_compiling(bars, settings.method, *STAGES)

@@ -27,9 +27,9 @@ def info_parser() -> Parser:
 def info(values: Namespace) -> None:
     """Print what a scan holds."""
     from ..options import settings_of
-    from ..pipeline import check_length, suggest_length
     from ..report.figures import cloud_lines, loop_rows
     from ..report.terminal import Bars, print_lines, print_table
+    from ..scan.member_length import check_length, suggest_length
 
     given = "length" in values
     settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
@@ -45,10 +45,11 @@ def info(values: Namespace) -> None:
         check_length(cloud, settings)
         with note_compiling(bars, settings.method, "boundary"):
             from ..boundary import find_boundary
+            from ..scan.sites import sample_surface
 
-            boundary = find_boundary(cloud, settings, progress=bars)
+            sites, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_strays(bars, cloud, settings, "scantruss grid")
-    field = boundary.sites.surface.field
+    field = sites.surface.field
     longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:

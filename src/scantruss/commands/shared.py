@@ -93,9 +93,9 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
     """Say so where points of the scan were left out, and the option that keeps them, of another command where this one has none."""
-    from ..scan.sites import prepare_sites
+    from ..scan.sites import sample_surface
 
-    sites = prepare_sites(cloud, settings)
+    sites = sample_surface(cloud, settings)
     say = f"{command} " if command else ""
     if sites.repeated:
         bars.note(f"{sites.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels.boxes import SearchBoxes, new_boxes
 from ..kernels.cover import lower_distances, nearest_distances, put_places
-from ..machine import alongside
 
 if TYPE_CHECKING:
     from ..scan.sites import Sites
@@ -18,22 +16,10 @@ if TYPE_CHECKING:
 NEAR = 0.1  #: the first reach of a search, in lengths; most of a scan lies nearer to its grid
 
 
-def begin_places(sites: Sites, length: float) -> Callable[[], tuple[np.ndarray, SearchBoxes]]:
-    """Begin to list, beside other work, the parts of the scan that a grid must reach: the sites of all pieces that are no debris.
-
-    Returns
-    -------
-    callable
-        Waits for the places (P, 3) [scan unit], and these by box; done once for a length.
-    """
-
-    def scan_places() -> tuple[np.ndarray, SearchBoxes]:
-        places = np.ascontiguousarray(sites.surface.mean[sites.kept])
-        return places, boxes_of(places, 0.5 * length)
-
-    if length not in sites.places:
-        sites.places[length] = alongside(scan_places)
-    return sites.places[length]
+def places_to_reach(sites: Sites, length: float) -> tuple[np.ndarray, SearchBoxes]:
+    """Return the parts of the scan that a grid must reach, (P, 3) [scan unit], and these by box: all pieces that are no debris."""
+    places = np.ascontiguousarray(sites.surface.mean[sites.kept])
+    return places, boxes_of(places, 0.5 * length)
 
 
 def boxes_of(places: np.ndarray, box: float) -> SearchBoxes:

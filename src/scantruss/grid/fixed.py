@@ -2,64 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..errors import InputError
 from ..kernels.grid import REST, RIM, may_split, split
 from ..kernels.rim import nearest_on_rim
 from ..kernels.seat import nearest_site
-from ..kernels.surface import Surface
 from ..kernels.trial import TRIED, Scratch, total_energy
-from ..scan.cloud import PointCloud
-from ..scan.sites import distance_from_scan, local_field
+from ..lines.fixed_nodes import place_text
+from ..scan.sites import local_field
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
 from .relief import Relief
 
 AT_RIM = 0.33  # a position this near to the boundary becomes a boundary node, in lengths
 SAME = 1e-6  # a node this near already stands there, in lengths
 CHOICES = 3  # nodes, and edges, that are tried
-
-
-def check_positions(
-    fixed: Sequence[Sequence[float]] | np.ndarray, cloud: PointCloud, surface: Surface, length: float
-) -> np.ndarray:
-    """Return fixed positions relative to the cloud's origin, (K, 3) [scan unit].
-
-    Raises
-    ------
-    InputError
-        Not three finite numbers each; farther than length / 2 from the scan; closer than length / 2 to another.
-    """
-    try:
-        places = np.asarray(fixed, float).reshape(-1, 3) if len(fixed) else np.zeros((0, 3))
-    except (TypeError, ValueError):
-        raise InputError(f"fixed positions must have shape (K, 3), got {fixed!r}") from None
-    if not np.isfinite(places).all():
-        raise InputError("fixed positions must be finite numbers; leave out those that are not")
-    unit = f" {cloud.unit}" if cloud.unit else ""
-    relative = places - cloud.origin
-    for k, place in enumerate(relative):
-        distance = distance_from_scan(surface, place)
-        local = length * local_field(surface, place)
-        if distance > 0.5 * local:
-            raise InputError(
-                f"fixed position {_text(places[k])} is {distance:.4g}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * local:.4g}{unit}"
-            )
-        gaps = np.linalg.norm(relative[:k] - place, axis=1)
-        if k and gaps.min() < 0.5 * local * (1 - 1e-9):
-            other = places[int(gaps.argmin())]
-            raise InputError(
-                f"fixed positions {_text(other)} and {_text(places[k])} are {gaps.min():.4g}{unit} apart;"
-                f" they need half a member, {0.5 * local:.4g}{unit}"
-            )
-    return relative
-
-
-def _text(place: np.ndarray) -> str:
-    return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
 
 
 def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
@@ -117,7 +74,7 @@ def fix_nearest_nodes(relief: Relief, positions: np.ndarray) -> None:
 
 
 def _no_node(place: np.ndarray) -> InputError:
-    return InputError(f"the grid has no node that could be moved to {_text(place)}; use a smaller length")
+    return InputError(f"the grid has no node that could be moved to {place_text(place)}; use a smaller length")
 
 
 def hold_nodes(relief: Relief, positions: np.ndarray) -> None:

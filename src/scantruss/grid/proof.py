@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import CertificateError
 from ..kernels.figures import folds_of
-from ..machine import alongside
+from ..machine import side_by_side
 from .certificate import Certificate, Fault, Worst, place_of
-from .cover import begin_places, distances_to_grid, distances_to_scan
+from .cover import distances_to_grid, distances_to_scan, places_to_reach
 from .crossings import find_crossings
 from .faults import faults_in_space, faults_of_topology
 from .irregular import count_irregular
@@ -29,15 +30,17 @@ if TYPE_CHECKING:
 REACH = 0.5  #: members from the nearest triangle, or part of the scan, up to which one lies within reach of the other
 
 
-def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
+def certify(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Certificate:
     """Return the certificate of a grid.
 
     Parameters
     ----------
     grid : Grid
         Of the same origin as the scan.
+    sites : Sites
+        The surface samples of the scan.
     boundary : Boundary
-        Boundary loops of the scan, and the sites they were found in.
+        Boundary loops of the scan.
     settings : Settings
         `length` is the desired member length, `fill_holes` tells which holes are closed, `fixed` where nodes must be.
 
@@ -49,23 +52,43 @@ def certify(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
     empty = "has no triangles" if len(grid.triangles) == 0 else ""
     if empty or not np.isfinite(grid.nodes).all():
         fault = Fault("empty", empty or "has nodes that are nowhere")
-        return replace(_topology(grid, boundary, settings), faults=(fault,))
-    sites, length = boundary.sites, settings.length
-    places, boxes = begin_places(sites, length)()
-    nearest = alongside(lambda: nodes_of_sites(grid, sites, length))  # kernels, which leave the interpreter to the rest
-    left = alongside(lambda: distances_to_grid(places, boxes, grid, length))
-    told = replace(_topology(grid, boundary, settings), **_extremes(grid, settings))
+        return replace(_topology(grid, sites, boundary, settings), faults=(fault,))
+    length = settings.length
+    places, boxes = places_to_reach(sites, length)
+    nearest, left, told = side_by_side(
+        lambda: nodes_of_sites(grid, sites, length),
+        lambda: distances_to_grid(places, boxes, grid, length),
+        lambda: replace(_topology(grid, sites, boundary, settings), **_extremes(grid, settings)),
+    )
     cuts = find_crossings(grid.nodes, grid.triangles)
     told = replace(told, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
-    on_sheets = faults_on_sheets(grid, sites, nearest())
-    told = replace(told, **_from_grid(grid, sites, length, places, left()))
+    on_sheets = faults_on_sheets(grid, sites, nearest)
+    told = replace(told, **_from_grid(grid, sites, length, places, left))
     faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
     known = {fault.kind for fault in faults}
     faults += [fault for fault in on_sheets if fault.kind not in known]
     return replace(told, faults=tuple(faults))
 
 
-def _topology(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate:
+def certified(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Grid:
+    """Return the grid with its certificate: rather no result than a wrong one that looks right.
+
+    Raises
+    ------
+    CertificateError
+        The grid does not pass. Names the first place of a fault.
+    """
+    certificate = certify(grid, sites, boundary, settings)
+    grid = grid.replace(certificate=certificate)
+    if certificate.passed:
+        return grid
+    words = " and ".join(fault.words for fault in certificate.faults)
+    where = next((fault.where for fault in certificate.faults if fault.where), None)
+    advice = "try another length, or clean the scan; --keep-failed gives the grid all the same"
+    raise CertificateError(f"the grid {words}; {advice}", grid, where)
+
+
+def _topology(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Certificate:
     """Return what a grid is and what its scan is, apart from where they lie."""
     found = grid.topology
     closed = found.manifold and found.orientable
@@ -75,7 +98,7 @@ def _topology(grid: Grid, boundary: Boundary, settings: Settings) -> Certificate
         manifold=found.manifold,
         orientable=found.orientable,
         pieces=found.components,
-        scan_pieces=len(boundary.sites.pieces),
+        scan_pieces=len(sites.pieces),
         boundary_loops=found.boundary_loops,
         scan_loops=len(boundary.loops),
         euler=found.euler,

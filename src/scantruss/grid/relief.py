@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +15,7 @@ from ..kernels.landing import land_nodes
 from ..kernels.rim import Rim
 from ..kernels.surface import PATCH, Surface
 from ..lines.network import NO_LINES, Lines
-from ..machine import alongside, in_parts
+from ..machine import in_parts
 from ..scan.sites import is_graded, with_own_scratch
 from .grid import Grid
 from .on_lines import find_on_lines, inner_lines, joined
@@ -233,15 +232,11 @@ class Relief:
         seat.distances_from_scan(self.net, self.patches, values)
         return values
 
-    def begin_to_close(self, grid: Grid) -> Callable[[], Closed]:
-        """Put the net together again and see what it is, beside other work: members are neither added nor taken away from now on."""
-
-        def close() -> Closed:
-            closed, kept = join_again(self.net, self.source, grid.replace(fixed=self.fixed))
-            _ = closed.topology, closed.edge_triangles
-            return closed, kept
-
-        return alongside(close)
+    def close(self, grid: Grid) -> Closed:
+        """Put the net together again and see what it is, with all else as in `grid`."""
+        closed, kept = join_again(self.net, self.source, grid.replace(fixed=self.fixed))
+        _ = closed.topology, closed.edge_triangles
+        return closed, kept
 
     def to_grid(self, grid: Grid, closed: Closed | None = None) -> Grid:
         """Put the net together again, with all else as in `grid`, or as it was `closed` already; deviation measured."""

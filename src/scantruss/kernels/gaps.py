@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .front import Front, add_triangle, edge_exists, remove_segment
+from .front import Front, add_triangle, edge_exists, link, remove_segment
 from .triangles import shape_quality
 from .vectors import cross, dot, norm, row, subtract, unit
 
@@ -14,8 +14,8 @@ from .vectors import cross, dot, norm, row, subtract, unit
 def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
     """Segments of the shortest closed walk along the front from a segment back to a node it has met; returns their number.
 
-    A loop that meets a node twice is taken apart there, so that the node keeps one fan. There is at least one segment in it: each
-    turn meets another node, or ends; `loop` has room for all segments and one more.
+    A loop that meets a node twice is taken apart there, so that the node keeps one fan. Segments form closed loops, so a walk meets
+    a node again after no more steps than there are segments; `loop` has room for one more.
     """
     count = 0
     at = s
@@ -82,10 +82,16 @@ def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
         stack[held, 0], stack[held, 1] = i, k
         stack[held + 1, 0], stack[held + 1, 1] = k, j
         held += 2
-    before, after = front.previous[loop[0]], front.next[loop[count - 1]]
-    for i in range(count):
-        remove_segment(front, loop[i])
-    if before != loop[count - 1]:
-        front.next[before] = after
-        front.previous[after] = before
+    cut_out(front, loop[:count])
     return made
+
+
+@kernel
+def cut_out(front: Front, loop: np.ndarray) -> None:
+    """Take a closed walk of segments (K,) off the front; the segments before and after it follow each other from now on."""
+    last = loop[len(loop) - 1]
+    before, after = front.previous[loop[0]], front.next[last]
+    for i in range(len(loop)):
+        remove_segment(front, loop[i])
+    if before != last:
+        link(front, before, after)

@@ -14,7 +14,6 @@ from ..kernels.surface import PATCH, Surface, fit_patch, onto_patch, walk
 from ..scan.sites import Sites, distance_from_scan, narrow_surface
 
 if TYPE_CHECKING:
-    from ..scan.cloud import PointCloud
     from ..settings import Settings
     from .network import Network
 
@@ -27,7 +26,7 @@ SHORTEST = 0.5  # of an open line, in lengths
 SHORTEST_RING = 2.0
 
 
-def add_polylines(network: Network, cloud: PointCloud, sites: Sites, settings: Settings) -> None:
+def add_polylines(network: Network, sites: Sites, settings: Settings) -> None:
     """Add the user's lines to a network.
 
     Raises
@@ -37,19 +36,19 @@ def add_polylines(network: Network, cloud: PointCloud, sites: Sites, settings: S
     """
     patches = narrow_surface(sites, FIT)
     for number, line in enumerate(settings.fixed_lines, 1):
-        given = np.array(line, float) - cloud.origin
-        _check_on_scan(given, line, number, cloud, sites.surface, settings.length)
+        given = np.array(line, float) - sites.origin
+        _check_on_scan(given, line, number, sites, settings.length)
         closed = bool((given[0] == given[-1]).all())
-        _check_length(given, closed, number, cloud.unit, settings.length)
+        _check_length(given, closed, number, sites.unit, settings.length)
         points, vertices = divide(simplify(given, FINE * settings.length, closed), closed, STEP * settings.length)
         corners = find_corners(points, vertices, closed, settings)
-        points = _onto_scan(points, number, cloud, patches, settings.length)
+        points = _onto_scan(points, number, sites, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
             network.add(part, ring, own)
 
 
-def _unit(cloud_unit: str) -> str:
-    return f" {cloud_unit}" if cloud_unit else ""
+def _unit(unit: str) -> str:
+    return f" {unit}" if unit else ""
 
 
 def _text(place: Sequence[float] | np.ndarray) -> str:
@@ -57,12 +56,12 @@ def _text(place: Sequence[float] | np.ndarray) -> str:
 
 
 def _check_on_scan(
-    given: np.ndarray, line: Sequence[Sequence[float]], number: int, cloud: PointCloud, surface: Surface, length: float
+    given: np.ndarray, line: Sequence[Sequence[float]], number: int, sites: Sites, length: float
 ) -> None:
     """Refuse a line with a point farther than half a member from the scan."""
-    unit = _unit(cloud.unit)
+    unit = _unit(sites.unit)
     for k, place in enumerate(given):
-        distance = distance_from_scan(surface, place)
+        distance = distance_from_scan(sites.surface, place)
         if distance > 0.5 * length:
             raise InputError(
                 f"fixed line {number}, point {k + 1} {_text(line[k])} is {distance:.4g}{unit} away from the scan;"
@@ -142,7 +141,7 @@ def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, setting
     return [int(vertices[((places - coarse[k + 1]) ** 2).sum(axis=1).argmin()]) for k in sharp]
 
 
-def _onto_scan(points: np.ndarray, number: int, cloud: PointCloud, surface: Surface, length: float) -> np.ndarray:
+def _onto_scan(points: np.ndarray, number: int, sites: Sites, surface: Surface, length: float) -> np.ndarray:
     """Bring the points (M, 3) of a line down onto the scan; refuse a line that leaves it between its own points."""
     patch, feet, site = np.zeros(PATCH), np.empty_like(points), -1
     for k, place in enumerate(points.tolist()):
@@ -155,9 +154,9 @@ def _onto_scan(points: np.ndarray, number: int, cloud: PointCloud, surface: Surf
         gap = float(np.linalg.norm(feet[k] - points[k]))
         beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.scale[1]
         if (gap := max(gap, beside)) > 0.5 * length:
-            unit = _unit(cloud.unit)
+            unit = _unit(sites.unit)
             raise InputError(
-                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + cloud.origin)};"
+                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + sites.origin)};"
                 f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
             )
     return feet

@@ -140,7 +140,7 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
 
 def cloud_lines(cloud: PointCloud) -> list[str]:
     """Return points, extent, spacing, unit and a sensible range for the member length, in words."""
-    from ..pipeline import length_range, suggest_length
+    from ..scan.member_length import length_range, suggest_length
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""

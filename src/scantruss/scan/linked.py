@@ -32,9 +32,6 @@ BENT = 0.075  # sites of a smooth scan are no thicker than this, in member lengt
 FEW = 2  # sites at which a smooth scan is not: there is no room for a ridge
 
 
-Choice = tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]  #: what `sites_of_points` returns
-
-
 class Linked(NamedTuple):
     """Sites of one thinning radius, linked; their normals of either sign."""
 
@@ -63,11 +60,9 @@ def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float
     return group(points, owner, len(places))[0]
 
 
-def link_sites(
-    points: np.ndarray, radius: float, length: float, spacing: float, choice: Choice | None = None
-) -> Linked:
-    """Return the sites of points for one thinning radius; of a choice where they were chosen already."""
-    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing, choice)
+def link_sites(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
+    """Return the sites of points for one thinning radius."""
+    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
     grouped, start, mean = group(points, owner, len(chosen))
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
@@ -115,7 +110,7 @@ def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
     return bool((found.thickness > rough).mean() > some)
 
 
-def sites_of_points(points: np.ndarray, radius: float) -> Choice:
+def sites_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
     """Return a site within the radius of each point, the point of each site and where it is (S, 3), and the sites by box.
 
     Sites are points that keep the radius: each that has no earlier site nearer.
@@ -140,10 +135,10 @@ def sites_of_points(points: np.ndarray, radius: float) -> Choice:
 
 
 def _settled(
-    points: np.ndarray, radius: float, length: float, spacing: float, choice: Choice | None = None
+    points: np.ndarray, radius: float, length: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
     """Return the nearest site of each point, the point of each site and where it is, the sites by box and their neighbours."""
-    owner, chosen, places, boxes = choice or sites_of_points(points, radius)
+    owner, chosen, places, boxes = sites_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
     in_parts(
         len(points), PART, lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end)

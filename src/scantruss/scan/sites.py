@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,19 +15,17 @@ from ..kernels import normals as normal_kernels
 from ..kernels.boxes import SearchBoxes
 from ..kernels.nearby import nearest_places
 from ..kernels.surface import Surface
-from ..machine import alongside, in_parts
+from ..machine import in_parts
 from ..settings import SITE, SMOOTH_SITE, Settings
 from ..vectors import dots
 from .cloud import Bounds, PointCloud, bounds_of
 from .field import Wish, length_field, wish_of
 from .linked import (
     FINE,
-    MANY,
     MANY_ROUGH,
     PART,
     ROUGH,
     SHEETS,
-    Choice,
     Linked,
     group,
     is_rough,
@@ -36,7 +33,6 @@ from .linked import (
     link_finer,
     link_sites,
     settle_to_sheet,
-    sites_of_points,
     thin_dense,
 )
 from .orientation import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
@@ -66,10 +62,8 @@ class Sites:
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     apart: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
-    #: what waits for the posts for rows of a length: see `rows.posts_of`
-    posts: dict[float, Callable[[], Any]] = field(default_factory=dict)
-    #: what waits for the places that a grid must reach: see `grid.cover.begin_places`
-    places: dict[float, Callable[[], Any]] = field(default_factory=dict)
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
+    unit: str = ""  #: unit of the scan
 
     @cached_property
     def kept(self) -> np.ndarray:
@@ -124,23 +118,10 @@ class _Chosen(NamedTuple):
     smooth: bool
 
 
-class _Begun(NamedTuple):
-    """Sites that are being chosen before anybody has asked for them."""
-
-    points: np.ndarray
-    radius: float
-    choice: Callable[[], Choice]
-
-    def of(self, points: np.ndarray, radius: float) -> Choice | None:
-        """Return them, if they are of these points."""
-        return self.choice() if points is self.points and radius == self.radius else None
-
-
-_BEGUN: weakref.WeakKeyDictionary[PointCloud, _Begun] = weakref.WeakKeyDictionary()
 _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, Sites]] = weakref.WeakKeyDictionary()
 
 
-def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
+def sample_surface(cloud: PointCloud, settings: Settings) -> Sites:
     """Return the sites of a cloud for a member length; kept as long as the cloud lives.
 
     Parameters
@@ -154,21 +135,9 @@ def prepare_sites(cloud: PointCloud, settings: Settings) -> Sites:
     kept = _KEPT.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
-        kept[asked] = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, begun=_BEGUN.pop(cloud, None))
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit)
     return kept[asked]
-
-
-def begin_sites(cloud: PointCloud, settings: Settings) -> None:
-    """Begin to choose the sites of a scan that may be dense and smooth beside other work, for `prepare_sites`.
-
-    How dense it is is not known yet: about as much as the longer sides of its box are covered, and the nearest of points that lie by
-    chance is half as far as in a lattice.
-    """
-    points, radius = cloud.points, SMOOTH_SITE * settings.length
-    covered = float(np.prod(np.sort(cloud.bounds[1] - cloud.bounds[0])[1:]))
-    dense = len(points) < MANY and covered < len(points) * (2.0 * SPARSE * settings.length) ** 2
-    if dense and settings.box_size is None and _Asked.of(settings, cloud.origin) not in _KEPT.get(cloud, {}):
-        _BEGUN[cloud] = _Begun(points, radius, alongside(lambda: sites_of_points(points, radius)))
 
 
 def is_graded(surface: Surface) -> bool:
@@ -181,15 +150,23 @@ def local_field(surface: Surface, place: np.ndarray) -> float:
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
-def sites_with(sites: Sites, added: np.ndarray, cloud: PointCloud, settings: Settings) -> Sites:
-    """Return the sites of the same points of a cloud and of made-up ones (F, 3) [scan unit]."""
+def sites_with(sites: Sites, added: np.ndarray, settings: Settings) -> Sites:
+    """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
     points = sites.surface.points
     both = np.concatenate([points, added])
-    asked = _Asked.of(settings, cloud.origin)._replace(stray_distance=0.0, drop_repeated=False)
+    asked = _Asked.of(settings, sites.origin)._replace(stray_distance=0.0, drop_repeated=False)
     if not sites.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SITE)
     prepared = _prepare(both, bounds_of(both), sites.spacing, asked, len(points))
-    return replace(prepared, strays=sites.strays, repeated=sites.repeated, whole=sites.whole, apart=sites.apart)
+    return replace(
+        prepared,
+        strays=sites.strays,
+        repeated=sites.repeated,
+        whole=sites.whole,
+        apart=sites.apart,
+        origin=sites.origin,
+        unit=sites.unit,
+    )
 
 
 def narrow_surface(sites: Sites, points: float) -> Surface:
@@ -248,18 +225,12 @@ def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
     return normals
 
 
-def surface_of(cloud: PointCloud, settings: Settings) -> Surface:
-    """Return the local surface of the scan for the kernels."""
-    return prepare_sites(cloud, settings).surface
-
-
 def _prepare(
     points: np.ndarray,
     bounds: Bounds,
     spacing: float,
     asked: _Asked,
     measured: int | None = None,
-    begun: _Begun | None = None,
 ) -> Sites:
     """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
@@ -269,7 +240,7 @@ def _prepare(
         points = np.ascontiguousarray(points[kept])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_sites(points, bounds, spacing, asked, thinned, begun) or _usual_sites(
+    chosen = _smooth_sites(points, bounds, spacing, asked, thinned) or _usual_sites(
         points, bounds, spacing, asked, thinned
     )
     found = chosen.found
@@ -296,15 +267,13 @@ def _prepare(
     )
 
 
-def _smooth_sites(
-    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool, begun: _Begun | None
-) -> _Chosen | None:
+def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
     """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
     length, radius = asked.length, SMOOTH_SITE * asked.length
     if asked.box_size is not None or spacing > SPARSE * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_sites(some, radius, length, spacing, begun.of(some, radius) if begun else None)
+    found = link_sites(some, radius, length, spacing)
     if has_strays(found.neighbors) or not is_smooth(found, length, asked.uneven):
         return None
     return _Chosen(found, radius, some, points, 0, True)

@@ -1,0 +1,249 @@
+"""Multi-start: all attempts at a grid as one flat list, several fronts for an attempt, and the best of their grids that passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
+
+from .errors import FrontError
+from .front import advance_front
+from .grid.equalize import energy_of_node
+from .grid.optimize import improve_first, improve_last
+from .grid.proof import certified
+from .lines.ridges import find_ridges
+from .machine import processors
+from .rows import Field, Rows
+from .scan.sites import sample_surface, with_own_scratch
+from .settings import SITE
+
+if TYPE_CHECKING:
+    from .boundary import Boundary
+    from .grid.grid import Grid
+    from .grid.relief import Relief
+    from .lines.find import Constraints
+    from .scan.cloud import PointCloud
+    from .scan.sites import Sites
+    from .settings import Settings
+
+Progress = Callable[[str, float], None]
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+FINALISTS = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
+POOR = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
+BATCHES = 2  # times that finalists are tried
+LENGTHS = (
+    1.0,
+    0.97,
+    1.04,
+)  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
+COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+COARSEST = 0.5  # largest of them, in desired lengths
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One attempt at a grid."""
+
+    settings: Settings
+    ways: tuple[Rows, ...] | None = None  #: how its fronts are laid out; None: as the effort of the settings allows
+
+
+def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
+    """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
+
+    Rather a grid without ridges than none, or one of another look at the scan: a scan so rough that hardly a grid passes is
+    another one to samples that lie a little farther apart. Method "paper" comes last.
+    """
+    yield from _same_scan(settings)
+    sites = sample_surface(cloud, settings)
+    if (
+        settings.ridge_angle > 0.0
+        and settings.method == "default"
+        and not sites.smooth
+        and find_ridges(sites, settings)
+    ):
+        settings = settings.replace(ridge_angle=0.0)
+        yield from _same_scan(settings)
+    if settings.method == "default":
+        if sites.smooth:
+            yield from _same_scan(settings.replace(box_size=SITE))
+        for size in (share * (settings.box_size or SITE) for share in COARSER):
+            if size <= COARSEST:
+                yield from _same_scan(settings.replace(box_size=size))
+        yield from _same_scan(settings.replace(method="paper"))
+
+
+def _same_scan(settings: Settings) -> Iterator[Attempt]:
+    """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
+    if settings.method == "default":
+        yield Attempt(settings)
+    for share in LENGTHS:
+        yield Attempt(settings, (Rows(scale=share, laid=False),))
+
+
+@dataclass(eq=False)
+class Candidate:
+    """A front on its way to a grid."""
+
+    front: Grid
+    settings: Settings  #: how it is improved
+    relief: Relief
+    grid: Grid | None = None  #: improved to the end, with its certificate
+    fault: FrontError | None = None  #: why it is not to be used
+
+    @property
+    def energy(self) -> float:
+        """The energy that falls, for a node: grids of other numbers of nodes can be compared."""
+        return energy_of_node(self.relief)
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether its worst triangle is a poor one."""
+        return self.grid is not None and self.grid.quality.shape_min < POOR
+
+
+def advance_fronts(
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    fields: Sequence[Field],
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> list[Grid]:
+    """Return what the fronts leave behind that advance over a scan, one for each field (Fig. 4); see `front.advance_front`.
+
+    Raises
+    ------
+    FrontError
+        None has come to its end; the fault of the first.
+    """
+    lone = progress if len(fields) == 1 else None
+
+    def advance(field: Field) -> Grid | FrontError:
+        way, rows = field
+        own = settings if way.laid else settings.replace(length=way.scale * settings.length)
+        scratch = replace(sites, surface=with_own_scratch(sites.surface))
+        try:
+            return advance_front(scratch, boundary, constraints, own, rows, progress=lone)
+        except FrontError as error:
+            return error
+
+    found = _side_by_side(advance, fields, _part(progress, "front", 0.0, 1.0))
+    fronts = [front for front in found if not isinstance(front, FrontError)]
+    if not fronts:
+        raise next(error for error in found if isinstance(error, FrontError))
+    return fronts
+
+
+def improve_fronts(
+    fronts: Sequence[Grid],
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> list[Candidate]:
+    """Return the fronts, opened and improved alike, that of least energy a node first (Sec. 4)."""
+    if progress:
+        progress("optimize", 0.0)
+
+    def improve(front: Grid) -> Candidate:
+        relief = improve_first(front, sites, boundary, constraints, settings)
+        return Candidate(front, settings, relief)
+
+    found = _side_by_side(improve, fronts, _part(progress, "optimize", 0.0, 0.5))
+    ordered = sorted(found, key=lambda candidate: candidate.energy) if len(found) > 1 else found
+    if settings.effort == "best" and len(ordered) > 1:
+        # the first once more as normal ends it: on thin parts annealing may lose
+        again = replace(improve(ordered[0].front), settings=settings.replace(effort="normal"))
+        ordered.insert(FINALISTS["best"] - 1, again)
+    return ordered
+
+
+def best_that_passes(
+    candidates: Sequence[Candidate],
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> Grid:
+    """Improve the first candidates to the end, check them, and return the best that passes, with its certificate.
+
+    Raises
+    ------
+    FrontError
+        None passes; the fault of the first.
+    """
+
+    def finish(candidate: Candidate) -> None:
+        try:
+            grid = improve_last(candidate.relief, candidate.front, sites, constraints, candidate.settings)
+            candidate.grid = certified(grid.replace(settings=settings), sites, boundary, settings)
+        except FrontError as error:
+            candidate.fault = error
+
+    passed: list[Candidate] = []
+    size = FINALISTS[settings.effort]
+    for begin in range(0, min(len(candidates), BATCHES * size), size):
+        batch = candidates[begin : begin + size]
+        _side_by_side(finish, batch, _part(progress, "optimize", 0.5, 1.0))
+        passed += [candidate for candidate in batch if candidate.grid is not None]
+        if any(not candidate.is_poor for candidate in passed):
+            break
+    if not passed:
+        fault = candidates[0].fault
+        assert fault is not None
+        raise fault
+    best = min(passed, key=lambda candidate: (candidate.is_poor, candidate.energy)) if len(passed) > 1 else passed[0]
+    assert best.grid is not None
+    return best.grid
+
+
+def optimize_fronts(
+    fronts: Sequence[Grid],
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> Grid:
+    """Return the best grid that comes of some fronts and passes the checks, with its certificate (Sec. 4)."""
+    improved = improve_fronts(fronts, sites, boundary, constraints, settings, progress=progress)
+    return best_that_passes(improved, sites, boundary, constraints, settings, progress=progress)
+
+
+def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:
+    """Report a share of a part of a stage."""
+    return (lambda share: progress(stage, begin + (end - begin) * share)) if progress else None
+
+
+def _side_by_side(
+    work: Callable[[Job], Result], jobs: Sequence[Job], report: Callable[[float], None] | None
+) -> list[Result]:
+    """Return what the work returns for each job, done on all processors."""
+    done = []
+    workers = min(processors(), len(jobs))
+    with ExitStack() as stack:
+        results: Iterable[Result]
+        if workers < 2:
+            results = map(work, jobs)
+        else:
+            pool = stack.enter_context(ThreadPoolExecutor(workers))
+            futures = [pool.submit(partial(work, job)) for job in jobs]
+            stack.callback(lambda: [future.cancel() for future in futures])
+            results = (future.result() for future in futures)
+        for count, result in enumerate(results, 1):
+            done.append(result)
+            if report:
+                report(count / len(jobs))
+    return done

@@ -1,0 +1,62 @@
+"""The steps before the front, as `pipeline.make_grid` takes them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from scantruss import (
+    Grid,
+    PointCloud,
+    Settings,
+    advance_front,
+    find_boundary,
+    find_constraints,
+    optimize_grid,
+    orientation_fields,
+    sample_surface,
+)
+from scantruss.boundary import Boundary
+from scantruss.kernels.offers import RowNodes
+from scantruss.lines.find import Constraints
+from scantruss.rows import Field, Rows
+from scantruss.scan.sites import Sites
+
+
+class Steps(NamedTuple):
+    """What a front needs."""
+
+    sites: Sites
+    boundary: Boundary
+    constraints: Constraints
+
+
+def steps_of(cloud: PointCloud, settings: Settings) -> Steps:
+    """Return the samples, the boundary and the constraints of a scan."""
+    sites, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    return Steps(sites, *find_constraints(sites, boundary, settings))
+
+
+def boundary_of(cloud: PointCloud, settings: Settings) -> Boundary:
+    """Return the boundary of a scan."""
+    return find_boundary(sample_surface(cloud, settings), settings)[1]
+
+
+def front_of(cloud: PointCloud, settings: Settings, way: Rows | None = None, **others: Any) -> Grid:
+    """Return what a front leaves behind that comes to rows laid in a way; None: that makes all of its nodes itself."""
+    steps = steps_of(cloud, settings)
+    (field,) = (
+        orientation_fields(steps.sites, steps.boundary, settings, [way]) if way else (Field(Rows(laid=False), None),)
+    )
+    return advance_front(*steps, settings, field.nodes, **others)
+
+
+def rows_of(steps: Steps, length: float, way: Rows) -> RowNodes:
+    """Return the nodes of rows laid in a way."""
+    (field,) = orientation_fields(steps.sites, steps.boundary, Settings(length=length), [way])
+    return field.nodes
+
+
+def optimized(grid: Grid, cloud: PointCloud, settings: Settings, places: Any = ()) -> Grid:
+    """Return a grid improved, with nodes at some places (K, 3) in the scan's own frame."""
+    steps = steps_of(cloud, settings.replace(fixed=tuple(map(tuple, places)) or settings.fixed))
+    return optimize_grid(grid, *steps, settings)

@@ -1,0 +1,213 @@
+"""Multi-start: the flat list of attempts, which of them is kept, and what more effort leaves."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from shapes import make
+from small_clouds import cap, sheet
+from steps import steps_of
+
+import scantruss as st
+from scantruss import candidates, pipeline
+from scantruss.candidates import LENGTHS, attempts
+from scantruss.errors import CertificateError, FrontError
+from scantruss.grid.equalize import grid_energy
+
+
+@pytest.fixture(scope="module")
+def shape():
+    return make("scallop", 20_000)
+
+
+def grid_of(shape, effort, **others):
+    return st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, effort=effort), **others)
+
+
+# ---- attempts
+
+
+def size_of(settings):
+    return settings.box_size and round(settings.box_size, 3)
+
+
+def listed(points, **settings):
+    """What the attempts at a scan differ in: ridges, samples, method; each kind once."""
+    cloud, asked = st.PointCloud.from_array(points), st.Settings(length=1.0, **settings)
+    kinds = [(a.settings.ridge_angle, size_of(a.settings), a.settings.method) for a in attempts(cloud, asked)]
+    return list(dict.fromkeys(kinds))
+
+
+def test_what_is_tried_in_which_order():
+    ridge, coarser = st.Settings(length=1.0).ridge_angle, [0.22, 0.24, 0.26]
+    rough, smooth = cap(4.0, 1.0, 0.25), sheet(8, 8, 0.04)
+    folded = make("gable", 20_000).points / 5.0
+    usual = [(ridge, None, "default")]
+    assert listed(rough) == usual + [(ridge, size, "default") for size in coarser] + [(ridge, None, "paper")]
+    without = [(0.0, size, "default") for size in (None, *coarser)]
+    assert listed(folded) == usual + without + [(0.0, None, "paper")]
+    others = [(ridge, size, "default") for size in (0.2, *coarser)]
+    assert listed(smooth) == usual + others + [(ridge, None, "paper")]
+    assert listed(rough, box_size=0.5) == [(ridge, 0.5, "default"), (ridge, 0.5, "paper")]
+    assert listed(rough, method="paper") == [(ridge, None, "paper")]
+
+
+def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without():
+    cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
+    by_kind: dict[tuple[object, ...], list[object]] = {}
+    for attempt in attempts(cloud, st.Settings(length=1.0)):
+        by_kind.setdefault((attempt.settings.box_size, attempt.settings.method), []).append(attempt.ways)
+    for (_, method), ways in by_kind.items():
+        lone = ways[1:] if method == "default" else ways
+        assert method == "paper" or ways[0] is None
+        assert [(way.scale, way.laid) for (way,) in lone] == [(share, False) for share in LENGTHS]
+
+
+def refusing(monkeypatch, passes):
+    """Let only some attempts be made; returns those that were begun."""
+    begun, make_grid = [], pipeline.make_grid
+
+    def chosen(cloud, attempt, **others):
+        begun.append(attempt)
+        if not passes(attempt):
+            raise FrontError(f"fault {len(begun)}")
+        return make_grid(cloud, attempt, **others)
+
+    monkeypatch.setattr(pipeline, "make_grid", chosen)
+    return begun
+
+
+@pytest.mark.parametrize(("size", "method"), [(0.22, "default"), (0.26, "default"), (None, "paper")])
+def test_the_first_that_passes_is_the_grid_and_its_settings_say_so(monkeypatch, size, method):
+    refusing(monkeypatch, lambda a: (size_of(a.settings), a.settings.method) == (size, method))
+    grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
+    assert (size_of(grid.settings), grid.settings.method) == (size, method)
+    assert grid.certificate.passed
+
+
+def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch):
+    begun = refusing(monkeypatch, lambda _: False)
+    with pytest.raises(FrontError, match="fault 1"):
+        st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
+    assert len(begun) == 4 * 4 + 3
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_a_front_of_another_length_is_taken_where_the_first_fails(monkeypatch, method):
+    refusing(monkeypatch, lambda a: a.ways is not None and a.ways[0].scale == LENGTHS[2])
+    grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0, method=method))
+    assert grid.certificate.passed and grid.settings == st.Settings(length=1.0, method=method)
+
+
+def test_a_grid_that_fails_its_check_comes_with_the_error_or_is_kept(monkeypatch):
+    """All grids lose a half: what is raised is the failed certificate of the first."""
+    finish = candidates.improve_last
+
+    def half(*arguments):
+        grid = finish(*arguments)
+        left = grid.nodes[grid.triangles].mean(axis=1)[:, 0] < np.median(grid.nodes[:, 0])
+        return grid.replace(triangles=grid.triangles[left])
+
+    monkeypatch.setattr(candidates, "improve_last", half)
+    points, asked = cap(4.0, 1.0, 0.25), st.Settings(length=1.0)
+    with pytest.raises(CertificateError, match=r"the grid leaves out .* of the scan") as refused:
+        st.grid_from_points(points, asked)
+    assert refused.value.where == refused.value.grid.certificate.faults[0].where
+    assert not refused.value.grid.certificate.passed
+    kept = st.grid_from_points(points, asked, keep_failed=True)
+    assert not kept.certificate.passed and kept.settings == asked
+
+
+# ---- several fronts
+
+
+def test_more_effort_leaves_less_energy():
+    """On the mean of some scans of some shapes, for a node; a single grid may be lucky."""
+    energies = []
+    for effort in ("quick", "normal", "best"):
+        shares = []
+        for name, seed in product(("scallop", "l_plate", "two_holes"), range(4)):
+            shape = make(name, 20_000, seed=seed)
+            grid = grid_of(shape, effort)
+            shares.append(grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
+        energies.append(np.mean(shares))
+    assert 0.95 * energies[0] > energies[1] > 1.03 * energies[2]
+
+
+def test_lengths_or_shapes_can_be_preferred(shape):
+    quality = {
+        prefer: st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, prefer=prefer)).quality
+        for prefer in ("lengths", "balance", "shapes")
+    }
+    assert quality["lengths"].length_cv < quality["balance"].length_cv < quality["shapes"].length_cv
+    assert quality["lengths"].shape_mean < quality["balance"].shape_mean < quality["shapes"].shape_mean
+
+
+def test_the_number_of_processors_makes_no_difference(shape, monkeypatch):
+    grids = []
+    for count in (1, 2, 5):
+        monkeypatch.setattr(candidates, "processors", lambda count=count: count)
+        grids.append(grid_of(shape, "best"))
+    for grid in grids[1:]:
+        assert grid.nodes.tobytes() == grids[0].nodes.tobytes()
+        assert grid.triangles.tobytes() == grids[0].triangles.tobytes()
+
+
+def test_the_quality_before_is_that_of_the_front_and_fixed_nodes_stay(shape):
+    place = tuple(shape.points[7])
+    settings = st.Settings(length=1.4 * shape.length, effort="best", fixed=(place,))
+    grid = st.grid_from_points(shape.points, settings)
+    assert grid.before.length_cv > 1.3 * grid.quality.length_cv
+    assert np.linalg.norm(grid.nodes[grid.fixed] + grid.origin - place, axis=1).min() < 1e-9 * shape.length
+    assert grid.settings == settings
+
+
+def test_progress_grows_to_the_end(shape):
+    seen = []
+    grid_of(shape, "best", progress=lambda stage, share: seen.append((stage, share)))
+    shares = [share for stage, share in seen if stage == "optimize"]
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+@pytest.mark.parametrize("effort", ["quick", "normal", "best"])
+def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape, effort):
+    """As the README shows them: the same bytes, the certificate included."""
+    place = tuple(shape.points[7])
+    cloud = st.PointCloud.from_array(shape.points)
+    settings = st.Settings(length=1.4 * shape.length, effort=effort, fixed=(place,))
+    surface = st.sample_surface(cloud, settings)
+    surface, boundary = st.find_boundary(surface, settings)
+    boundary, constraints = st.find_constraints(surface, boundary, settings)
+    fields = st.orientation_fields(surface, boundary, settings)
+    fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
+    grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)
+    whole = st.grid_from_points(shape.points, settings)
+    assert grid.nodes.tobytes() == whole.nodes.tobytes() and grid.triangles.tobytes() == whole.triangles.tobytes()
+    assert grid.certificate == whole.certificate and grid.certificate.passed
+
+
+def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_raised(shape, monkeypatch):
+    cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length, effort="best")
+    steps = steps_of(cloud, settings)
+    fronts = st.advance_fronts(*steps, st.orientation_fields(steps.sites, steps.boundary, settings), settings)
+    refused = []
+
+    def check(grid, *_):
+        if len(refused) < 3:
+            refused.append(grid)
+            raise FrontError(f"fault {len(refused)}")
+        return grid
+
+    monkeypatch.setattr(candidates, "processors", lambda: 1)
+    monkeypatch.setattr(candidates, "certified", check)
+    grid = st.optimize_fronts(fronts, *steps, settings)
+    assert len(refused) == 3 and grid.topology.manifold
+
+    def never(grid, *_):
+        refused.append(grid)
+        raise FrontError(f"fault {len(refused)}")
+
+    refused.clear()
+    monkeypatch.setattr(candidates, "certified", never)
+    with pytest.raises(FrontError, match="fault 1"):
+        st.optimize_fronts(fronts, *steps, settings)
