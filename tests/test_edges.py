@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as strategies
 from marks import compiled_only
+from small_clouds import HandFront, sheet
 from steps import steps_of
 
 import scantruss as st
@@ -10,7 +13,7 @@ from scantruss import front as driver
 from scantruss.errors import FrontError
 from scantruss.kernels import front as lists
 from scantruss.kernels import gaps
-from scantruss.slits import check_links
+from scantruss.slits import add_half_edges, check_links, link_around
 
 
 def groin_vault(rise, noise=0.02, half=36.0, count=60_000, seed=0):
@@ -104,3 +107,74 @@ def test_a_grid_comes_of_it_or_a_clear_refusal(name, effort):
         assert "the grid" in str(error)
     else:
         assert grid.certificate.passed
+
+
+@compiled_only
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_segments_are_closed_loops_from_the_start_to_the_last_gap(name, monkeypatch):
+    """After each slice of the front, and before each gap, of which each leaves fewer segments."""
+    points, length = SURFACES[name]
+    settings = st.Settings(length=length)
+    steps = steps_of(st.PointCloud.from_array(points()), settings)
+    advance, find, left = driver.kernels.advance, gaps.gap_loop, []
+
+    def look_after_a_slice(surface, front, *others):
+        status = advance(surface, front, *others)
+        assert_closed_loops(front)
+        return status
+
+    def look_before_a_gap(front, *others):
+        assert_closed_loops(front)
+        left.append(int((front.state[: front.count[lists.SEGMENTS]] != lists.GONE).sum()))
+        return find(front, *others)
+
+    monkeypatch.setattr(driver.kernels, "advance", look_after_a_slice)
+    monkeypatch.setattr(gaps, "gap_loop", look_before_a_gap)
+    try:
+        st.advance_front(*steps, settings)
+    except FrontError as error:
+        assert "a line could not be kept" in str(error)
+    assert left == sorted(set(left), reverse=True)
+
+
+PLATE = sheet(8.0, 8.0, 0.25)
+
+
+def add_lines_from(front, node, places):
+    """Add lines of one member each from a node to new nodes, these linked, the node not yet."""
+    for far in places:
+        add_half_edges(front, [node, far])
+        link_around(front, far)
+
+
+@given(strategies.lists(strategies.integers(0, 23), min_size=1, max_size=6), strategies.booleans())
+def test_lines_in_any_directions_leave_closed_loops(turns, on_rim):
+    """Lines from one node: several in one direction, some of them across the rim."""
+    hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0)], points=PLATE)
+    x, y = (0.0, 0.0) if on_rim else (1.5, 1.5)
+    node = 0 if on_rim else hand.add_node(x, y)
+    reach, angle = 0.5 + 0.1 * np.arange(len(turns)), np.pi / 12 * np.array(turns)
+    add_lines_from(
+        hand.front,
+        node,
+        [hand.add_node(x + r * np.cos(a), y + r * np.sin(a)) for r, a in zip(reach, angle, strict=True)],
+    )
+    link_around(hand.front, node)
+    assert_closed_loops(hand.front)
+    check_links(hand.front)
+
+
+@given(strategies.lists(strategies.integers(1, 11), min_size=1, max_size=5, unique=True))
+def test_the_rim_goes_out_and_back_along_each_line_in_the_order_in_which_they_stand(turns):
+    """What comes along the rim turns into the line that is nearest, back from it into the next, and goes on along the rim."""
+    hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (-3.0, 0.0)], points=PLATE)
+    front, rim = hand.front, hand.segments[0]
+    ends = {turn: hand.add_node(np.cos(turn * np.pi / 12), np.sin(turn * np.pi / 12)) for turn in turns}
+    add_lines_from(front, 0, ends.values())
+    link_around(front, 0)
+    met, s = [], rim[-1]
+    for _ in turns:
+        s = front.next[s]
+        met.append(int(front.head[s]))
+        s = front.next[s]
+    assert met == [ends[turn] for turn in sorted(turns, reverse=True)] and front.next[s] == rim[0]

@@ -2,6 +2,13 @@
 
 A front segment runs from its tail to its head with the unmeshed area on its left. Segments form closed loops (previous, next).
 Attaching a triangle keeps the loops closed and every edge at two triangles, so the grid is manifold at every moment.
+
+Of the segments that are not GONE these hold from the initial front on, and whoever changes the lists keeps them:
+
+- `next` is one to one among them, `previous` is its inverse, and each begins where the one before it ends;
+- the list of a node (`out`, `out_next`) holds each of them that starts there once, and nothing else; so does that of its corners.
+
+Therefore every walk ends: along `next` it comes back to where it began, and down the list of a node to its end.
 """
 
 from __future__ import annotations
@@ -138,7 +145,7 @@ def add_chain(front: Front, nodes: np.ndarray, state: int) -> None:
 
 @kernel
 def remove_segment(front: Front, s: int) -> None:
-    """Take a segment out of the front."""
+    """Take a segment that is not GONE out of the front; its neighbours are still to be linked."""
     front.state[s] = GONE
     node = front.tail[s]
     at = front.out[node]
