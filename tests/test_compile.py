@@ -141,7 +141,6 @@ def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch):
         return 2.0 * x
 
     assert twice(21.0) == 42.0
-    assert compiling.is_compiled(twice) == bool(numba.config.DISABLE_JIT)
 
 
 def test_the_decorator_leaves_the_settings_of_numba_alone():
@@ -159,7 +158,7 @@ CODE = """
 import scantruss.kernels.vectors as v
 from scantruss.kernels import compile as c
 assert v.norm((3.0, 4.0, 0.0)) == 5.0
-print(c.FOLDER, c.is_compiled(v.norm))
+print(c.FOLDER, any(c.FOLDER.rglob("vectors.norm-*.nbc")) if c.FOLDER else False)
 """
 
 
@@ -222,7 +221,7 @@ import scantruss.kernels.vectors as v
 from scantruss.kernels import compile as c
 assert v.norm((3.0, 4.0, 0.0)) == 5.0
 stats = v.norm.alone.stats
-print(sum(stats.cache_hits.values()), c.is_compiled(v.norm), v.__file__)
+print(sum(stats.cache_hits.values()), v.__file__)
 """
 
 
@@ -241,8 +240,8 @@ def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path
         kept = {key: value for key, value in os.environ.items() if key != "SCANTRUSS_INSTALLED"}
         done = subprocess.run([sys.executable, "-c", FOUND], capture_output=True, text=True, env=kept | words)
         assert done.returncode == 0, done.stderr
-        hits, known, file = done.stdout.split()
-        assert known == "True" and Path(file).is_relative_to(package)
+        hits, file = done.stdout.split()
+        assert Path(file).is_relative_to(package)
         return int(hits), len(list((tmp_path / name).rglob("*.nbc")))
 
     assert find("fresh") == (1, 0)
@@ -252,39 +251,6 @@ def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path
     with (package / "kernels" / "boxes.py").open("a") as file:
         file.write("# a change\n")
     assert find("another kernel") == (0, 1)
-
-
-def test_without_a_folder_of_ones_own_what_came_with_the_package_is_not_counted_on(tmp_path, monkeypatch):
-    """Machine code is read by numba only where it could also write some."""
-    (tmp_path / "vectors.norm-1.py311.1.nbc").write_bytes(b"")
-    monkeypatch.setattr(compiling, "INSTALLED", tmp_path)
-    monkeypatch.setattr(numba.config, "DISABLE_JIT", 0)
-    norm = importlib.import_module("scantruss.kernels.vectors").norm
-    for folder in (tmp_path / "own", None):
-        monkeypatch.setattr(compiling, "FOLDER", folder)
-        assert compiling.is_compiled(norm) == (folder is not None)
-
-
-BLAS = """
-import sys
-from scantruss import kernels
-kernels.of_command = {of_command}
-import scantruss.kernels.vectors as v
-assert v.norm((3.0, 4.0, 0.0)) == 5.0
-print("scipy.linalg" in sys.modules)
-import scipy.linalg.cython_blas
-"""
-
-
-@compiled_only
-@pytest.mark.parametrize("of_command", [True, False])
-def test_a_command_does_not_wait_for_products_of_matrices_and_other_processes_keep_them(of_command):
-    pytest.importorskip("scipy")
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", BLAS.format(of_command=of_command)], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == [str(not of_command)]
 
 
 def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path):

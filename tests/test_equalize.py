@@ -194,9 +194,9 @@ def test_the_same_grid_comes_out_twice(rough):
 def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough):
     relief = rough.relief()
     equalize(relief)
-    closed = relief.begin_to_close(rough.grid)
+    closed = relief.close(rough.grid)
     finish(relief)
-    early, late = relief.to_grid(rough.grid, closed()), relief.to_grid(rough.grid)
+    early, late = relief.to_grid(rough.grid, closed), relief.to_grid(rough.grid)
     assert "topology" in vars(early) and early.topology == late.topology
     for name in ("nodes", "triangles", "fixed", "deviation"):
         assert getattr(early, name).tobytes() == getattr(late, name).tobytes()

@@ -22,7 +22,6 @@ LAYERS = (  # lowest first; a module imports from its own line and from lines ab
     ("grid",),
     ("candidates",),
     ("pipeline",),
-    ("ahead",),
     ("structure",),
     ("export",),
     ("sweep",),

@@ -11,14 +11,12 @@ import pytest
 from steps import boundary_of
 
 import scantruss as st
-from scantruss import ahead
 from scantruss.cli import main
 from scantruss.commands import scaling
 from scantruss.machine import available_memory
 from scantruss.options import size_of_memory
 from scantruss.scan import fit
 from scantruss.scan.thin import thin_points
-from scantruss.sweep import Trial
 
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
@@ -294,15 +292,6 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
 )
 def test_a_sweep_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
     assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
-
-
-@pytest.mark.parametrize(
-    ("compiled", "method"), [(("default", "paper"), "default"), (("default",), "paper"), ((), "default")]
-)
-def test_a_sweep_compiles_the_first_of_its_methods_that_needs_it(monkeypatch, compiled, method):
-    trials = [Trial(m, m, (m,), st.Settings(length=1.0, method=m)) for m in ("default", "paper", "default")]
-    monkeypatch.setattr(ahead, "are_compiled", lambda method, *stages: method in compiled)
-    assert scaling._method_to_compile(trials, "default") == method
 
 
 def test_a_sweep_into_a_file_is_refused(place, capsys):

@@ -6,14 +6,14 @@ A refusal is one line on stderr and an exit status of `HELP`; nothing is written
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType
+from types import FrameType, ModuleType
+from typing import cast
 
-from . import __version__, kernels
+from . import __version__
 from .errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
 
 HELP = f"""\
@@ -45,8 +45,6 @@ Exit status; one line says why it is not 0:
   143  stopped (SIGTERM)
 """
 
-RARELY = 50_000  # objects more until Python looks for some that nobody has
-
 
 def run(words: Sequence[str]) -> None:
     """Run one command."""
@@ -65,7 +63,22 @@ def run(words: Sequence[str]) -> None:
     if "-h" in words or "--help" in words:
         print(parser.format_help(), end="")
         return
-    command(parser.read(words[1:]))
+    values = parser.read(words[1:])
+    import_numba_without_blas()
+    command(values)
+
+
+def import_numba_without_blas() -> None:
+    """Import numba without scipy.linalg, which it looks for where scipy is installed: a seventh of a short command.
+
+    Only products of matrices in kernels need it, of which a process of ours has none.
+    """
+    if (name := "scipy.linalg.cython_blas") not in sys.modules:
+        sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
+        try:
+            import numba.np.arraymath  # noqa: F401
+        finally:
+            del sys.modules[name]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -76,11 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Words after the name of the program; `sys.argv` by default.
     """
-    kernels.of_command = True
-    kept, often = signal.getsignal(signal.SIGTERM), gc.get_threshold()
+    kept = signal.getsignal(signal.SIGTERM)
     try:
-        # importing makes much that stays, and looking through it takes a tenth of a short command
-        gc.set_threshold(RARELY)
         try_signal(signal.SIGTERM, _stop)
         run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
@@ -108,7 +118,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return refuse(f"a fault of ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
     finally:
         try_signal(signal.SIGTERM, kept)
-        gc.set_threshold(*often)
     return 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError
 from .outputs import claim, inputs_of
-from .shared import SCAN, STAGES, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
+from .shared import SCAN, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -101,14 +101,12 @@ def make_grid(
     cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
 ) -> Grid:
     """Run the chain, and say so where kernels must be compiled."""
-    from ..ahead import CompileAhead
     from ..pipeline import grid_from_cloud
     from ..scan.member_length import check_length
 
     check_length(cloud, settings)
-    said = note_compiling(bars, settings.method, *STAGES)
-    with said, CompileAhead(settings.method, bars) as progress:
-        grid = grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=read_seconds)
+    with note_compiling(bars):
+        grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:

@@ -43,7 +43,7 @@ def info(values: Namespace) -> None:
         print_lines(cloud_lines(cloud))
         settings = settings if given else settings.replace(length=suggest_length(cloud))
         check_length(cloud, settings)
-        with note_compiling(bars, settings.method, "boundary"):
+        with note_compiling(bars):
             from ..boundary import find_boundary
             from ..scan.sites import sample_surface
 

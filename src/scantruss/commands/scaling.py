@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
 from .outputs import Taken, claim, cloud_output, inputs_of, result_folder
-from .shared import STAGES, add_memory, note_compiling, read_scan, said_of_cloud_file, say_of_cloud, thin_to_fit
+from .shared import add_memory, note_compiling, read_scan, said_of_cloud_file, say_of_cloud, thin_to_fit
 
 if TYPE_CHECKING:
     from ..options import Parser
@@ -161,7 +161,7 @@ def sweep(values: Namespace) -> None:
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
-        said = note_compiling(bars, _method_to_compile(trials, shortest.method), *STAGES)
+        said = note_compiling(bars)
         with said, _workers(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
@@ -193,14 +193,6 @@ def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
         raise FormatError(
             f"{folder} holds grids of another sweep, {others[0]}{more}; name another folder, or remove these first"
         )
-
-
-def _method_to_compile(trials: list[Trial], usual: str) -> str:
-    """Return the first method of the trials whose kernels must be compiled, else the usual one."""
-    from ..ahead import are_compiled
-
-    methods = (trial.settings.method for trial in trials)
-    return next((method for method in methods if not are_compiled(method, *STAGES)), usual)
 
 
 def _thinned(trial: Trial, spacing: float) -> Trial:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
-STAGES = ("boundary", "front", "optimize")  # of a grid
 
 
 def add_memory(parser: Parser) -> None:
@@ -110,17 +109,10 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str 
 
 
 @contextmanager
-def note_compiling(bars: Bars, method: str = "default", *stages: str) -> Iterator[None]:
-    """Say so, once a run, where kernels must be compiled, which takes long: at the start where stages are known to need it."""
-    from ..ahead import are_compiled, can_be_stored
-    from ..kernels.compile import tell_of_compiling
+def note_compiling(bars: Bars) -> Iterator[None]:
+    """Say so, once a run, when kernels are compiled, which takes long."""
+    from ..kernels.compile import FOLDER, tell_of_compiling
 
-    def tell() -> None:
-        bars.note_once("compiling kernels, once on this machine" if can_be_stored() else "compiling kernels")
-
-    if are_compiled(method, *stages):
-        with tell_of_compiling(tell):
-            yield
-    else:
-        tell()
+    words = "compiling kernels, once on this machine" if FOLDER else "compiling kernels"
+    with tell_of_compiling(lambda: bars.note_once(words)):
         yield

@@ -15,14 +15,12 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
 from numba.core import event
 
-from . import of_command
 from .linking import compiled
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -73,16 +71,6 @@ def _folder() -> Path | None:
     return None
 
 
-def _without_blas() -> None:
-    """Let numba get ready without scipy.linalg: products of matrices need it, which no kernel has, and it takes a tenth of a command."""
-    if (name := "scipy.linalg.cython_blas") not in sys.modules:
-        sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
-        try:
-            import numba.np.arraymath  # noqa: F401
-        finally:
-            del sys.modules[name]
-
-
 def _installed() -> Path | None:
     """The folder of the machine code that came with the package; None where none did, or it is of other kernels.
 
@@ -97,17 +85,6 @@ def _installed() -> Path | None:
 NAME = f"kernels-{_contents()}"
 FOLDER = _folder()
 INSTALLED = _installed()
-if of_command:
-    _without_blas()
-
-
-def is_compiled(*kernels: Callable[..., object]) -> bool:
-    """Whether machine code of these kernels is on disk already (False: their next call compiles)."""
-    if numba.config.DISABLE_JIT:
-        return True
-    folders = [folder for folder in (FOLDER, INSTALLED) if folder and FOLDER]
-    stored = {path.name.partition("-")[0] for folder in folders for path in folder.rglob("*.nbc")}
-    return all(f"{kernel.__module__.rpartition('.')[2]}.{kernel.__qualname__}" in stored for kernel in kernels)
 
 
 @contextmanager
