@@ -8,6 +8,7 @@ from rough import rough_disc, rough_sphere, same_topology
 from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_scratch, settle
 from scantruss.grid.kicks import new_area, search_widely
 from scantruss.kernels import kick as kernels
+from scantruss.kernels.grid import KIND
 from scantruss.kernels.trial import total_energy
 
 MAKERS = {
@@ -123,7 +124,7 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
 @pytest.mark.kernels
 def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
-    relief.net.state[:, 2] = kernels.LOCKED
+    relief.net.state[:, KIND] = kernels.LOCKED
     first = int(np.flatnonzero(relief.net.degree > 0)[0])
     assert kernels.list_area(relief.net, relief.patches, area, first) == kernels.UNFIT
 
