@@ -85,7 +85,7 @@ class HandFront:
         self.sites = sites_of(points, length)
         self.surface = self.sites.surface
         self.front = new_front(self.sites, self.settings)
-        self.numbers = numbers_of(self.settings, self.sites.spacing)
+        self.rules = rules_of(self.settings, self.sites.spacing)
         self.found, self.patch = np.empty(lists.NEAR, np.int64), np.zeros(PATCH)
         self.segments = []
         for i, loop in enumerate(loops):
@@ -127,12 +127,18 @@ class HandFront:
         return self.front.nodes[: self.front.count[lists.NODES]]
 
 
-def numbers_of(settings, spacing, strict=1.0):
-    """The numbers that steer a front, for the kernels."""
-    numbers = np.zeros(16)
-    numbers[lists.LENGTH], numbers[lists.NEARNESS] = settings.length, settings.nearness
-    numbers[lists.W1], numbers[lists.MERGE] = settings.length_weight, np.radians(settings.merge_angle)
-    numbers[lists.SHAPE], numbers[lists.SIZE] = settings.shape_weight, settings.size_weight
-    numbers[lists.RANGE], numbers[lists.STRICT] = settings.search_range * spacing, strict
-    numbers[lists.QUADRANGLE] = float(settings.case3 == "quadrangle")
-    return numbers
+def rules_of(settings, spacing, strict=1.0):
+    """What a front goes by, for the kernels."""
+    return lists.Rules(
+        length=settings.length,
+        desired=settings.length,
+        graded=False,
+        length_weight=settings.length_weight,
+        shape_weight=settings.shape_weight,
+        size_weight=settings.size_weight,
+        search_range=settings.search_range * spacing,
+        nearness=settings.nearness,
+        merge_angle=float(np.radians(settings.merge_angle)),
+        quadrangle=settings.case3 == "quadrangle",
+        strict=strict,
+    )

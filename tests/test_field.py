@@ -45,7 +45,7 @@ def across(points, low, high):
 def field_of(points, **settings):
     """The desired lengths at the sites of a cloud [scan unit], and the surface."""
     sites = sites_of(points, settings.pop("length", 0.0), **settings)
-    return sites.surface.scale[0] * sites.surface.field, sites.surface
+    return sites.surface.length * sites.surface.field, sites.surface
 
 
 def targets(grid):

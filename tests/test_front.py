@@ -187,7 +187,7 @@ def test_a_grown_front_keeps_what_it_holds():
     """Nodes that were merged away do not come back into the boxes."""
     places = [(0, 0), (1, 0), (0.8, 0.95), (3.2, 1), (3.2, 2.6), (0.5, 3.2), (-2.2, 2.6), (-2.2, 1), (0.2, 0.95)]
     hand = HandFront(places, inner=(2, 8), method="paper")
-    assert choose_by_case(hand.surface, hand.front, 0, hand.numbers, hand.found, hand.patch)
+    assert choose_by_case(hand.surface, hand.front, 0, hand.rules, hand.found, hand.patch)
     larger = driver.grown(hand.front)
     assert len(larger.nodes) > len(hand.front.nodes) and len(larger.tail) > len(hand.front.tail)
     for s in range(1, 9):

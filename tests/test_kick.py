@@ -8,7 +8,6 @@ from rough import rough_disc, rough_sphere, same_topology
 from scantruss.grid.equalize import PRICE, WEIGHT, energy_of_node, new_scratch, settle
 from scantruss.grid.kicks import new_area, search_widely
 from scantruss.kernels import kick as kernels
-from scantruss.kernels.grid import KIND
 from scantruss.kernels.trial import total_energy
 
 MAKERS = {
@@ -30,7 +29,7 @@ def trace(net):
     """All that a net says of the nodes in use."""
     used = np.flatnonzero(net.degree > 0)
     rings = [net.ring[v, : net.degree[v]].tolist() for v in used]
-    return used.tolist(), rings, net.nodes[used].tobytes(), net.arc[used].tobytes(), net.state[used].tobytes()
+    return used.tolist(), rings, net.nodes[used].tobytes(), net.arc[used].tobytes(), net.degree[used].tobytes()
 
 
 def energy_of(relief, scratch):
@@ -49,7 +48,7 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, relief, scratch, area = settled
     net = relief.net
-    before, free, patches = trace(net), int(net.free[-2]), relief.patches[net.degree > 0].tobytes()
+    before, free, patches = trace(net), int(net.spare[0]), relief.patches[net.degree > 0].tobytes()
     kicked = 0
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
         assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
@@ -57,7 +56,7 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
         kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
         kernels.search_area(net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, 0.05)
         kernels.put_area_back(net, relief.patches, area)
-        assert int(net.free[-2]) == free and trace(net) == before
+        assert int(net.spare[0]) == free and trace(net) == before
         assert relief.patches[net.degree > 0].tobytes() == patches
     assert kicked > 20
 
@@ -82,10 +81,10 @@ def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(set
     for v in np.flatnonzero(net.degree > 0).tolist() * 2:
         if net.degree[v] == 0:
             continue
-        before, free = energy_of(relief, scratch), int(net.free[-2])
+        before, free = energy_of(relief, scratch), int(net.spare[0])
         if kick(relief, scratch, area, v, 0.03):
             paid += 1
-            assert energy_of(relief, scratch) < before + 0.03 * (free - int(net.free[-2])) - 9e-5
+            assert energy_of(relief, scratch) < before + 0.03 * (free - int(net.spare[0])) - 9e-5
     assert paid > 3
     assert same_topology(rough.grid, relief.to_grid(rough.grid))
 
@@ -124,7 +123,7 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
 @pytest.mark.kernels
 def test_a_defect_is_left_alone(settled):
     _, relief, _, area = settled
-    relief.net.state[:, KIND] = kernels.LOCKED
+    relief.net.kind[:] = kernels.LOCKED
     first = int(np.flatnonzero(relief.net.degree > 0)[0])
     assert kernels.list_area(relief.net, relief.patches, area, first) == kernels.UNFIT
 
@@ -135,11 +134,11 @@ def test_an_area_that_reaches_out_of_bounds_is_told(settled):
     net = relief.net
     first = int(np.flatnonzero(net.degree > 0)[0])
     assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
-    around = area.around[: area.counter[kernels.COUNT]].copy()
+    around = area.around[: area.gathered[0]].copy()
     for out in around[:: max(len(around) // 5, 1)].tolist():
-        area.mark[out, kernels.OUT] = 1
+        area.out[out] = 1
         assert kernels.list_area(net, relief.patches, area, first) == kernels.BEYOND
-        area.mark[out, kernels.OUT] = 0
+        area.out[out] = 0
     assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
 
 

@@ -164,15 +164,15 @@ def test_section_3_4_step_1_the_optimal_point(w1):
     With w_1 = 1 the regular triangle, of height 0.87, lies below the search region, which begins at r - h = 1.56 - 0.38.
     """
     hand = HandFront(square(), length=1.8, length_weight=w1, search_range=3.0)
-    assert cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch)
+    assert cases.optimal_point(hand.surface, hand.front, AB, hand.rules, hand.patch)
     found = hand.front.nodes[hand.front.count[lists.NODES]]
     expected = naive.optimal_point(
-        hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.8, w1, hand.numbers[lists.RANGE]
+        hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.8, w1, hand.rules.search_range
     )
     assert found.tolist() == hand.surface.points[expected].tolist()  # to the last bit: a point of the cloud
     r = ROOT3 / 2 * (w1 * 1.8 + (1 - w1) * 1.0)
-    assert abs(found[0] - 0.5) <= hand.numbers[lists.RANGE]
-    assert abs(found[1] - r) <= hand.numbers[lists.RANGE]
+    assert abs(found[0] - 0.5) <= hand.rules.search_range
+    assert abs(found[1] - r) <= hand.rules.search_range
 
 
 @pytest.mark.kernels
@@ -182,7 +182,7 @@ def test_section_3_4_step_1_b_and_h_bound_the_search():
     away = np.hypot(points[:, 0] - 0.5, points[:, 1] - ROOT3 / 2)
     for radius, there in ((0.2, True), (0.95, False)):
         hand = HandFront(square(5), points=points[away > radius], length=1.0, search_range=3.0)
-        assert cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch) == there
+        assert cases.optimal_point(hand.surface, hand.front, AB, hand.rules, hand.patch) == there
 
 
 @pytest.mark.kernels
@@ -190,7 +190,7 @@ def test_section_3_4_step_1_points_on_the_meshed_side_do_not_count():
     """Eq. 7: all points above AB are taken away; those below it are as near."""
     points = sheet(8, 8, 0.125)
     hand = HandFront(square(), points=points[points[:, 1] < 1e-3])
-    assert not cases.optimal_point(hand.surface, hand.front, AB, hand.numbers, hand.patch)
+    assert not cases.optimal_point(hand.surface, hand.front, AB, hand.rules, hand.patch)
 
 
 @pytest.mark.kernels
@@ -198,7 +198,7 @@ def test_section_3_4_step_2_a_point_far_from_the_front_becomes_a_node():
     """The distance to the upper side, 3 - r = 2.1, is more than l_e / 2."""
     hand = HandFront(square())
     near = hand.near(AB)
-    assert cases.new_node(hand.surface, hand.front, AB, hand.numbers, hand.found, near, hand.patch)
+    assert cases.new_node(hand.surface, hand.front, AB, hand.rules, hand.found, near, hand.patch)
     a, b, p = 1, 2, 12
     assert hand.triangles == [{a, b, p}]
     assert hand.nodes[p, :2] == pytest.approx([0.5, ROOT3 / 2], abs=0.1)
@@ -212,7 +212,7 @@ def test_section_3_4_step_2_half_a_length_is_the_limit(height, far):
     hand = HandFront(square(5))
     near = hand.near(AB)
     place = three(1.5, height)
-    assert fits.far_from_front(hand.front, AB, -1, place, hand.found, near, 0.5 * 1.0, 1.0) == far
+    assert cases.far_from_front(hand.front, AB, -1, place, hand.found, near, 0.5 * 1.0, 1.0) == far
 
 
 @pytest.mark.kernels
@@ -233,7 +233,7 @@ def test_section_3_4_step_3_else_the_best_triangle_with_an_end_of_the_near_segme
                 ends[q] = naive.shape_quality(three(*A), three(*B), hand.nodes[q]) + naive.size_quality(1, to_a, to_b)
     assert max(ends, key=ends.get) == 16
     assert ends[16] == pytest.approx(0.948 + 0.591, abs=0.002)
-    assert cases.new_node(hand.surface, hand.front, AB, hand.numbers, hand.found, near, hand.patch)
+    assert cases.new_node(hand.surface, hand.front, AB, hand.rules, hand.found, near, hand.patch)
     assert hand.triangles == [{1, 2, 16}]
     assert len(hand.nodes) == 20  # no new one
 
@@ -243,13 +243,13 @@ def test_section_3_4_step_3_else_the_best_triangle_with_an_end_of_the_near_segme
 
 def advance_once(hand, s=0):
     """Advance one segment by Table 1."""
-    return cases.choose_by_case(hand.surface, hand.front, s, hand.numbers, hand.found, hand.patch)
+    return cases.choose_by_case(hand.surface, hand.front, s, hand.rules, hand.found, hand.patch)
 
 
 def case(hand, s=0):
     """Number of the case in which a segment is."""
     angles = fits.left_angle(hand.front, s), fits.right_angle(hand.front, s)
-    return cases.case_of(hand.front, s, *angles, hand.numbers[lists.MERGE])
+    return cases.case_of(hand.front, s, *angles, hand.rules.merge_angle)
 
 
 def around(c, d):
@@ -274,11 +274,11 @@ def test_table_1_case_2_a_quadrangle_is_divided_by_its_better_diagonal():
     """A (0, 0), B (1, 0), D (1.4, 0.9), C (0.4, 0.9): BC = 1.08 is shorter than AD = 1.66, and its triangles are better."""
     hand = HandFront([A, B, (1.4, 0.9), (0.4, 0.9)], method="paper")
     assert case(hand) == 2
-    assert advance_by_cases(hand.surface, hand.front, hand.numbers, 100) == lists.DONE
+    assert advance_by_cases(hand.surface, hand.front, hand.rules, 100) == lists.DONE
     assert set(hand.triangles) == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
     assert not hand.alive
     mirrored = HandFront([A, B, (0.6, 0.9), (-0.4, 0.9)], method="paper")
-    advance_by_cases(mirrored.surface, mirrored.front, mirrored.numbers, 100)
+    advance_by_cases(mirrored.surface, mirrored.front, mirrored.rules, 100)
     assert set(mirrored.triangles) == {frozenset({0, 1, 2}), frozenset({0, 2, 3})}
 
 

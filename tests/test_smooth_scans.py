@@ -18,7 +18,7 @@ from scantruss.settings import SITE, SMOOTH_SITE
 
 def apart(sites):
     """How far apart the sites are: the smallest distance that they keep [member lengths]."""
-    return sites.surface.scale[1]
+    return sites.surface.radius
 
 
 def roof(angle, length, points, seed=0):

@@ -148,7 +148,7 @@ def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None
 def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
     """All loops but those of small holes, none of them external yet."""
     length = settings.length
-    radius = max(settings.boundary_radius * length, 1.3 * sites.surface.scale[1], 1.9 * sites.spacing)
+    radius = max(settings.boundary_radius * length, 1.3 * sites.surface.radius, 1.9 * sites.spacing)
     found: list[tuple[np.ndarray, int, Chance]] = []
     surface = sites.surface._replace(normals=broad_normals(sites.surface))
     rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)

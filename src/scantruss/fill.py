@@ -37,7 +37,7 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
     All happens in a flat picture of the hole: what is seen around it is laid out there, and a thin plate for each coordinate passes
     through it.
     """
-    length = float(surface.scale[0])
+    length = surface.length
     around = float(np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1).sum())
     start, away, places, normals = _look_around(surface, curve, max(SIGHT[0] * length, SIGHT[1] * around / np.pi))
     if len(places) < FEW:
@@ -68,7 +68,7 @@ def _look_around(
     away : (K,) way from there [scan unit]
     places, normals : (K, 3) on the scanned surface
     """
-    length, patch = float(surface.scale[0]), np.zeros(PATCH)
+    length, patch = surface.length, np.zeros(PATCH)
     found: list[tuple[int, float, np.ndarray, np.ndarray]] = []
     site = nearest_site(surface, *curve[0].tolist())
     for i in range(0, len(curve), max(1, len(curve) // RIM)):

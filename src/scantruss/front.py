@@ -62,28 +62,31 @@ def advance_front(
     """
     front = start_front(new_front(sites, settings), sites, boundary, constraints, settings, rows)
     members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
-    numbers = np.array(
-        [
-            settings.length,
-            settings.nearness,
-            settings.length_weight,
-            np.radians(settings.merge_angle),
-            settings.shape_weight,
-            settings.size_weight,
-            settings.search_range * sites.spacing,
-            1.0,
-            float(settings.case3 == "quadrangle"),
-            settings.length,
-            float(sites.graded),
-        ]
+    rules = lists.Rules(
+        length=settings.length,
+        desired=settings.length,
+        graded=sites.graded,
+        length_weight=settings.length_weight,
+        shape_weight=settings.shape_weight,
+        size_weight=settings.size_weight,
+        search_range=settings.search_range * sites.spacing,
+        nearness=settings.nearness,
+        merge_angle=float(np.radians(settings.merge_angle)),
+        quadrangle=settings.case3 == "quadrangle",
+        strict=1.0,
     )
     for strict in STRICTNESS:
-        numbers[lists.STRICT] = strict
         count = int(front.count[lists.SEGMENTS])
         for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
             lists.enqueue(front, s)
         by_cases = settings.method == "paper" and strict == STRICTNESS[0]
-        front = run(front, sites, numbers, progress, kernels.advance_by_cases if by_cases else kernels.advance)
+        front = run(
+            front,
+            sites,
+            rules._replace(strict=strict),
+            progress,
+            kernels.advance_by_cases if by_cases else kernels.advance,
+        )
     close_gaps(front, sites, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     check_kept(members, triangles, front.nodes)
@@ -276,12 +279,12 @@ def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 
 
 def run(
-    front: lists.Front, sites: Sites, numbers: np.ndarray, progress: Progress | None, step: Callable[..., int]
+    front: lists.Front, sites: Sites, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = sites.graded_area / (0.433 * numbers[lists.REFERENCE] ** 2)
+    expected = sites.graded_area / (0.433 * rules.desired**2)
     while True:
-        status = step(sites.surface, front, numbers, BUDGET)
+        status = step(sites.surface, front, rules, BUDGET)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:

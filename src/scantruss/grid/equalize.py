@@ -18,7 +18,7 @@ from ..kernels.equalize import STRIDE, settle_some
 from ..kernels.grid import Net
 from ..kernels.halves import BETWEEN
 from ..kernels.search import search, suit_nodes
-from ..kernels.trial import OUT, TRIED, Scratch, total_energy
+from ..kernels.trial import Scratch, total_energy
 from ..machine import two_at_once
 from .flips import flip_by_angle
 from .grid import Grid
@@ -49,11 +49,18 @@ def blank_scratch(relief: Relief) -> Scratch:
     """Return room for the trials of the search."""
     capacity, width = relief.net.ring.shape
     return Scratch(
-        note=np.zeros((capacity, 3), np.int64),
+        held=np.zeros(capacity, np.int64),
+        tried=np.zeros(capacity, np.int64),
+        out=np.zeros(capacity, np.int64),
         around=np.zeros(capacity, np.int64),
-        nodes=np.zeros((capacity, 4)),
-        ring=np.zeros((capacity, width + 2), np.int64),
-        counter=np.zeros(3, np.int64),
+        nodes=np.zeros((capacity, 3)),
+        arc=np.zeros(capacity),
+        ring=np.zeros((capacity, width), np.int64),
+        degree=np.zeros(capacity, np.int64),
+        line=np.zeros(capacity, np.int64),
+        trial=np.zeros(1, np.int64),
+        gathered=np.zeros(1, np.int64),
+        paid=np.zeros(1, np.int64),
     )
 
 
@@ -106,7 +113,7 @@ def search_once(relief: Relief, scratch: Scratch) -> int:
     Where many ask, those of two halves of the grid are tried side by side, then those between.
     """
     net, kept = relief.net, 0
-    asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.note[:, TRIED] == 0)
+    asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.tried[:] == 0)
     if asking.sum() >= ASKING:
         kept = _search_halves(relief, Halves(net, asking), scratch)
     terms = terms_of(relief, scratch)
@@ -119,11 +126,11 @@ def _search_halves(relief: Relief, halves: Halves, scratch: Scratch) -> int:
     terms = terms._replace(nodes=terms.nodes // 2)
     own = [blank_scratch(relief), blank_scratch(relief)]
     for side in (0, 1):
-        own[side].note[:, OUT] = halves.label != side
+        own[side].out[:] = halves.label != side
     halves.run(lambda side: _search(relief, halves.nets[side], own[side], terms))
     for side in (0, 1):
-        scratch.note[halves.label == side, TRIED] = own[side].note[halves.label == side, TRIED]
-    return sum(int(room.counter[2]) for room in own)
+        scratch.tried[halves.label == side] = own[side].tried[halves.label == side]
+    return sum(int(room.paid[0]) for room in own)
 
 
 def _search(relief: Relief, net: Net, scratch: Scratch, terms: Terms) -> int:

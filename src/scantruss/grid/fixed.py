@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..kernels.grid import REST, RIM, may_split, split
 from ..kernels.rim import nearest_on_rim
 from ..kernels.seat import nearest_site
-from ..kernels.trial import TRIED, Scratch, total_energy
+from ..kernels.trial import Scratch, total_energy
 from ..lines.fixed_nodes import place_text
 from ..scan.sites import local_field
 from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
@@ -93,7 +93,7 @@ def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
     if not len(positions):
         return
     scratch = new_scratch(relief)
-    scratch.note[:, TRIED] = 1
+    scratch.tried[:] = 1
     for place in positions:
         if (v := _node_at(relief, place)) >= 0:
             _put_node(relief, v, place)
@@ -140,7 +140,7 @@ def _take(relief: Relief, scratch: Scratch, way: tuple[int, int], place: np.ndar
     around = {v}
     for _ in range(2):
         around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
-    scratch.note[sorted(around), TRIED] = 0
+    scratch.tried[sorted(around)] = 0
     for _ in range(3):
         relief.renew(FAR)
         settle(relief, WEIGHT, 1e-3, 6)

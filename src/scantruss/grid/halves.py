@@ -27,15 +27,15 @@ class Halves:
         if kernels.ways_from_ends(net, among, away, queue):
             ahead = away[0] - away[1]
             kernels.part(net, (ahead > np.median(ahead[among])).astype(np.int64), self.label)
-        self.nets = tuple(net._replace(free=self._free(side)) for side in (0, 1))  #: the net of each half
+        self.nets = tuple(net._replace(**self._free(side)) for side in (0, 1))  #: the net of each half
 
-    def _free(self, side: int) -> np.ndarray:
-        count, used = self._net.free[-2:]
+    def _free(self, side: int) -> dict[str, np.ndarray]:
+        count = self._net.spare[0]
         own = self._net.free[:count][side::2]
         self.label[own] = side
         free = np.zeros(len(self._net.free), np.int64)
-        free[: len(own)], free[-2:] = own, (len(own), used)
-        return free
+        free[: len(own)] = own
+        return {"free": free, "spare": np.array([len(own)]), "in_use": self._net.in_use.copy()}
 
     def run(self, work: Callable[[int], object]) -> None:
         """Call work(side) for both halves at once, and make them one net again."""
@@ -45,7 +45,7 @@ class Halves:
                 work(side)
 
         in_parts(2, 1, both)
-        first, second = (net.free for net in self.nets)
-        left = np.concatenate([first[: first[-2]], second[: second[-2]]])
+        first, second = self.nets
+        left = np.concatenate([half.free[: half.spare[0]] for half in self.nets])
         self._net.free[: len(left)] = np.sort(left)[::-1]
-        self._net.free[-2:] = len(left), max(first[-1], second[-1])
+        self._net.spare[0], self._net.in_use[0] = len(left), max(first.used, second.used)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..kernels.grid import Net
-from ..kernels.kick import HOPE, HOPELESS, KEPT, MOST, OUT, Area, kick_all
+from ..kernels.kick import HOPE, HOPELESS, KEPT, MOST, Area, kick_all
 from ..kernels.trial import Scratch
 from .equalize import FAR, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
 from .halves import Halves
@@ -24,14 +24,18 @@ def new_area(relief: Relief, number: int = 0) -> Area:
     """Return room for what a kick may change, and a source of chance of its own for each number."""
     capacity, width = relief.net.ring.shape
     return Area(
-        mark=np.zeros((capacity, 3), np.int64),
-        around=np.zeros(MOST, np.int64),
-        nodes=np.zeros((MOST, 5)),
+        **{name: np.zeros(capacity, np.int64) for name in ("mark", "away", "out")},
+        **{
+            name: np.zeros(MOST, np.int64) for name in ("around", "degree", "is_open", "kind", "curve", "ideal", "line")
+        },
+        nodes=np.zeros((MOST, 3)),
+        arc=np.zeros(MOST),
+        desired=np.zeros(MOST),
         ring=np.zeros((MOST, width), np.int64),
         patches=np.zeros((MOST, relief.patches.shape[1])),
-        state=np.zeros((MOST, relief.net.state.shape[1]), np.int64),
-        free=np.zeros(KEPT + 2, np.int64),
-        counter=np.array([0, 0, 7919 * number, 0]),
+        free=np.zeros(KEPT, np.int64),
+        **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
+        seed=np.array([7919 * number]),
     )
 
 
@@ -70,7 +74,7 @@ def kick_in_halves(relief: Relief) -> None:
         terms = terms_of(relief, rooms[2][0])
         terms = terms._replace(nodes=terms.nodes // 2)  # each half brings the mean length to the desired one by itself
         for side in (0, 1):
-            rooms[side][1].mark[:, OUT] = halves.label != side
+            rooms[side][1].out[:] = halves.label != side
         halves.run(lambda side: kick(relief, halves.nets[side], rooms[side], waiting, terms, 0.0, HOPE))
 
     for _ in range(HALVINGS):

@@ -55,21 +55,23 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     net = Net(
         nodes=np.zeros((capacity, 3)),
         ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
-        state=np.zeros((capacity, kernels.COLUMNS), np.int64),
+        **{name: np.zeros(capacity, np.int64) for name in ("degree", "is_open", "kind", "ideal", "line")},
+        curve=np.full(capacity, -1),
         arc=np.zeros(capacity),
-        free=np.zeros(capacity + 2, np.int64),
+        free=np.zeros(capacity, np.int64),
+        spare=np.zeros(1, np.int64),
+        in_use=np.zeros(1, np.int64),
         desired=np.ones(capacity),
     )
-    net.curve[:] = -1
     if len(grid.lines) and net.ring.shape[1] > MOST:
         raise FrontError(f"a node came out with {valence} members; use another length", grid)
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
-    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.state, source, count)
+    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.degree, net.is_open, source, count)
     net.nodes[:used] = grid.nodes[source[:used]]
     spare = np.arange(capacity - 1, used - 1, -1)
     net.free[: len(spare)] = spare
-    net.free[-2:] = len(spare), used
+    net.spare[0], net.in_use[0] = len(spare), used
     net.kind[:used][net.is_open[:used] == 1] = REST
     net.kind[:count][grid.fixed] = REST
     several = np.bincount(source[:used], minlength=count) > 1

@@ -6,34 +6,28 @@ import math
 
 import numpy as np
 
-from .cases import choose_by_case
+from .cases import choose_by_case, far_from_front
 from .compile import kernel
 from .field import length_at
-from .fits import far_from_front, fits, left_angle, near_nodes, right_angle
+from .fits import fits, left_angle, near_nodes, right_angle
 from .front import (
     ACTIVE,
     DONE,
     FIRST,
     FULL,
-    GRADED,
     LAST,
-    LENGTH,
     MORE,
     NEAR,
-    NEARNESS,
     NODES,
-    REFERENCE,
     SEGMENTS,
-    SHAPE,
-    SIZE,
-    STRICT,
     TRIANGLES,
-    W1,
     WAITING,
     Front,
+    Rules,
     add_node,
     attach,
     propose_node,
+    rules_at,
 )
 from .surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from .triangles import quality, turned
@@ -70,15 +64,15 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
     gap = norm(subtract(row(surface.mean, near), foot))
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)
-    return gap < 0.9 * surface.scale[0] * surface.field[near]
+    return gap < 0.9 * surface.length * surface.field[near]
 
 
 @kernel
 def choose_by_quality(
-    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray
 ) -> bool:
     """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
-    length, strict = numbers[LENGTH], numbers[STRICT]
+    length, strict = rules.length, rules.strict
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     before, after = front.previous[s], front.next[s]
@@ -86,27 +80,27 @@ def choose_by_quality(
     near = near_nodes(surface, front, s, (2.4 + 0.8 * (1.0 - strict)) * length, length, found)
     alpha, beta = left_angle(front, s), right_angle(front, s)
     segment = norm(subtract(pb, pa))
-    side = numbers[W1] * length + (1.0 - numbers[W1]) * segment
+    side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
     place = ideal_point(front, s, alpha, beta, side)
     widest = 2.2 + 0.7 * (1.0 - strict)
     around = (0.75 + 0.9 * (1.0 - strict)) * length
-    room = (0.4 + 0.6 * strict) * numbers[NEARNESS] * length * 1.1
+    room = (0.4 + 0.6 * strict) * rules.nearness * length * 1.1
     score = np.full(near + 1, -1.0)
     for i in range(near):
         q = found[i]
         if front.out[q] < 0 and front.corner[q] >= 0:
             continue
         pq = row(front.nodes, q)
-        value = quality(pa, pb, pq, side, numbers[SHAPE], numbers[SIZE])
+        value = quality(pa, pb, pq, side, rules.shape_weight, rules.size_weight)
         if q in (c, d):
             if (q == c and alpha < widest) or (q == d and beta < widest):
                 score[i] = value
         elif norm(subtract(pq, place)) < around:
             if front.out[q] >= 0:
                 score[i] = 0.9 * value
-            elif far_from_front(front, s, q, pq, found, near, 0.5 * numbers[NEARNESS] * length, length):
+            elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
                 score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
-    enough = ENOUGH * (numbers[SHAPE] + numbers[SIZE])
+    enough = ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = False
     while True:
         best = -1
@@ -118,7 +112,7 @@ def choose_by_quality(
             if propose_on_surface(surface, front, s, place, patch):
                 pp = row(front.nodes, front.count[NODES])
                 if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
-                    score[near] = quality(pa, pb, pp, side, numbers[SHAPE], numbers[SIZE])
+                    score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
             continue
         if best < 0 or score[best] < 0.5 * strict:
             return False
@@ -155,20 +149,20 @@ def take_segment(front: Front) -> int:
 
 
 @kernel
-def set_length(surface: Surface, front: Front, s: int, numbers: np.ndarray) -> None:
-    """Set the length that is desired where the triangle of a segment will lie."""
-    if numbers[GRADED] == 0.0:
-        return
+def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Rules:
+    """The rules with the length that is desired where the triangle of a segment will lie."""
+    if not rules.graded:
+        return rules
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
-    height = 0.4 * numbers[REFERENCE] * surface.field[front.site[a]]
+    height = 0.4 * rules.desired * surface.field[front.site[a]]
     place = along(along(pa, 0.5, ab), height, turned(ab, row(front.normals, a), 0.5 * math.pi))
-    numbers[LENGTH] = numbers[REFERENCE] * length_at(surface, front.site[a], place)
+    return rules_at(rules, rules.desired * length_at(surface, front.site[a], place))
 
 
 @kernel
-def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
+def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(NEAR, np.int64)
     patch = np.zeros(PATCH)
@@ -178,14 +172,14 @@ def advance(surface: Surface, front: Front, numbers: np.ndarray, budget: int) ->
         s = take_segment(front)
         if s < 0:
             return DONE
-        set_length(surface, front, s, numbers)
-        if not choose_by_quality(surface, front, s, numbers, found, patch):
+        own = rules_of_segment(surface, front, s, rules)
+        if not choose_by_quality(surface, front, s, own, found, patch):
             front.state[s] = WAITING
     return MORE
 
 
 @kernel
-def advance_by_cases(surface: Surface, front: Front, numbers: np.ndarray, budget: int) -> int:
+def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
     found = np.empty(NEAR, np.int64)
     patch = np.zeros(PATCH)
@@ -195,7 +189,7 @@ def advance_by_cases(surface: Surface, front: Front, numbers: np.ndarray, budget
         s = take_segment(front)
         if s < 0:
             return DONE
-        set_length(surface, front, s, numbers)
-        if not choose_by_case(surface, front, s, numbers, found, patch):
+        own = rules_of_segment(surface, front, s, rules)
+        if not choose_by_case(surface, front, s, own, found, patch):
             front.state[s] = WAITING
     return MORE

@@ -111,7 +111,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
     """
     blocked = np.zeros(DIRECTIONS, np.bool_)
     ahead = np.empty((surface.neighbors.shape[1], 3))
-    noise = 0.2 * surface.scale[0]
+    noise = 0.2 * surface.length
     for s in range(begin, end):
         free[s] = 9.0
         normal, place = row(surface.normals, s), row(surface.mean, s)
@@ -192,7 +192,7 @@ def roll_disc(
     """
     path[0] = site
     count, came_from = 1, -1
-    noise = 0.2 * surface.scale[0]
+    noise = 0.2 * surface.length
     step = 2.0 * math.pi / BINS
     cover = np.empty(BINS + 1, np.int64)
     while count < len(path):
@@ -274,7 +274,7 @@ def touch_points(
     sites : (M,) site near each place
     touched : (M, 3) filled with the point that the disc touches first
     """
-    noise = 0.35 * surface.scale[0]
+    noise = 0.35 * surface.length
     for m in range(begin, end):
         site, place = sites[m], row(places, m)
         normal = row(surface.normals, site)
@@ -282,7 +282,7 @@ def touch_points(
         side = cross(normal, out)
         touched[m, 0], touched[m, 1], touched[m, 2] = place
         best = -1e300
-        count = flood(surface, site, row(surface.mean, site), radius + 2.0 * surface.scale[1])
+        count = flood(surface, site, row(surface.mean, site), radius + 2.0 * surface.radius)
         for i in range(count):
             s = surface.queue[i]
             if dot(row(surface.normals, s), normal) < FACING:

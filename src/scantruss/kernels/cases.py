@@ -8,18 +8,11 @@ import numpy as np
 
 from .boxes import put, take
 from .compile import kernel
-from .fits import clear_of_front, far_from_front, fits, left_angle, near_nodes, right_angle
+from .fits import clear_of_front, fits, left_angle, near_nodes, right_angle
 from .front import (
-    LENGTH,
-    MERGE,
-    NEARNESS,
     NODES,
-    QUADRANGLE,
-    RANGE,
-    SHAPE,
-    SIZE,
-    W1,
     Front,
+    Rules,
     add_node,
     add_triangle,
     attach,
@@ -33,7 +26,17 @@ from .surface import Surface, fit_patch, flood, onto_patch, patch_normal, walk
 from .triangles import distance_to_segment, on_unmeshed_side, quality, shape_quality, turned
 from .vectors import Vector, along, cross, dot, norm, row, subtract, unit
 
-TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # numbers of the cases in Table 1
+# What the paper leaves open: how strict the tests are by which a triangle is found fit.
+TOLERANT = 0.7  # strictness of the tests for a triangle that a case asks for, from 0 to 1
+SOUND = 0.4  # shape quality below which the triangle of two merged nodes is too flat
+KEPT_SOUND = 0.35  # shape quality below which merging would leave a finished triangle too flat
+ALIGNED = 0.5  # cosine of the angle between a triangle and the surface at its nodes, below which it stands up from it
+MERGED = 0.9  # free nodes farther apart than this are not merged [lengths]
+LEAST = 0.3  # quality delta below which no triangle with an existing node is made
+SEEN = 2.4  # how far the nodes of the front are looked at around a segment [lengths]
+APART = 0.45  # least distance of a new node from a node that the front has not come to yet [lengths]
+
+TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
 
 
 @kernel
@@ -59,34 +62,34 @@ def reach(length: float, segment: float, w1: float) -> float:
 
 
 @kernel
-def try_node(front: Front, s: int, p: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def try_node(front: Front, s: int, p: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Attach node p to a segment if that fits."""
-    good, passage = fits(front, s, p, found, near, numbers[LENGTH], 0.7)
+    good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
     if good:
         attach(front, s, p, passage)
     return good
 
 
 @kernel
-def close_triangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def close_triangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 1: the neighbours meet."""
-    return try_node(front, s, front.tail[front.previous[s]], numbers, found, near)
+    return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
-def close_left(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def close_left(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 6: a triangle with the previous neighbour."""
-    return try_node(front, s, front.tail[front.previous[s]], numbers, found, near)
+    return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
-def close_right(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def close_right(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 5: a triangle with the next neighbour."""
-    return try_node(front, s, front.head[front.next[s]], numbers, found, near)
+    return try_node(front, s, front.head[front.next[s]], rules, found, near)
 
 
 @kernel
-def close_quadrangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def close_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 2: the better diagonal of a quadrangle; its other triangle is then case 1."""
     a, b = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
     c = row(front.nodes, front.tail[front.previous[s]])
@@ -94,8 +97,8 @@ def close_quadrangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarra
     left = min(shape_quality(a, b, c), shape_quality(b, d, c))
     right = min(shape_quality(a, b, d), shape_quality(a, d, c))
     if left >= right:
-        return close_left(front, s, numbers, found, near) or close_right(front, s, numbers, found, near)
-    return close_right(front, s, numbers, found, near) or close_left(front, s, numbers, found, near)
+        return close_left(front, s, rules, found, near) or close_right(front, s, rules, found, near)
+    return close_right(front, s, rules, found, near) or close_left(front, s, rules, found, near)
 
 
 @kernel
@@ -107,7 +110,7 @@ def _fan_holds(front: Front, node: int, place: Vector) -> bool:
         q, r = front.triangles[t, (k + 1) % 3], front.triangles[t, (k + 2) % 3]
         pq, pr = row(front.nodes, q), row(front.nodes, r)
         face = unit(cross(subtract(pq, place), subtract(pr, place)))
-        if dot(face, row(front.normals, q)) < 0.5 or shape_quality(place, pq, pr) < 0.35:
+        if dot(face, row(front.normals, q)) < ALIGNED or shape_quality(place, pq, pr) < KEPT_SOUND:
             return False
         at = front.corner_next[at]
     return True
@@ -134,7 +137,7 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 
 
 @kernel
-def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
     Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
@@ -147,7 +150,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray,
     if c == d or edge_exists(front, c, d) or _share_neighbor(front, c, d, a, b):
         return False
     pc, pd = row(front.nodes, c), row(front.nodes, d)
-    if norm(subtract(pd, pc)) > 0.9 * numbers[LENGTH]:
+    if norm(subtract(pd, pc)) > MERGED * rules.length:
         return False
     middle = along(pc, 0.5, subtract(pd, pc))
     keep, lose = (d, c) if front.on_boundary[d] else (c, d)
@@ -156,7 +159,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray,
         place = row(front.nodes, keep)
     else:
         site = walk(surface, front.site[c], middle)
-        count = flood(surface, site, middle, 2.0 * surface.scale[4])
+        count = flood(surface, site, middle, 2.0 * surface.step)
         least = 1e300
         for i in range(count):
             t = surface.queue[i]
@@ -166,14 +169,14 @@ def merge_neighbors(surface: Surface, front: Front, s: int, numbers: np.ndarray,
                     least, place = dot(away, away), row(surface.points, p)
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     face = unit(cross(subtract(pb, pa), subtract(place, pa)))
-    if dot(face, row(front.normals, a)) < 0.5 or shape_quality(pa, pb, place) < 0.4:
+    if dot(face, row(front.normals, a)) < ALIGNED or shape_quality(pa, pb, place) < SOUND:
         return False
     if not (_fan_holds(front, c, place) and _fan_holds(front, d, place)):
         return False
     for i in range(near):
         if found[i] == lose:
             found[i] = keep
-    if not clear_of_front(front, s, keep, place, found, near, 0.0, numbers[LENGTH]):
+    if not clear_of_front(front, s, keep, place, found, near, 0.0, rules.length):
         return False
     _merge(front, keep, lose, place)
     x, y = front.previous[before], front.next[after]
@@ -220,7 +223,7 @@ def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
 
 
 @kernel
-def divide_quadrangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int) -> bool:
+def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 3 after Foucault et al. [30]: the free ends are joined, and the quadrangle is divided by a diagonal."""
     c, d = front.tail[front.previous[s]], front.head[front.next[s]]
     if edge_exists(front, c, d):
@@ -232,18 +235,18 @@ def divide_quadrangle(front: Front, s: int, numbers: np.ndarray, found: np.ndarr
     right = min(shape_quality(a, b, pd), shape_quality(a, pd, pc))
     if left >= right:
         after = front.next[s]
-        if not close_left(front, s, numbers, found, near):
+        if not close_left(front, s, rules, found, near):
             return False
-        close_right(front, front.previous[after], numbers, found, near)
+        close_right(front, front.previous[after], rules, found, near)
         return True
-    if not close_right(front, s, numbers, found, near):
+    if not close_right(front, s, rules, found, near):
         return False
-    close_left(front, front.next[before], numbers, found, near)
+    close_left(front, front.next[before], rules, found, near)
     return True
 
 
 @kernel
-def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, patch: np.ndarray) -> bool:
+def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
     """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False where there is none.
 
     Searched are the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
@@ -257,13 +260,13 @@ def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, p
     segment = norm(ab)
     e = unit(ab)
     middle = along(pa, 0.5, ab)
-    r = reach(numbers[LENGTH], segment, numbers[W1])
+    r = reach(rules.length, segment, rules.length_weight)
     ideal = along(middle, r, turned(ab, normal, 0.5 * math.pi))
     site = walk(surface, front.site[a], ideal)
-    extent = numbers[RANGE]
+    extent = rules.search_range
     best, chosen, of = -1.0, -1, site
     for _ in range(2):
-        count = flood(surface, site, ideal, 1.5 * extent + surface.scale[4])
+        count = flood(surface, site, ideal, 1.5 * extent + surface.step)
         for i in range(count):
             t = surface.queue[i]
             if dot(row(surface.normals, t), normal) < 0.0:
@@ -277,7 +280,7 @@ def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, p
                     continue
                 if not on_unmeshed_side(pa, pb, place, normal):
                     continue
-                value = quality(pa, pb, place, segment, numbers[SHAPE], numbers[SIZE])
+                value = quality(pa, pb, place, segment, rules.shape_weight, rules.size_weight)
                 if value > best:
                     best, chosen, of = value, p, t
         if chosen >= 0:
@@ -293,7 +296,28 @@ def optimal_point(surface: Surface, front: Front, s: int, numbers: np.ndarray, p
 
 
 @kernel
-def best_existing_node(front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, pp: Vector) -> bool:
+def far_from_front(
+    front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float
+) -> bool:
+    """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
+    for i in range(near + 2):
+        q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
+        t = front.out[q]
+        while t >= 0:
+            if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
+                return False
+            t = front.out_next[t]
+        if (
+            i < near
+            and q != p
+            and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, APART * length))
+        ):
+            return False
+    return True
+
+
+@kernel
+def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, near: int, pp: Vector) -> bool:
     """Step 3 of Sec. 3.4: the best triangle with an end of the segments that are too near to the optimal point."""
     pa, pb = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
     segment = norm(subtract(pb, pa))
@@ -306,14 +330,14 @@ def best_existing_node(front: Front, s: int, numbers: np.ndarray, found: np.ndar
             pe = row(front.nodes, front.head[t])
             w = front.tail[front.previous[t]]
             least = min(distance_to_segment(pp, pq, pe), distance_to_segment(pp, row(front.nodes, w), pq))
-            if least < numbers[NEARNESS] * numbers[LENGTH]:
-                score[i] = quality(pa, pb, pq, segment, numbers[SHAPE], numbers[SIZE])
+            if least < rules.nearness * rules.length:
+                score[i] = quality(pa, pb, pq, segment, rules.shape_weight, rules.size_weight)
             t = front.out_next[t]
     for _ in range(near):
         i = int(np.argmax(score))
-        if score[i] <= 0.3:
+        if score[i] <= LEAST:
             return False
-        if try_node(front, s, found[i], numbers, found, near):
+        if try_node(front, s, found[i], rules, found, near):
             return True
         score[i] = -1.0
     return False
@@ -321,43 +345,41 @@ def best_existing_node(front: Front, s: int, numbers: np.ndarray, found: np.ndar
 
 @kernel
 def new_node(
-    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, near: int, patch: np.ndarray
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.ndarray
 ) -> bool:
     """Case 4: the three steps of Sec. 3.4."""
-    if not optimal_point(surface, front, s, numbers, patch):
+    if not optimal_point(surface, front, s, rules, patch):
         return False
     p = front.count[NODES]
     pp = row(front.nodes, p)
-    if far_from_front(front, s, p, pp, found, near, numbers[NEARNESS] * numbers[LENGTH], numbers[LENGTH]):
-        good, passage = fits(front, s, p, found, near, numbers[LENGTH], 0.7)
+    if far_from_front(front, s, p, pp, found, near, rules.nearness * rules.length, rules.length):
+        good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
         if good:
             add_node(front)
             attach(front, s, p, passage)
             return True
     if near == 0:
         return False
-    return best_existing_node(front, s, numbers, found, near, pp)
+    return best_existing_node(front, s, rules, found, near, pp)
 
 
 @kernel
-def choose_by_case(
-    surface: Surface, front: Front, s: int, numbers: np.ndarray, found: np.ndarray, patch: np.ndarray
-) -> bool:
+def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
     """Advance a segment by the six cases of Table 1; False where the case's triangle does not fit."""
-    near = near_nodes(surface, front, s, 2.4 * numbers[LENGTH], numbers[LENGTH], found)
-    case = case_of(front, s, left_angle(front, s), right_angle(front, s), numbers[MERGE])
+    near = near_nodes(surface, front, s, SEEN * rules.length, rules.length, found)
+    case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
     if case == TRIANGLE:
-        return close_triangle(front, s, numbers, found, near)
+        return close_triangle(front, s, rules, found, near)
     if case == QUAD:
-        return close_quadrangle(front, s, numbers, found, near)
+        return close_quadrangle(front, s, rules, found, near)
     if case == BOTH:
-        if numbers[QUADRANGLE] > 0.0:
-            return divide_quadrangle(front, s, numbers, found, near)
-        if merge_neighbors(surface, front, s, numbers, found, near):
+        if rules.quadrangle:
+            return divide_quadrangle(front, s, rules, found, near)
+        if merge_neighbors(surface, front, s, rules, found, near):
             return True
-        return close_quadrangle(front, s, numbers, found, near)
+        return close_quadrangle(front, s, rules, found, near)
     if case == RIGHT:
-        return close_right(front, s, numbers, found, near)
+        return close_right(front, s, rules, found, near)
     if case == LEFT:
-        return close_left(front, s, numbers, found, near)
-    return new_node(surface, front, s, numbers, found, near, patch)
+        return close_left(front, s, rules, found, near)
+    return new_node(surface, front, s, rules, found, near, patch)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .grid import CURVE, DEGREE, INTERIOR, KIND, OPEN, REST, RIM, Net
+from .grid import INTERIOR, REST, RIM, Net
 from .rim import Rim, slide
 from .surface import onto_patch
 
@@ -33,7 +33,7 @@ def star_energy(
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
     nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
-    d, half = net.state[v, DEGREE], 0.5 * length
+    d, half = net.degree[v], 0.5 * length
     own = half * net.desired[v]
     w = net.ring[v, d - 1]
     cx, cy, cz = nodes[w, 0] - x, nodes[w, 1] - y, nodes[w, 2] - z
@@ -51,7 +51,7 @@ def star_energy(
             if slope:
                 f = 2.0 * weight * stretch / (target * size)
                 gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
-        if i == 0 and net.state[v, OPEN] == 1:
+        if i == 0 and net.is_open[v] == 1:
             continue
         energy += 1.0
         ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx  # twice the area, as a vector
@@ -83,8 +83,8 @@ def settle_node(
 
     Steps shorter than `still`, where members are to have the length, are not made.
     """
-    kind = net.state[v, KIND]
-    if kind >= REST or net.state[v, DEGREE] == 0:
+    kind = net.kind[v]
+    if kind >= REST or net.degree[v] == 0:
         return 0.0
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
@@ -93,7 +93,7 @@ def settle_node(
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
-    step = stride * local * local / (net.state[v, DEGREE] * (weight + 1.3))
+    step = stride * local * local / (net.degree[v] * (weight + 1.3))
     most = 0.3 * local
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
     if size < still * net.desired[v]:
@@ -104,7 +104,7 @@ def settle_node(
     for _ in range(2):
         place = (x - step * gx, y - step * gy, z - step * gz)
         if kind == RIM:
-            arc, px, py, pz = slide(rim, net.state[v, CURVE], net.arc[v], most, place[0], place[1], place[2])
+            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
             dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
@@ -148,7 +148,7 @@ def settle_some(
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1
-                    for i in range(net.state[v, DEGREE]):
+                    for i in range(net.degree[v]):
                         awake[net.ring[v, i]] = 1
         if gain < enough * len(some):
             return gain, sweep + 1

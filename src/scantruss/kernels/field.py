@@ -23,7 +23,7 @@ NEAREST = 12  # given lengths that count at a place; the next one says how far a
 def length_at(surface: Surface, site: int, place: Vector) -> float:
     """Desired length at a place near a site: the mean of the site and its neighbours, the nearer the weightier."""
     site = walk(surface, site, place)
-    reach = BESIDE * surface.scale[4]
+    reach = BESIDE * surface.step
     total = mean = 0.0
     for k in range(-1, surface.neighbors.shape[1]):
         s = site if k < 0 else surface.neighbors[site, k]
@@ -162,14 +162,14 @@ def measure_bends(surface: Surface, sites: np.ndarray, found: np.ndarray, begin:
     for i in range(begin, end):
         place = row(surface.mean, sites[i])
         taken = fit_patch(surface, patch, sites[i], place)
-        count = flood(surface, sites[i], place, surface.scale[2])
+        count = flood(surface, sites[i], place, surface.patch_radius)
         x = y = z = 0.0
         for k in range(count):
             d = subtract(row(surface.mean, surface.queue[k]), place)
             x, y, z = x + d[0], y + d[1], z + d[2]
-        aside = norm((x, y, z)) / (max(count, 1) * surface.scale[2])
+        aside = norm((x, y, z)) / (max(count, 1) * surface.patch_radius)
         found[i, 0] = _bend(patch)
         spread = SPREAD * (1.0 + ASIDE * aside * aside) * 1.25 * patch[17]
-        found[i, 1] = spread / (surface.scale[2] * surface.scale[2] * math.sqrt(max(taken, 1)))
+        found[i, 1] = spread / (surface.patch_radius * surface.patch_radius * math.sqrt(max(taken, 1)))
         if taken < 10:
             found[i, 1] = np.inf

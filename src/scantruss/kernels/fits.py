@@ -41,7 +41,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
     if facing < -0.5 and flat > 0.7:
         return False
     place = along(row(front.nodes, a), 0.5, d)
-    return linked(surface, front.site[a], front.site[q], place, 0.6 * far + 1.5 * surface.scale[4])
+    return linked(surface, front.site[a], front.site[q], place, 0.6 * far + 1.5 * surface.step)
 
 
 @kernel
@@ -197,25 +197,4 @@ def clear_of_front(
                 if q != b and e != b and lines_cross(pb, pp, pq, pe, SHEET * length):
                     return False
             t = front.out_next[t]
-    return True
-
-
-@kernel
-def far_from_front(
-    front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float
-) -> bool:
-    """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
-    for i in range(near + 2):
-        q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
-        t = front.out[q]
-        while t >= 0:
-            if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
-                return False
-            t = front.out_next[t]
-        if (
-            i < near
-            and q != p
-            and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, 0.45 * length))
-        ):
-            return False
     return True

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .compile import kernel
-from .grid import DEGREE, Net, flip, may_flip, wings
+from .grid import Net, flip, may_flip, wings
 from .vectors import Vector, cross, dot, norm, row, subtract
 
 
@@ -54,9 +54,9 @@ def flip_by_angle(net: Net, fold: float, rounds: int, changed: np.ndarray) -> in
     count = 0
     for turn in range(rounds):
         before = count
-        for v in range(net.free[-1]):
+        for v in range(net.in_use[0]):
             i = 0
-            while i < net.state[v, DEGREE]:
+            while i < net.degree[v]:
                 u = net.ring[v, i]
                 i += 1
                 if v < u and changed[v] >= turn - 1 and changed[u] >= turn - 1:
@@ -66,7 +66,7 @@ def flip_by_angle(net: Net, fold: float, rounds: int, changed: np.ndarray) -> in
                         count += 1
                         for w in (v, u, right, left):
                             changed[w] = turn
-                            for k in range(net.state[w, DEGREE]):
+                            for k in range(net.degree[w]):
                                 changed[net.ring[w, k]] = turn
         if count == before:
             break

@@ -24,14 +24,41 @@ from .vectors import Vector
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
-LENGTH, NEARNESS, W1, MERGE, SHAPE, SIZE, RANGE, STRICT, QUADRANGLE = range(
-    9
-)  # places in `numbers`; LENGTH is that at the segment in hand
-REFERENCE, GRADED = (
-    9,
-    10,
-)  # places of the length that the length field multiplies, and of 1 where there is one that differs
 NEAR = 400  # most front nodes looked at in one step
+
+
+class Rules(NamedTuple):
+    """What a front goes by."""
+
+    length: float  #: desired at the segment in hand [scan unit]
+    desired: float  #: desired member length, which the length field multiplies [scan unit]
+    graded: bool  #: whether the length field differs from place to place
+    length_weight: float  #: w_1 of Eq. 10
+    shape_weight: float  #: alpha_1 of Eq. 5
+    size_weight: float  #: alpha_2 of Eq. 5
+    search_range: float  #: b and h of Sec. 3.4, step 1 [scan unit]
+    nearness: float  #: least distance of a new node from the front, in lengths (Sec. 3.4, step 2)
+    merge_angle: float  #: limit of alpha and beta in Table 1 [radian]
+    quadrangle: bool  #: case 3 makes Foucault's quadrangle
+    strict: float  #: how good a triangle must be, from 1 in the first round to 0 in the last
+
+
+@kernel
+def rules_at(rules: Rules, length: float) -> Rules:
+    """The same rules where another length is desired."""
+    return Rules(
+        length,
+        rules.desired,
+        rules.graded,
+        rules.length_weight,
+        rules.shape_weight,
+        rules.size_weight,
+        rules.search_range,
+        rules.nearness,
+        rules.merge_angle,
+        rules.quadrangle,
+        rules.strict,
+    )
 
 
 class Front(NamedTuple):

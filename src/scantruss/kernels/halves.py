@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .grid import DEGREE, Net
+from .grid import Net
 
 BETWEEN = -1  # label of the nodes that rest
 
@@ -25,7 +25,7 @@ def farthest(net: Net, start: int, among: np.ndarray, away: np.ndarray, queue: n
         at += 1
         if among[v]:
             last = v
-        for i in range(net.state[v, DEGREE]):
+        for i in range(net.degree[v]):
             u = net.ring[v, i]
             if away[u] < 0:
                 away[u] = away[v] + 1
@@ -40,7 +40,7 @@ def ways_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.ndar
 
     The ends depend on the net alone, not on where it lies.
     """
-    for v in range(net.free[-1]):
+    for v in range(net.in_use[0]):
         if among[v]:
             end = farthest(net, farthest(net, v, among, away[0], queue), among, away[0], queue)
             farthest(net, farthest(net, end, among, away[0], queue), among, away[1], queue)
@@ -51,8 +51,8 @@ def ways_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.ndar
 @kernel
 def part(net: Net, nearer: np.ndarray, label: np.ndarray) -> None:
     """Label the nodes 0 or 1 by the end that they are nearer to (C,) int64, or BETWEEN beside the other half."""
-    for v in range(net.free[-1]):
+    for v in range(net.in_use[0]):
         label[v] = nearer[v]
-        for i in range(net.state[v, DEGREE]):
+        for i in range(net.degree[v]):
             if nearer[net.ring[v, i]] != nearer[v]:
                 label[v] = BETWEEN

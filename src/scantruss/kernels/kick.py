@@ -9,10 +9,10 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import STRIDE, settle_node
-from .grid import DEGREE, IDEAL, KIND, LOCKED, Net, place_of, target_length, wings
+from .grid import LOCKED, Net, place_of, target_length, wings
 from .rim import Rim
 from .search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
-from .trial import MARK, TRIED, Scratch, gather, local_energy
+from .trial import Scratch, gather, local_energy
 from .vectors import fill_row, norm, row, subtract
 
 WIDE, SEARCHED, KICKED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
@@ -21,31 +21,43 @@ KEPT = 32  # free nodes at the top of the stack that are written down
 MOVES = 3  # most random moves of a kick
 ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
-STAMP, COUNT, CHANCE, PAID = 0, 1, 2, 3  # places in `Area.counter`
 HOPELESS = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
 HOPE = 0.2  # the same once searched: what costs more hardly ever does
-OUT = 2  # column of `Area.mark`
 LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
 
 
 class Area(NamedTuple):
     """The nodes that a kick may change, as they were before it."""
 
-    mark: np.ndarray  #: (C, 3) int64 number of the kick that has the node in its area; rings away from the kicked node; 1 out of bounds
+    mark: np.ndarray  #: (C,) int64 number of the kick that has the node in its area
+    away: np.ndarray  #: (C,) int64 rings away from the kicked node
+    out: np.ndarray  #: (C,) int64, 1 where the node is out of bounds
     around: np.ndarray  #: (A,) int64 the nodes
-    nodes: np.ndarray  #: (A, 5) their places, arcs and desired lengths
+    nodes: np.ndarray  #: (A, 3) their places
+    arc: np.ndarray  #: (A,) their arcs
+    desired: np.ndarray  #: (A,) their desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
+    degree: np.ndarray  #: (A,) int64 and all else of a `Net` that they have
+    is_open: np.ndarray  #: (A,) int64
+    kind: np.ndarray  #: (A,) int64
+    curve: np.ndarray  #: (A,) int64
+    ideal: np.ndarray  #: (A,) int64
+    line: np.ndarray  #: (A,) int64
     patches: np.ndarray  #: (A, PATCH) their local surfaces: a node that is freed may come back elsewhere
-    state: np.ndarray  #: (A, 6) int64 their states
-    free: np.ndarray  #: (KEPT + 2,) int64 the top of the stack of free nodes; their number, and how many are here
-    counter: np.ndarray  #: (4,) int64 kicks; nodes of the area; chance; kicks that paid
+    free: np.ndarray  #: (KEPT,) int64 the top of the stack of free nodes
+    saved: np.ndarray  #: (1,) int64 how many of these there are
+    spare: np.ndarray  #: (1,) int64 how many nodes were free
+    number: np.ndarray  #: (1,) int64 number of the kick
+    gathered: np.ndarray  #: (1,) int64 nodes of the area
+    seed: np.ndarray  #: (1,) int64 state of the random numbers
+    paid: np.ndarray  #: (1,) int64 kicks that paid
 
 
 @kernel
 def chance(area: Area, choices: int) -> int:
     """A number from 0 to choices - 1, the same in every run."""
-    area.counter[CHANCE] = (area.counter[CHANCE] * 1103515245 + 12345) & 0x7FFFFFFF
-    return (area.counter[CHANCE] >> 8) % choices
+    area.seed[0] = (area.seed[0] * 1103515245 + 12345) & 0x7FFFFFFF
+    return (area.seed[0] >> 8) % choices
 
 
 @kernel
@@ -54,40 +66,41 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
 
     BEYOND where one is out of bounds.
     """
-    area.counter[STAMP] += 1
-    stamp = area.counter[STAMP]
+    area.number[0] += 1
+    stamp = area.number[0]
     area.around[0] = v
-    area.mark[v, 0], area.mark[v, 1] = stamp, 0
+    area.mark[v], area.away[v] = stamp, 0
     count, at = 1, 0
     while at < count:
         u = area.around[at]
         at += 1
-        if area.mark[u, OUT] == 1:
+        if area.out[u] == 1:
             return BEYOND
-        if net.state[u, KIND] == LOCKED:
+        if net.kind[u] == LOCKED:
             return UNFIT
-        if area.mark[u, 1] == WIDE:
+        if area.away[u] == WIDE:
             continue
-        for i in range(net.state[u, DEGREE]):
+        for i in range(net.degree[u]):
             w = net.ring[u, i]
-            if area.mark[w, 0] != stamp:
+            if area.mark[w] != stamp:
                 if count == len(area.around):
                     return UNFIT
-                area.mark[w, 0], area.mark[w, 1] = stamp, area.mark[u, 1] + 1
+                area.mark[w], area.away[w] = stamp, area.away[u] + 1
                 area.around[count] = w
                 count += 1
-    area.counter[COUNT] = count
+    area.gathered[0] = count
     for k in range(count):
         u = area.around[k]
         for c in range(3):
             area.nodes[k, c] = net.nodes[u, c]
-        area.nodes[k, 3], area.nodes[k, 4] = net.arc[u], net.desired[u]
+        area.arc[k], area.desired[k] = net.arc[u], net.desired[u]
         fill_row(area.ring[k], net.ring[u])
-        fill_row(area.state[k], net.state[u])
+        area.degree[k], area.is_open[k], area.kind[k] = net.degree[u], net.is_open[u], net.kind[u]
+        area.curve[k], area.ideal[k], area.line[k] = net.curve[u], net.ideal[u], net.line[u]
         fill_row(area.patches[k], patches[u])
-    free = net.free[-2]
-    area.free[-2], area.free[-1] = free, min(free, KEPT)
-    for k in range(area.free[-1]):
+    free = net.spare[0]
+    area.spare[0], area.saved[0] = free, min(free, KEPT)
+    for k in range(area.saved[0]):
         area.free[k] = net.free[free - 1 - k]
     return LISTED
 
@@ -95,18 +108,19 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
 @kernel
 def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
     """Undo a kick."""
-    free = area.free[-2]
-    net.free[-2] = free
-    for k in range(area.free[-1]):
+    free = area.spare[0]
+    net.spare[0] = free
+    for k in range(area.saved[0]):
         net.free[free - 1 - k] = area.free[k]
-        net.state[area.free[k], DEGREE] = 0
-    for k in range(area.counter[COUNT]):
+        net.degree[area.free[k]] = 0
+    for k in range(area.gathered[0]):
         u = area.around[k]
         for c in range(3):
             net.nodes[u, c] = area.nodes[k, c]
-        net.arc[u], net.desired[u] = area.nodes[k, 3], area.nodes[k, 4]
+        net.arc[u], net.desired[u] = area.arc[k], area.desired[k]
         fill_row(net.ring[u], area.ring[k])
-        fill_row(net.state[u], area.state[k])
+        net.degree[u], net.is_open[u], net.kind[u] = area.degree[k], area.is_open[k], area.kind[k]
+        net.curve[u], net.ideal[u], net.line[u] = area.curve[k], area.ideal[k], area.line[k]
         fill_row(patches[u], area.patches[k])
 
 
@@ -114,40 +128,40 @@ def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
 def added_node(net: Net, area: Area, k: int) -> int:
     """Free node k of those written down if it is in use now and not in the area, else -1; it joins the area at its middle."""
     v = area.free[k]
-    if net.state[v, DEGREE] == 0:
+    if net.degree[v] == 0:
         return -1
-    if area.mark[v, 0] != area.counter[STAMP]:
-        area.mark[v, 0], area.mark[v, 1] = area.counter[STAMP], KICKED
+    if area.mark[v] != area.number[0]:
+        area.mark[v], area.away[v] = area.number[0], KICKED
     return v
 
 
 @kernel
 def area_energy(net: Net, scratch: Scratch, area: Area, length: float, weight: float) -> float:
     """Energy of all members and triangles that have a node in the area."""
-    scratch.counter[0] += 1
+    scratch.trial[0] += 1
     count = 0
-    for k in range(area.counter[COUNT] + area.free[-1]):
-        listed = k < area.counter[COUNT]
-        v = area.around[k] if listed else added_node(net, area, k - area.counter[COUNT])
-        if v >= 0 and net.state[v, DEGREE] > 0 and scratch.note[v, MARK] != scratch.counter[0]:
-            scratch.note[v, MARK] = scratch.counter[0]
+    for k in range(area.gathered[0] + area.saved[0]):
+        listed = k < area.gathered[0]
+        v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
+        if v >= 0 and net.degree[v] > 0 and scratch.held[v] != scratch.trial[0]:
+            scratch.held[v] = scratch.trial[0]
             scratch.around[count] = v
             count += 1
-    scratch.counter[1] = count
+    scratch.gathered[0] = count
     return local_energy(net, scratch, length, weight)
 
 
 @kernel
 def is_within(net: Net, area: Area, a: int, b: int) -> bool:
     """Whether all that a move at the edge a-b may change lies in the area."""
-    stamp = area.counter[STAMP]
+    stamp = area.number[0]
     right, left = wings(net, a, b)
     for v in (a, b, right, left):
         if v >= 0:
-            if area.mark[v, 0] != stamp:
+            if area.mark[v] != stamp:
                 return False
-            for i in range(net.state[v, DEGREE]):
-                if area.mark[net.ring[v, i], 0] != stamp:
+            for i in range(net.degree[v]):
+                if area.mark[net.ring[v, i]] != stamp:
                     return False
     return True
 
@@ -158,19 +172,19 @@ def move_at_random(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, ar
     made = 0
     for _ in range(1 + chance(area, MOVES)):
         near = 1
-        while near < area.counter[COUNT] and area.mark[area.around[near], 1] <= KICKED:
+        while near < area.gathered[0] and area.away[area.around[near]] <= KICKED:
             near += 1
         a = area.around[chance(area, near)]
-        if net.state[a, DEGREE] == 0:
+        if net.degree[a] == 0:
             continue
-        b = net.ring[a, chance(area, net.state[a, DEGREE])]
+        b = net.ring[a, chance(area, net.degree[a])]
         kind = chance(area, 5)
         move = FLIP if kind < 3 else (COLLAPSE if kind == 3 else SPLIT)
         if is_allowed(net, move, a, b) and is_within(net, area, a, b):
             gather(net, scratch, a, b)
             added = make_move(net, patches, rim, scratch, move, a, b)
             if added >= 0:
-                area.mark[added, 0], area.mark[added, 1] = area.counter[STAMP], KICKED
+                area.mark[added], area.away[added] = area.number[0], KICKED
             made += 1
     return made
 
@@ -179,10 +193,10 @@ def move_at_random(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, ar
 def settle_area(net: Net, patches: np.ndarray, rim: Rim, area: Area, length: float, weight: float) -> None:
     """Settle the nodes of the area but those at its edge."""
     for _ in range(CALM):
-        for k in range(area.counter[COUNT] + area.free[-1]):
-            listed = k < area.counter[COUNT]
-            v = area.around[k] if listed else added_node(net, area, k - area.counter[COUNT])
-            if v >= 0 and net.state[v, DEGREE] > 0 and area.mark[v, 1] < WIDE:
+        for k in range(area.gathered[0] + area.saved[0]):
+            listed = k < area.gathered[0]
+            v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
+            if v >= 0 and net.degree[v] > 0 and area.away[v] < WIDE:
                 settle_node(net, patches, rim, v, length, weight, STILL * length, STRIDE)
 
 
@@ -192,24 +206,24 @@ def search_area(
 ) -> int:
     """Try moves at the irregular nodes in the middle of the area that are not marked as tried; returns how many were kept."""
     kept = 0
-    for k in range(area.counter[COUNT] + area.free[-1]):
-        listed = k < area.counter[COUNT]
-        v = area.around[k] if listed else added_node(net, area, k - area.counter[COUNT])
-        if v < 0 or net.state[v, DEGREE] == 0 or area.mark[v, 1] > SEARCHED:
+    for k in range(area.gathered[0] + area.saved[0]):
+        listed = k < area.gathered[0]
+        v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
+        if v < 0 or net.degree[v] == 0 or area.away[v] > SEARCHED:
             continue
-        if scratch.note[v, TRIED] == 1 or is_regular(net, v, length):
+        if scratch.tried[v] == 1 or is_regular(net, v, length):
             continue
         i = 0
-        while i < 4 * net.state[v, DEGREE] and kept < 20:
+        while i < 4 * net.degree[v] and kept < 20:
             u, way = net.ring[v, i // 4], i % 4
-            if way == 0 and scratch.note[u, TRIED] == 1:
+            if way == 0 and scratch.tried[u] == 1:
                 i += 4  # this edge was tried from its other end
                 continue
-            scratch.note[v, TRIED] = 1
+            scratch.tried[v] = 1
             i += 1
             move, a, b = (way + 1) // 2, v, u
             if way == 2:
-                if net.state[u, KIND] == net.state[v, KIND]:
+                if net.kind[u] == net.kind[v]:
                     continue
                 a, b = u, v
             if not (is_allowed(net, move, a, b) and is_within(net, area, a, b)):
@@ -226,20 +240,20 @@ def search_area(
 @kernel
 def forget_trials(scratch: Scratch, area: Area) -> None:
     """Mark all nodes of the area as not tried."""
-    for k in range(area.counter[COUNT] + area.free[-1]):
-        scratch.note[area.around[k] if k < area.counter[COUNT] else area.free[k - area.counter[COUNT]], TRIED] = 0
+    for k in range(area.gathered[0] + area.saved[0]):
+        scratch.tried[area.around[k] if k < area.gathered[0] else area.free[k - area.gathered[0]]] = 0
 
 
 @kernel
 def is_as_before(net: Net, area: Area) -> bool:
     """Whether each node of the area has the neighbours that it had before the kick."""
-    if net.free[-2] != area.free[-2]:
+    if net.spare[0] != area.spare[0]:
         return False
-    for k in range(area.counter[COUNT]):
+    for k in range(area.gathered[0]):
         v = area.around[k]
-        if net.state[v, DEGREE] != area.state[k, DEGREE]:
+        if net.degree[v] != area.degree[k]:
             return False
-        for i in range(net.state[v, DEGREE]):
+        for i in range(net.degree[v]):
             if place_of(net, v, area.ring[k, i]) < 0:
                 return False
     return True
@@ -280,10 +294,10 @@ def kick(
             return False
     settle_area(net, patches, rim, area, length, weight)
     after = area_energy(net, scratch, area, length, weight)
-    more = area.free[-2] - net.free[-2]
+    more = area.spare[0] - net.spare[0]
     luck = -heat * math.log((chance(area, 100000) + 1.0) / 100001.0) if heat > 0.0 else -1e-4
     if after - before < worth * more - bend * more * more + luck:
-        area.counter[PAID] += 1
+        area.paid[0] += 1
         return True
     put_area_back(net, patches, area)
     return False
@@ -315,15 +329,15 @@ def kick_all(
     count : V, as in `search`; those within bounds
     heat, hope : as in `kick`
     """
-    paid, free = area.counter[PAID], net.free[-2]
-    for v in range(net.free[-1]):
-        if not waiting[v] or area.mark[v, OUT] == 1:
+    paid, free = area.paid[0], net.spare[0]
+    for v in range(net.in_use[0]):
+        if not waiting[v] or area.out[v] == 1:
             continue
         listed = UNFIT
-        if net.state[v, DEGREE] > 0 and net.state[v, DEGREE] != net.state[v, IDEAL]:
+        if net.degree[v] > 0 and net.degree[v] != net.ideal[v]:
             listed = list_area(net, patches, area, v)
         waiting[v] = listed == BEYOND
         if listed == LISTED:
-            worth = share + price * (strain - 0.5 * (free - net.free[-2]) / count)
+            worth = share + price * (strain - 0.5 * (free - net.spare[0]) / count)
             kick(net, patches, rim, scratch, area, length, weight, worth, 0.25 * price / count, heat, hope)
-    return area.counter[PAID] - paid
+    return area.paid[0] - paid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compile import kernel
-from .grid import DEGREE, INTERIOR, KIND, Net
+from .grid import INTERIOR, Net
 from .surface import Surface, fit_patch, onto_patch, patch_normal
 from .vectors import Vector, along, dot, fill_row, norm, row, subtract
 
@@ -37,7 +37,7 @@ def _fit_widest(
     least = _away(patch, taken)
     kept = patch.copy()
     for turn in range(2):
-        if turn == 0 and middle.scale[2] > ALIKE * broad.scale[2]:
+        if turn == 0 and middle.patch_radius > ALIKE * broad.patch_radius:
             continue
         more = fit_patch(middle if turn == 0 else broad, patch, site, place)
         too_narrow = kept[18] < LINED or taken < FEW
@@ -77,16 +77,16 @@ def land_nodes(
     """
     narrow = np.empty(patches.shape[1])
     for v in range(begin, end):
-        if net.state[v, DEGREE] == 0:
+        if net.degree[v] == 0:
             continue
-        local, stayed = broad.scale[0] * net.desired[v], False
+        local, stayed = broad.length * net.desired[v], False
         for _ in range(2):
             place = row(net.nodes, v)
             taken = _fit_widest(fine, middle, broad, patches[v], narrow, int(patches[v, 15]), place)
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)
-            if net.state[v, KIND] != INTERIOR:
+            if net.kind[v] != INTERIOR:
                 normal = patch_normal(patches[v], foot)
                 foot = along(place, dot(subtract(foot, place), normal), normal)
             if fixed[v] or norm(subtract(foot, place)) > 0.6 * local:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from .compile import kernel
-from .grid import CURVE, Net
+from .grid import Net
 from .rim import Rim, is_open
 
 
 @kernel
 def arc_on_line(net: Net, rim: Rim, v: int, a: int, b: int) -> float:
     """Arc length of node a on the line of node v; a node of several lines is at an end of it, the one on the side away from node b."""
-    curve = net.state[v, CURVE]
-    if net.state[a, CURVE] == curve:
+    curve = net.curve[v]
+    if net.curve[a] == curve:
         return net.arc[a]
     first, last = rim.start[curve], rim.start[curve + 1] - 1
     before = after = 0.0

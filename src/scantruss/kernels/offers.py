@@ -33,7 +33,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
         place = row(nodes, i)
         if site >= 0:
             site = walk(surface, site, place)
-        if site < 0 or norm(subtract(row(surface.mean, site), place)) > 2.0 * surface.scale[4]:
+        if site < 0 or norm(subtract(row(surface.mean, site), place)) > 2.0 * surface.step:
             site = nearest_site(surface, place[0], place[1], place[2])
         fit_patch(surface, patch, site, place)
         propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)

@@ -126,7 +126,7 @@ def is_folded(surface: Surface, site: int, radius: float, least: float, buffer: 
     """Whether a few points around a site look as if they were folded by an angle of at least `least` [radian]."""
     place = row(surface.mean, site)
     n, c = mean_normal(surface, site, place, radius)
-    count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
+    count = flood(surface, site, place, radius + 0.5 * surface.step)
     taken = gather_points(surface, count, place, radius, FEW, n, EITHER_SIDE, buffer)
     if taken < 20 or norm(c) < 0.5:
         return False
@@ -177,8 +177,8 @@ def fit_fold(
     n, c = mean_normal(surface, site, place, radius)
     if norm(towards) > 0.0:
         c = unit(cross(towards, n))
-    count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
-    taken = gather_points(surface, count, place, radius, int(surface.scale[3]), n, EITHER_SIDE, buffer)
+    count = flood(surface, site, place, radius + 0.5 * surface.step)
+    taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
     if taken < 30 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))

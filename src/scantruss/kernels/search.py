@@ -9,11 +9,6 @@ import numpy as np
 from .compile import kernel
 from .equalize import STRIDE, settle_node
 from .grid import (
-    CURVE,
-    DEGREE,
-    IDEAL,
-    KIND,
-    OPEN,
     RIM,
     Net,
     collapse,
@@ -28,7 +23,7 @@ from .grid import (
 )
 from .lines import arc_on_line, halfway
 from .rim import Rim, at_arc
-from .trial import MARK, OUT, TRIED, Scratch, gather, local_energy, may_change, put_back
+from .trial import Scratch, gather, local_energy, may_change, put_back
 from .vectors import cross, dot, norm, row, subtract
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2
@@ -48,15 +43,15 @@ def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
     """Put node v halfway between a and b: along their curve if it is on the rim."""
     if slides_on_line(net, v):
         first = arc_on_line(net, rim, v, a, b)
-        middle = halfway(rim, net.state[v, CURVE], first, arc_on_line(net, rim, v, b, a))
-        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.state[v, CURVE], middle)
-    elif net.state[v, KIND] == RIM:
-        total = rim.total[net.state[v, CURVE]]
+        middle = halfway(rim, net.curve[v], first, arc_on_line(net, rim, v, b, a))
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.curve[v], middle)
+    elif net.kind[v] == RIM:
+        total = rim.total[net.curve[v]]
         ahead = (net.arc[b] - net.arc[a]) % total if total > 0.0 else 0.0
         if ahead > 0.5 * total:
             ahead -= total
         net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(
-            rim, net.state[v, CURVE], net.arc[a] + 0.5 * ahead
+            rim, net.curve[v], net.arc[a] + 0.5 * ahead
         )
     else:
         for c in range(3):
@@ -68,18 +63,18 @@ def disorder(net: Net, move: int, a: int, b: int) -> int:
     """By how much a move at the edge a-b changes the sum of squared differences between neighbours and ideal."""
     right, left = wings(net, a, b)
     rim = right < 0 or left < 0
-    da, db = net.state[a, DEGREE] - net.state[a, IDEAL], net.state[b, DEGREE] - net.state[b, IDEAL]
+    da, db = net.degree[a] - net.ideal[a], net.degree[b] - net.ideal[b]
     change = 0
     if move == FLIP:
         change = 2 - 2 * da - 2 * db
     elif move == COLLAPSE:
-        merged = net.state[a, DEGREE] + net.state[b, DEGREE] - (3 if rim else 4) - net.state[a, IDEAL]
+        merged = net.degree[a] + net.degree[b] - (3 if rim else 4) - net.ideal[a]
         change = merged * merged - da * da - db * db
     else:
         change = 1 if rim else 4
     for v in (right, left):
         if v >= 0:
-            d = net.state[v, DEGREE] - net.state[v, IDEAL]
+            d = net.degree[v] - net.ideal[v]
             change += 1 - 2 * d if move == COLLAPSE else 1 + 2 * d
     return change
 
@@ -87,25 +82,19 @@ def disorder(net: Net, move: int, a: int, b: int) -> int:
 @kernel
 def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
     """Flip edges at the first `seeds` nodes of the neighbourhood while that lessens the disorder; returns the change of it."""
-    stamp, total, state = scratch.counter[0], 0, net.state
+    stamp, total = scratch.trial[0], 0
     for _ in range(FLIPS):
         best, a, b = 0, scratch.around[0], scratch.around[0]
         for k in range(seeds):
             v = scratch.around[k]
-            d = net.state[v, DEGREE]
+            d = net.degree[v]
             for i in range(d):
-                if net.state[v, OPEN] == 1 and (i == 0 or i == d - 1):
+                if net.is_open[v] == 1 and (i == 0 or i == d - 1):
                     continue
                 u, right, left = net.ring[v, i], net.ring[v, (i + d - 1) % d], net.ring[v, (i + 1) % d]
-                if (
-                    scratch.note[u, MARK] == stamp
-                    and scratch.note[right, MARK] == stamp
-                    and scratch.note[left, MARK] == stamp
-                ):
-                    change = 4 - 2 * (d - state[v, IDEAL] + state[u, DEGREE] - state[u, IDEAL])
-                    change += 2 * (
-                        state[right, DEGREE] - state[right, IDEAL] + state[left, DEGREE] - state[left, IDEAL]
-                    )
+                if scratch.held[u] == stamp and scratch.held[right] == stamp and scratch.held[left] == stamp:
+                    change = 4 - 2 * (d - net.ideal[v] + net.degree[u] - net.ideal[u])
+                    change += 2 * (net.degree[right] - net.ideal[right] + net.degree[left] - net.ideal[left])
                     if change < best and may_flip(net, v, u):
                         best, a, b = change, v, u
         if best == 0:
@@ -122,7 +111,7 @@ def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: i
         flip(net, a, b)
         return -1
     if move == COLLAPSE:
-        if net.state[a, KIND] == net.state[b, KIND]:
+        if net.kind[a] == net.kind[b]:
             place_between(net, rim, a, a, b)
         collapse(net, a, b)
         return -1
@@ -130,10 +119,10 @@ def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: i
     for c in range(patches.shape[1]):
         patches[added, c] = patches[a, c]
     place_between(net, rim, added, a, b)
-    net.state[added, IDEAL] = 4 if net.state[added, OPEN] == 1 else 6
-    scratch.note[added, MARK] = scratch.counter[0]
-    scratch.around[scratch.counter[1]] = added
-    scratch.counter[1] += 1
+    net.ideal[added] = 4 if net.is_open[added] == 1 else 6
+    scratch.held[added] = scratch.trial[0]
+    scratch.around[scratch.gathered[0]] = added
+    scratch.gathered[0] += 1
     return added
 
 
@@ -141,12 +130,12 @@ def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: i
 def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
     """Put all around back as it was before a move."""
     if added >= 0:
-        scratch.note[added, MARK] = 0
-        scratch.counter[1] -= 1
-        net.state[added, DEGREE] = 0
-        net.free[-2] += 1
+        scratch.held[added] = 0
+        scratch.gathered[0] -= 1
+        net.degree[added] = 0
+        net.spare[0] += 1
     elif move == COLLAPSE:
-        net.free[-2] -= 1
+        net.spare[0] -= 1
     put_back(net, scratch)
 
 
@@ -189,7 +178,7 @@ def try_move(
             continue
         break
     for turn in range(1 + SWEEPS):
-        for i in range(min(4, scratch.counter[1]) if turn == 0 else scratch.counter[1]):
+        for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
             settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length, STRIDE)
         if turn == 0 and added >= 0:
             settle_node(net, patches, rim, added, length, weight, STILL * length, STRIDE)
@@ -197,9 +186,9 @@ def try_move(
         if after > before + (EARLY[move] if turn == 0 else HOPE[move]):
             break
     if after < before - 1e-4:
-        for i in range(scratch.counter[1]):
-            scratch.note[scratch.around[i], TRIED] = 0
-        scratch.counter[2] += 1
+        for i in range(scratch.gathered[0]):
+            scratch.tried[scratch.around[i]] = 0
+        scratch.paid[0] += 1
         return True
     undo_move(net, scratch, move, added)
     return False
@@ -208,9 +197,9 @@ def try_move(
 @kernel
 def is_regular(net: Net, v: int, length: float) -> bool:
     """Whether nothing about node v asks for a move: neighbours as ideal, members near their length."""
-    if net.state[v, DEGREE] != net.state[v, IDEAL]:
+    if net.degree[v] != net.ideal[v]:
         return False
-    for i in range(net.state[v, DEGREE]):
+    for i in range(net.degree[v]):
         w = net.ring[v, i]
         size = norm(subtract(row(net.nodes, w), row(net.nodes, v)))
         if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED:
@@ -247,28 +236,28 @@ def search(
     is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added; V is `count`, the nodes within bounds. The
     `share` of energy that any node has does not count, or nodes would be taken away for being nodes.
     """
-    kept, free = scratch.counter[2], net.free[-2]
-    for v in range(net.free[-1]):
-        i, left = 0, scratch.note[v, OUT] == 1
+    kept, free = scratch.paid[0], net.spare[0]
+    for v in range(net.in_use[0]):
+        i, left = 0, scratch.out[v] == 1
         if left:
             continue
-        while i < 4 * net.state[v, DEGREE] and scratch.counter[2] - kept < count:
+        while i < 4 * net.degree[v] and scratch.paid[0] - kept < count:
             u, way = net.ring[v, i // 4], i % 4  # flip, draw u into v, draw v into u, split
-            if i == 0 and scratch.note[v, TRIED] == 1:
+            if i == 0 and scratch.tried[v] == 1:
                 break
             if way == 0:
                 asked = v if i == 0 else u
                 regular = is_regular(net, asked, length)
                 if i == 0 and regular:
                     break
-                if asked == u and scratch.note[u, TRIED] == 1 and not regular:
+                if asked == u and scratch.tried[u] == 1 and not regular:
                     i += 4  # this edge was tried from its other end
                     continue
-            scratch.note[v, TRIED] = 1
+            scratch.tried[v] = 1
             i += 1
             move, a, b = (way + 1) // 2, v, u
             if way == 2:
-                if net.state[u, KIND] == net.state[v, KIND]:
+                if net.kind[u] == net.kind[v]:
                     continue  # both would come to the middle
                 a, b = u, v
             if not is_allowed(net, move, a, b):
@@ -280,25 +269,25 @@ def search(
                 left = True  # for those who may
                 continue
             half = 0.5 if move == SPLIT else -0.5
-            worth = share + price * (strain - 0.5 * (free - net.free[-2] + half) / count)
+            worth = share + price * (strain - 0.5 * (free - net.spare[0] + half) / count)
             if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
                 i = 0
         if left:
-            scratch.note[v, TRIED] = 0
-    return scratch.counter[2] - kept
+            scratch.tried[v] = 0
+    return scratch.paid[0] - kept
 
 
 @kernel
 def suit_nodes(net: Net) -> None:
     """Fill in how many neighbours suit each node: 6 inside, on the boundary as many as its angle has room for."""
     for v in range(len(net.arc)):
-        net.state[v, IDEAL] = 6
-        if net.state[v, DEGREE] > 0 and net.state[v, OPEN] == 1:
+        net.ideal[v] = 6
+        if net.degree[v] > 0 and net.is_open[v] == 1:
             angle = 0.0
-            for i in range(net.state[v, DEGREE] - 1):
+            for i in range(net.degree[v] - 1):
                 p = subtract(row(net.nodes, net.ring[v, i]), row(net.nodes, v))
                 q = subtract(row(net.nodes, net.ring[v, i + 1]), row(net.nodes, v))
                 n, d = norm(cross(p, q)), dot(p, q)
                 if n > 0.0 or d != 0.0:
                     angle += math.atan2(n, d)
-            net.state[v, IDEAL] = max(2, int(math.floor(3.0 * angle / math.pi + 0.5)) + 1)
+            net.ideal[v] = max(2, int(math.floor(3.0 * angle / math.pi + 0.5)) + 1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from .compile import kernel
 from .field import length_at
-from .grid import CURVE, DEGREE, INTERIOR, KIND, LINE, OPEN, REST, RIM, Net
+from .grid import INTERIOR, REST, RIM, Net
 from .rim import Rim, nearest_on_rim, slide
 from .surface import Surface, fit_patch, onto_patch, walk
 from .vectors import fill_row, norm, row, subtract
@@ -34,9 +34,9 @@ def seat_nodes(
 
     `queue` and `seated` (C,) int64 are scratch, zero at the start.
     """
-    used = net.free[-1]
+    used = net.in_use[0]
     for seed in range(used):
-        if seated[seed] == 1 or net.state[seed, DEGREE] == 0:
+        if seated[seed] == 1 or net.degree[seed] == 0:
             continue
         queue[0], count, at = seed, 1, 0
         seated[seed] = 1
@@ -49,7 +49,7 @@ def seat_nodes(
             if norm(subtract(row(surface.mean, site), place)) > 0.5 * length:
                 site = nearest_site(surface, place[0], place[1], place[2])
             patches[v, 15] = site
-            for i in range(net.state[v, DEGREE]):
+            for i in range(net.degree[v]):
                 u = net.ring[v, i]
                 if seated[u] == 0:
                     seated[u] = 1
@@ -61,19 +61,19 @@ def seat_nodes(
 @kernel
 def seat_on_rim(net: Net, rim: Rim, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
     """Find the place of every boundary node on the curves; those that are no corner (K, 3) and not fixed may slide from there."""
-    for v in range(net.free[-1]):
-        if net.state[v, OPEN] == 0 or net.state[v, KIND] != REST:
+    for v in range(net.in_use[0]):
+        if net.is_open[v] == 0 or net.kind[v] != REST:
             continue
         place = row(net.nodes, v)
         curve, arc, distance = nearest_on_rim(rim, place[0], place[1], place[2])
         if curve < 0 or distance > 0.5 * length:
             continue
-        net.state[v, CURVE], net.arc[v] = curve, arc
-        free = not fixed[v] and net.state[v, LINE] == 0
+        net.curve[v], net.arc[v] = curve, arc
+        free = not fixed[v] and net.line[v] == 0
         for k in range(len(corners)):
             free = free and norm(subtract(row(corners, k), place)) > 1e-6 * length
         if free:
-            net.state[v, KIND] = RIM
+            net.kind[v] = RIM
 
 
 @kernel
@@ -85,12 +85,12 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
     count = 0
     before = np.empty(patches.shape[1])
     for v in range(begin, end):
-        if net.state[v, DEGREE] > 0:
+        if net.degree[v] > 0:
             place = row(net.nodes, v)
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
-                local = surface.scale[0] * net.desired[v]
+                local = surface.length * net.desired[v]
                 if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > ASTRAY * local:
                     fill_row(patches[v], before)
                 count += 1
@@ -101,26 +101,26 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
 def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, end: int) -> None:
     """Give each node from `begin` to `end` - 1 the member length that is desired where it stands."""
     for v in range(begin, end):
-        if net.state[v, DEGREE] > 0:
+        if net.degree[v] > 0:
             net.desired[v] = length_at(surface, int(patches[v, 15]), row(net.nodes, v))
 
 
 @kernel
 def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> None:
     """Bring every free node back: onto its patch of the scanned surface, or onto its boundary curve within `reach` along it."""
-    for v in range(net.free[-1]):
+    for v in range(net.in_use[0]):
         x, y, z = row(net.nodes, v)
-        if net.state[v, DEGREE] > 0 and net.state[v, KIND] == INTERIOR:
+        if net.degree[v] > 0 and net.kind[v] == INTERIOR:
             x, y, z = onto_patch(patches[v], (x, y, z))
-        elif net.state[v, DEGREE] > 0 and net.state[v, KIND] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.state[v, CURVE], net.arc[v], reach * net.desired[v], x, y, z)
+        elif net.degree[v] > 0 and net.kind[v] == RIM:
+            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], reach * net.desired[v], x, y, z)
         net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 
 @kernel
 def distances_from_scan(net: Net, patches: np.ndarray, distance: np.ndarray) -> None:
     """Distance of each node from its patch of the scanned surface, (C,)."""
-    for v in range(net.free[-1]):
-        if net.state[v, DEGREE] > 0:
+    for v in range(net.in_use[0]):
+        if net.degree[v] > 0:
             place = row(net.nodes, v)
             distance[v] = norm(subtract(place, onto_patch(patches[v], place)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from .compile import kernel
 from .equalize import ROOT
-from .grid import DEGREE, INTERIOR, KIND, LINE, OPEN, RIM, Net, slides_on_line
+from .grid import INTERIOR, RIM, Net, slides_on_line
 from .vectors import cross, dot, norm, row, subtract
 
 
@@ -20,18 +20,18 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
     weights a grid keeps the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from
     which they start.
     """
-    used = net.free[-1]
+    used = net.in_use[0]
     for v in range(used):
         before[v, 0], before[v, 1], before[v, 2] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     for v in range(used):
-        d = net.state[v, DEGREE]
-        if d == 0 or net.state[v, KIND] > RIM:
+        d = net.degree[v]
+        if d == 0 or net.kind[v] > RIM:
             continue
         along_line = slides_on_line(net, v)
-        step = 1 if net.state[v, KIND] == INTERIOR or along_line else d - 1
+        step = 1 if net.kind[v] == INTERIOR or along_line else d - 1
         x = y = z = total = 0.0
         for i in range(0, d, step):
-            if along_line and (net.state[v, LINE] >> i) & 1 == 0:
+            if along_line and (net.line[v] >> i) & 1 == 0:
                 continue
             arm = subtract(row(before, net.ring[v, i]), row(before, v))
             weight = norm(arm) / (net.desired[v] + net.desired[net.ring[v, i]])
@@ -51,8 +51,8 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
     """
     shape = total = squares = moved = 0.0
     triangles = members = count = 0
-    for v in range(net.free[-1]):
-        d = net.state[v, DEGREE]
+    for v in range(net.in_use[0]):
+        d = net.degree[v]
         if d == 0:
             continue
         count += 1
@@ -66,7 +66,7 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
                 shorter = 2.0 / (net.desired[v] + net.desired[u])
                 total += shorter * norm(a)
                 squares += shorter * shorter * dot(a, a)
-            if v < u and v < w and i < d - net.state[v, OPEN]:
+            if v < u and v < w and i < d - net.is_open[v]:
                 triangles += 1
                 c = subtract(b, a)
                 edges = dot(a, a) + dot(b, b) + dot(c, c)

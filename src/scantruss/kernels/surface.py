@@ -29,13 +29,15 @@ class Surface(NamedTuple):
     mean: np.ndarray  #: (S, 3) mean of the points of each site
     normals: np.ndarray  #: (S, 3) oriented unit normals
     neighbors: np.ndarray  #: (S, K) nearest sites on the same sheet, -1 at the end
-    scale: np.ndarray  #: (5,) member length, thinning radius, radius of a patch, most points of a site in a patch, step from site to site
+    length: float  #: desired member length [scan unit]
+    radius: float  #: thinning radius: no two sites are nearer [scan unit]
+    patch_radius: float  #: [scan unit]
+    patch_points: float  #: most points of a site that a patch is fitted to
+    step: float  #: from site to site [scan unit]
     stamp: np.ndarray  #: (S,) int64 scratch of `flood`
     queue: np.ndarray  #: (S,) int64 scratch of `flood`
     counter: np.ndarray  #: (1,) int64 number of the last flood
-    field: (
-        np.ndarray
-    )  #: (S,) desired member length at each site, in member lengths of `scale`: ones where there is one length
+    field: np.ndarray  #: (S,) desired member length at each site, in units of `length`: ones where there is one length
 
 
 @kernel
@@ -160,16 +162,16 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
     local = surface.field[
         site
     ]  # a patch is as wide as the members there; the wider, the fewer points of a site suffice
-    radius, most = surface.scale[2] * local, max(int(surface.scale[3] / (local * local)), 1)
+    radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
     patch[15] = site
     taken = 0
     while True:
-        count = flood(surface, site, place, radius + 0.5 * surface.scale[4])
+        count = flood(surface, site, place, radius + 0.5 * surface.step)
         if count < 1:
             count = 1
         buffer = np.empty((_points_at_most(surface, count, most), COLUMNS))
         taken = gather_points(surface, count, place, radius, most, facing, 0.0, buffer)
-        if taken >= 12 or radius >= max(1.6 * surface.scale[2], surface.scale[0]) * local:
+        if taken >= 12 or radius >= max(1.6 * surface.patch_radius, surface.length) * local:
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)
@@ -180,7 +182,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> 
     for i in range(taken):
         mean += abs(buffer[i, AWAY])
     mean = mean / max(taken, 1)
-    if mean > 0.002 * surface.scale[0] * local and taken > 12:
+    if mean > 0.002 * surface.length * local and taken > 12:
         for i in range(taken):
             r = buffer[i, AWAY] / (2.0 * mean)
             buffer[i, WEIGHT] /= (1.0 + r * r) * (1.0 + r * r)
@@ -267,7 +269,7 @@ def onto_surface(surface: Surface, patches: np.ndarray, node: int, x: float, y: 
     patch = patches[node]
     place = (x, y, z)
     d = subtract(place, (patch[0], patch[1], patch[2]))
-    reach = 0.25 * surface.scale[0]
+    reach = 0.25 * surface.length
     if patch[16] == 0.0 or dot(d, d) > reach * reach:
         fit_patch(surface, patch, int(patch[15]), place)
     return onto_patch(patch, place)

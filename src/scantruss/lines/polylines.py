@@ -152,7 +152,7 @@ def _onto_scan(points: np.ndarray, number: int, sites: Sites, surface: Surface, 
         fit_patch(surface, patch, site, at)
         feet[k] = onto_patch(patch, at)
         gap = float(np.linalg.norm(feet[k] - points[k]))
-        beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.scale[1]
+        beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.radius
         if (gap := max(gap, beside)) > 0.5 * length:
             unit = _unit(sites.unit)
             raise InputError(

@@ -49,10 +49,9 @@ class Tracer:
     """Fits folds to a scan and goes along ridges."""
 
     def __init__(self, sites: Sites, settings: Settings) -> None:
-        scale = sites.surface.scale.copy()
-        if np.median(sites.thickness) > ROUGH * settings.length:
-            scale[3] = ALL
-        self.surface, self.length = sites.surface._replace(scale=scale), settings.length
+        rough = np.median(sites.thickness) > ROUGH * settings.length
+        self.surface = sites.surface._replace(patch_points=ALL) if rough else sites.surface
+        self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
         self.radius = max(RADIUS * settings.length, 2.6 * sites.spacing)
         self.buffer = np.empty((6000, COLUMNS))

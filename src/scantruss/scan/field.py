@@ -74,11 +74,11 @@ def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
 def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: float) -> None:
     """Refuse given lengths (K, 4) that stand away from the scan: they are of another part, frame or unit."""
     mean = surface.mean
-    allowed = FAR * scale * rows[:, 3] + 1.5 * surface.scale[4]
+    allowed = FAR * scale * rows[:, 3] + 1.5 * surface.step
     low, high = mean.min(axis=0), mean.max(axis=0)
     far = np.maximum(low - places, places - high).max(axis=1) > allowed
     inside = np.flatnonzero(~far)
-    step = max(4.0 * float(surface.scale[4]), 0.01 * float((high - low).max()))
+    step = max(4.0 * surface.step, 0.01 * float((high - low).max()))
     boxes = new_boxes(low, high, step, len(mean), len(mean))
     put_places(boxes, mean)
     away = np.empty(len(inside))
@@ -100,7 +100,7 @@ def _by_curvature(surface: Surface, most: float) -> np.ndarray:
     longest member would be flat there.
     """
     bends = measured_bends(surface, most)
-    shortest = float(surface.scale[0])
+    shortest = surface.length
     bulge = max(float(np.quantile(bends, BENT)) * shortest**2 / 8.0, FLAT * most * shortest)
     lengths = np.sqrt(8.0 * bulge / np.maximum(bends, 1e-300)) / shortest
     return np.clip(lengths, 1.0, most)
@@ -130,10 +130,9 @@ def _bends(surface: Surface, sites: np.ndarray, wider: float) -> np.ndarray:
     """Curvature and its doubt at some sites, (P, 2) [1 / scan unit], by patches so many times wider."""
     from .sites import with_own_scratch
 
-    scale = surface.scale.copy()
-    scale[2] *= wider
-    scale[3] = max(scale[3] / wider**2, 1.0)
-    scaled = surface._replace(scale=scale)
+    scaled = surface._replace(
+        patch_radius=surface.patch_radius * wider, patch_points=max(surface.patch_points / wider**2, 1.0)
+    )
     found = np.empty((len(sites), 2))
 
     def measure_part(part: int, begin: int, end: int) -> None:

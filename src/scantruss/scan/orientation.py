@@ -66,7 +66,7 @@ def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
     Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
     or overgrown that happens by chance.
     """
-    smooth = 0.15 * surface.scale[4]
+    smooth = 0.15 * surface.step
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
         raise InputError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"

@@ -176,12 +176,13 @@ def narrow_surface(sites: Sites, points: float) -> Surface:
     """
     surface = sites.surface
     radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
-    scale = surface.scale.copy()
-    scale[2] = np.clip(radius, 0.1 * scale[0], scale[2])
-    scale[3] = ALL * (SMOOTH_SITE / SITE) ** 2 if sites.smooth else ALL  # as many for an area
+    surface = surface._replace(
+        patch_radius=float(np.clip(radius, 0.1 * surface.length, surface.patch_radius)),
+        patch_points=ALL * (SMOOTH_SITE / SITE) ** 2 if sites.smooth else ALL,  # as many for an area
+    )
     if np.isfinite(points):  # so many points, whatever the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
-    return surface._replace(scale=scale)
+    return surface
 
 
 def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
@@ -189,7 +190,7 @@ def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
     if sites.whole is None:
         return surface
     near = sites.whole.take(points_near(sites.whole, rim, BESIDE * sites.apart), axis=0)
-    owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.scale[1]
+    owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
     in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, far, owner, begin, end))
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
@@ -200,7 +201,7 @@ def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
 def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
     """Distance of a place from the nearest point of the scan."""
     squares = ((surface.mean - place) ** 2).sum(axis=1)
-    reach = np.sqrt(squares.min()) + 2.0 * surface.scale[1]
+    reach = np.sqrt(squares.min()) + 2.0 * surface.radius
     best = np.inf
     for site in np.flatnonzero(squares <= reach * reach):
         points = surface.points[surface.start[site] : surface.start[site + 1]]
@@ -309,10 +310,22 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
     piece = face_one_side(mean, normals, neighbors)
     normals = mean_normals(normals, neighbors, 0.7)
     face_outside(mean, normals, piece)
-    scale = np.array([length, radius, max(0.65 * length, 2.6 * spacing), SOME, max(radius, 1.3 * spacing)])
-    stamp, queue, counter = np.zeros(len(mean), np.int64), np.zeros(len(mean), np.int64), np.zeros(1, np.int64)
-    field = np.ones(len(mean))
-    surface = Surface(found.grouped, found.start, mean, normals, neighbors, scale, stamp, queue, counter, field)
+    surface = Surface(
+        points=found.grouped,
+        start=found.start,
+        mean=mean,
+        normals=normals,
+        neighbors=neighbors,
+        length=float(length),
+        radius=float(radius),
+        patch_radius=float(max(0.65 * length, 2.6 * spacing)),
+        patch_points=SOME,
+        step=float(max(radius, 1.3 * spacing)),
+        stamp=np.zeros(len(mean), np.int64),
+        queue=np.zeros(len(mean), np.int64),
+        counter=np.zeros(1, np.int64),
+        field=np.ones(len(mean)),
+    )
     return surface, piece
 
 
