@@ -47,7 +47,7 @@ def test_scallop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (tmp_path / "scallop.png").stat().st_size > 10_000
     nodes = grid.nodes + grid.origin
     for corner in make("scallop", 10).corners:
-        assert np.linalg.norm(nodes - corner, axis=1).min() < 0.47
+        assert np.linalg.norm(nodes - corner, axis=1).min() < 0.1 * grid.settings.length
 
 
 def test_clam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,7 +69,7 @@ def test_cloth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert_right(grid, "cloth")
     assert_good(grid)
     for corner in make("cloth", 10).corners:
-        assert np.linalg.norm(grid.nodes + grid.origin - corner, axis=1).min() < 0.275
+        assert np.linalg.norm(grid.nodes + grid.origin - corner, axis=1).min() < 0.1 * grid.settings.length
 
 
 def test_two_holes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

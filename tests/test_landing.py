@@ -29,7 +29,10 @@ def heights(shape: Shape, nodes: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["scallop", "cloth"])
 def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> None:
-    """There a patch has half or a quarter of its points, all to one side."""
+    """Off by as little as the mean of 17 points would be, at the rim of 5: there a patch has half of its points, all to one side.
+
+    At a corner it has a quarter of them, so nothing is averaged there, but the noise is hardly made larger either.
+    """
     inside, rim, corners = [], [], []
     for seed in range(3):
         shape = make(name, 100_000, seed=seed, noise=0.01 * make(name).length)
@@ -43,4 +46,6 @@ def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> N
         corners.append(off[at_corner].mean())
         at_rim[at_corner] = False
         rim.append(off[at_rim].mean())
-    assert np.mean(inside) <= 0.195 and np.mean(rim) <= 0.36 and np.mean(corners) <= 1.5
+    one_point = np.sqrt(2 / np.pi)  # mean distance of a measured point from its true place along the normal, in noises
+    assert np.mean(inside) <= one_point / np.sqrt(17) and np.mean(rim) <= one_point / np.sqrt(5)
+    assert np.mean(corners) <= 1.5
