@@ -1,7 +1,7 @@
 """Compile the kernels when the package is installed, as an extension in C would be, so that its first run need not.
 
 Runs the usual commands where nothing is stored yet and puts the machine code beside the package: in the wheel, or in `src` where
-the installation is editable. `scantruss.kernels.compile` looks there first; where the kernels have changed since, or another
+the installation is editable. `scantruss.runtime.jit` looks there first; where the kernels have changed since, or another
 processor, Python or numba meets them, they compile on the first run instead, as they do where this fails. SCANTRUSS_COMPILE=0
 leaves it out, for a wheel that is to serve all machines.
 """
@@ -73,8 +73,8 @@ def run() -> None:
     """Run the commands one after the other, in this process."""
     import numpy as np
 
-    from scantruss.cli import main
-    from scantruss.demo import SCAN
+    from scantruss.cli.demo_files import SCAN
+    from scantruss.cli.main import main
 
     chance = np.random.default_rng(1)
     x, y = chance.uniform(-10.0, 10.0, (2, 20_000))

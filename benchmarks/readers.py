@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 ROUNDS = 3
-OURS = "import scantruss.kernels.decimals\nfrom scantruss.scan.readers import read_content\n"
-OUR_CLOUD = "import scantruss.kernels.decimals\nfrom scantruss.scan.readers import read_points\n"
+OURS = "import scantruss.kernels.scan.decimals\nfrom scantruss.scan.formats.reading import read_content\n"
+OUR_CLOUD = "import scantruss.kernels.scan.decimals\nfrom scantruss.scan.formats.reading import read_points\n"
 CASES = (  # suffix, imports of the other, what it does, its name
     (
         ".ply",
@@ -74,7 +74,7 @@ def main() -> None:
 def made(path: Path, count: int) -> Path:
     """Return a file of so many points on a national grid, with three decimals."""
     if not path.exists():
-        from scantruss.scan.writers import write_points
+        from scantruss.scan.formats.writing import write_points
 
         path.parent.mkdir(parents=True, exist_ok=True)
         points = np.random.default_rng(0).random((count, 3)) * [400, 300, 30]

@@ -17,7 +17,7 @@ import numpy as np
 from shapes import Shape, make
 
 import scantruss as st
-from scantruss.kernels.compile import INSTALLED
+from scantruss.runtime.jit import INSTALLED
 
 from .page import Section
 from .peers.child import neighbour_search

@@ -20,8 +20,8 @@ import numpy as np
 BLOCK = 1_000_000  # points
 READ = """
 import sys, time
-from scantruss.scan.chunks import read_chunks
-from scantruss.scan.tiles import find_source, tiles_of
+from scantruss.scan.stream.chunks import read_chunks
+from scantruss.scan.stream.tiles import find_source, tiles_of
 if __name__ == "__main__":
     begun = time.perf_counter()
     count = sum(len(chunk.points) for tile in tiles_of([find_source(sys.argv[1])]) for chunk in read_chunks(tile))
@@ -29,9 +29,9 @@ if __name__ == "__main__":
 """
 THIN = """
 import resource, sys, time
-from scantruss.scan.streaming import thin_scan
-from scantruss.scan.thin import thin_points
-from scantruss.workers import open_workers
+from scantruss.scan.stream.thin_scan import thin_scan
+from scantruss.scan.stream.thinning import thin_points
+from scantruss.runtime.cluster import open_workers
 import numpy as np
 if __name__ == "__main__":
     name, spacing, workers, keep, rim = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5] == "rim"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scantruss.demo import MEMBER_DIAMETER, NODE_DIAMETER, SCALE, SCAN, demo_settings
-from scantruss.export.picture import draw_panels
+from scantruss.cli.demo_files import MEMBER_DIAMETER, NODE_DIAMETER, SCALE, SCAN, demo_settings
+from scantruss.export.drawing.picture import draw_panels
 from scantruss.export.solid import build_solid
 from scantruss.pipeline import grid_from_cloud
-from scantruss.scan.readers import read_points
+from scantruss.scan.formats.reading import read_points
 
 PLACE = Path(__file__).resolve().parents[1] / "docs" / "picture.png"
 

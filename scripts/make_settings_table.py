@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
-from scantruss.options import option_of
+from scantruss.cli.options import option_of
 from scantruss.settings import Settings
 
 PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"

@@ -3,7 +3,7 @@
 import numba
 import pytest
 
-from scantruss.kernels.linking import HANDS_OVER
+from scantruss.runtime.cache import HANDS_OVER
 
 needs_jit = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 compiled_only = pytest.mark.skipif(

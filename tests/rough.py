@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from scantruss import Grid, PointCloud, Settings
-from scantruss.grid.relief import Relief
-from scantruss.kernels.rim import Rim
-from scantruss.scan.sites import sample_surface
+from scantruss.improve.working_mesh import Relief
+from scantruss.kernels.boundary.curves import Rim
+from scantruss.surface.samples import sample_surface
 
 
 class Rough(NamedTuple):

@@ -14,8 +14,8 @@ import numpy as np
 from copc_file import copc
 from numpy.lib import recfunctions
 
-from scantruss.scan.e57_writer import Column, write_scans
-from scantruss.scan.writers import write_points
+from scantruss.scan.formats.e57_writer import Column, write_scans
+from scantruss.scan.formats.writing import write_points
 
 COUNT = 120
 TURN = (

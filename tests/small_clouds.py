@@ -3,11 +3,11 @@
 import numpy as np
 
 from scantruss import PointCloud, Settings
-from scantruss.front import new_front
-from scantruss.kernels import front as lists
-from scantruss.kernels.fits import near_nodes
-from scantruss.kernels.surface import PATCH
-from scantruss.scan.sites import sample_surface
+from scantruss.front.advance import new_front
+from scantruss.kernels.front import front as lists
+from scantruss.kernels.front.fits import near_nodes
+from scantruss.kernels.surface.local_surface import PATCH
+from scantruss.surface.samples import sample_surface
 
 
 def sheet(width, depth, spacing, *, keep=None, noise=0.0, seed=0):

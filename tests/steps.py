@@ -15,11 +15,11 @@ from scantruss import (
     orientation_fields,
     sample_surface,
 )
-from scantruss.boundary import Boundary
-from scantruss.kernels.offers import RowNodes
-from scantruss.lines.find import Constraints
-from scantruss.rows import Field, Rows
-from scantruss.scan.sites import Sites
+from scantruss.boundary.find import Boundary
+from scantruss.constraints.find import Constraints
+from scantruss.front.orientation_field import Field, Rows
+from scantruss.kernels.front.candidate_nodes import RowNodes
+from scantruss.surface.samples import Sites
 
 
 class Steps(NamedTuple):

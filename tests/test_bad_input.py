@@ -18,12 +18,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scan_files import axes, e57, npy, pcd, plate, text, whole_files
 
-from scantruss.cli import main
+from scantruss.cli.main import main
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.scan.cloud import PointCloud
-from scantruss.scan.e57_pages import DATA, to_pages
-from scantruss.scan.readers import READERS, read_points
-from scantruss.scan.streaming import thin_scan
+from scantruss.scan.formats.e57_pages import DATA, to_pages
+from scantruss.scan.formats.reading import READERS, read_points
+from scantruss.scan.stream.thin_scan import thin_scan
 
 FILES = whole_files()
 HUGE = 10**12
@@ -234,7 +234,7 @@ import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, ({memory}, {memory}))
 resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 resource.setrlimit(resource.RLIMIT_FSIZE, (300 << 20, 300 << 20))
-from scantruss.cli import main
+from scantruss.cli.main import main
 for name in sys.argv[1:]:
     status = main(["grid", name, name + ".grid.obj", "--length", "5"])
     assert status == 2, (name, status)

@@ -7,8 +7,8 @@ from small_clouds import ball, cap, ring, sheet, tire, turn_of
 from steps import boundary_of
 
 import scantruss as st
-from scantruss.boundary import _onwards as onwards
-from scantruss.boundary import characteristic_points
+from scantruss.boundary.find import _onwards as onwards
+from scantruss.boundary.find import characteristic_points
 
 
 def found(points, length=1.0, **settings):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from scantruss.kernels.boxes import box_index, new_boxes, put, search, take
+from scantruss.kernels.geometry.boxes import box_index, new_boxes, put, search, take
 
 pytestmark = pytest.mark.kernels
 

@@ -12,7 +12,7 @@ import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.candidates import LENGTHS, attempts
 from scantruss.errors import CertificateError, FrontError
-from scantruss.grid.equalize import grid_energy
+from scantruss.improve.equalize import grid_energy
 
 
 @pytest.fixture(scope="module")

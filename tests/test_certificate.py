@@ -15,11 +15,11 @@ from steps import steps_of
 
 import scantruss as st
 from scantruss import pipeline
+from scantruss.check.certify import certify, fold_angles
+from scantruss.check.defects import FOLDED
+from scantruss.check.irregular import count_irregular
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate
-from scantruss.grid.faults import FOLDED
-from scantruss.grid.irregular import count_irregular
-from scantruss.grid.proof import certify, fold_angles
 
 SETTINGS = st.Settings(length=1.0)
 SHIFT = np.array([500_000.0, 4_500_000.0, 100.0])
@@ -268,7 +268,7 @@ def plate():
 
 @pytest.mark.parametrize("effort", ["quick", "best"])
 def test_a_failed_grid_is_kept_where_that_is_asked_for(plate, monkeypatch, effort):
-    monkeypatch.setattr("scantruss.grid.faults.LEFT_OUT", -1.0)  # no grid can pass
+    monkeypatch.setattr("scantruss.check.defects.LEFT_OUT", -1.0)  # no grid can pass
     settings = st.Settings(length=1.5, effort=effort)
     with pytest.raises(CertificateError) as refused:
         st.grid_from_points(plate, settings)

@@ -9,14 +9,14 @@ from scipy.spatial import cKDTree
 from shapes import make
 
 import scantruss as st
-from scantruss.clean import clean_points
-from scantruss.clean.duplicates import find_near_duplicates, find_repeated, has_repeats
-from scantruss.clean.nearby import Nearby
-from scantruss.clean.pieces import find_loose_pieces
-from scantruss.clean.thinning import thin_to
-from scantruss.cli import main
-from scantruss.kernels import tree as trees
-from scantruss.scan.sites import sample_surface
+from scantruss.cli.main import main
+from scantruss.kernels.geometry import kd_tree as trees
+from scantruss.scan.clean import clean_points
+from scantruss.scan.clean.duplicates import find_near_duplicates, find_repeated, has_repeats
+from scantruss.scan.clean.nearby import Nearby
+from scantruss.scan.clean.pieces import find_loose_pieces
+from scantruss.scan.clean.thinning import thin_to
+from scantruss.surface.samples import sample_surface
 
 
 def spacing_of(shape, count):

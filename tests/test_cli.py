@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import scantruss as st
-from scantruss import cli
-from scantruss.cli import main
-from scantruss.commands import gridding, showing
+from scantruss.cli import demo, grid
+from scantruss.cli import main as cli
+from scantruss.cli.main import main
+from scantruss.cli.options import option_of
 from scantruss.errors import CertificateError, FrontError, words_of_place
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
-from scantruss.options import option_of
 from scantruss.scan import member_length
 from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 
@@ -61,7 +61,7 @@ def place(tmp_path, monkeypatch):
 @pytest.fixture
 def ready(place, monkeypatch):
     """The same, with a finished grid in place of the long work."""
-    for command in (gridding, showing):
+    for command in (grid, demo):
         monkeypatch.setattr(command, "read_scan", lambda *_: PointCloud.from_array(plate()))
         monkeypatch.setattr(command, "make_grid", lambda *_, **__: hexagon())
     return place
@@ -142,7 +142,7 @@ def test_a_length_that_is_no_positive_number_is_refused(place, capsys, command, 
 )
 def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(place, capsys, monkeypatch, out, line):
     (place / "folder.obj").mkdir()
-    monkeypatch.setattr(gridding, "read_scan", lambda *_: pytest.fail("the scan was read"))
+    monkeypatch.setattr(grid, "read_scan", lambda *_: pytest.fail("the scan was read"))
     assert line in refused(capsys, "grid", "scan.xyz", "good.obj", out, "--length", LENGTH)
 
 
@@ -288,7 +288,7 @@ def test_a_command_leaves_the_signals_as_they_were(words, capsys):
 def test_help_and_version_import_nothing_heavy():
     heavy = "numpy numba rich scipy trimesh laspy matplotlib"
     code = (
-        "import sys, scantruss.cli as cli\n"
+        "import sys, scantruss.cli.main as cli\n"
         "for words in '--help', 'grid --help', 'clean --help', 'info -h', 'print --help', 'demo -h', '--version', '':\n"
         "    assert cli.main(words.split()) == 0\n"
         f"assert not set('{heavy}'.split()) & set(sys.modules)"
@@ -332,7 +332,7 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
 @pytest.fixture
 def failing(place, monkeypatch):
     """No grid can pass."""
-    monkeypatch.setattr("scantruss.grid.faults.UNEVEN", 0.0)
+    monkeypatch.setattr("scantruss.check.defects.UNEVEN", 0.0)
     return place
 
 
@@ -480,7 +480,7 @@ def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
 
 def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(gridding, "make_grid", lambda *_, **__: 1 // 0)
+    monkeypatch.setattr(grid, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 

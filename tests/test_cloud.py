@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial import cKDTree
 
 from scantruss.errors import InputError
-from scantruss.kernels.origin import BLOCK, move_points, widen_bounds
+from scantruss.kernels.geometry.bounds import BLOCK, move_points, widen_bounds
 from scantruss.scan import cloud as clouds
 from scantruss.scan.cloud import PointCloud, bounds_of, measure_spacing
 

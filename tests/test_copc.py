@@ -14,12 +14,12 @@ from copc_file import ENTRY, copc
 from laspy.copc import Bounds
 
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.chunks import Reading, read_chunks
-from scantruss.scan.copc import find_boxes
-from scantruss.scan.fit import spacing_to_fit
-from scantruss.scan.readers import read_points
-from scantruss.scan.streaming import thin_scan
-from scantruss.scan.tiles import find_source, tiles_of
+from scantruss.scan.formats.copc import find_boxes
+from scantruss.scan.formats.reading import read_points
+from scantruss.scan.stream.chunks import Reading, read_chunks
+from scantruss.scan.stream.fit import spacing_to_fit
+from scantruss.scan.stream.thin_scan import thin_scan
+from scantruss.scan.stream.tiles import find_source, tiles_of
 from scantruss.selection import Selection
 from scantruss.settings import Settings
 
@@ -258,7 +258,7 @@ def test_the_thinned_scan_is_that_of_the_whole_file(both) -> None:
 
 
 def test_points_that_are_not_read_take_no_memory(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("scantruss.scan.fit.FEWEST", 100)
+    monkeypatch.setattr("scantruss.scan.stream.fit.FEWEST", 100)
     path = tmp_path / "a.copc.laz"
     path.write_bytes(DATA)
     assert spacing_to_fit(path, Settings(length=2.0), 2e5) == 0.1

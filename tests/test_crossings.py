@@ -12,9 +12,9 @@ from rough import strip_of
 from scipy.optimize import linprog
 from small_grids import dome, fan, icosahedron, make_grid
 
-from scantruss.grid import crossings
-from scantruss.grid.crossings import find_crossings, triangles_meet
-from scantruss.kernels import crossing as kernels
+from scantruss.check import crossings
+from scantruss.check.crossings import find_crossings, triangles_meet
+from scantruss.kernels.mesh import crossings as kernels
 
 pytestmark = pytest.mark.kernels
 

@@ -9,11 +9,11 @@ from small_clouds import HandFront, sheet
 from steps import steps_of
 
 import scantruss as st
-from scantruss import front as driver
+from scantruss.constraints.embedded_lines import add_half_edges, check_links, link_around
 from scantruss.errors import FrontError
-from scantruss.kernels import front as lists
-from scantruss.kernels import gaps
-from scantruss.slits import add_half_edges, check_links, link_around
+from scantruss.front import advance as driver
+from scantruss.kernels.front import front as lists
+from scantruss.kernels.front import gaps
 
 
 def groin_vault(rise, noise=0.02, half=36.0, count=60_000, seed=0):

@@ -8,7 +8,7 @@ from hypothesis import strategies as some
 from marks import compiled_only
 from rough import curve_of, rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.equalize import (
+from scantruss.improve.equalize import (
     LAST_STRIDE,
     PRICE,
     WEIGHT,
@@ -19,11 +19,11 @@ from scantruss.grid.equalize import (
     search_once,
     settle,
 )
-from scantruss.kernels import equalize as kernels
-from scantruss.kernels import rim as curves
-from scantruss.kernels import search
-from scantruss.kernels.grid import INTERIOR, REST, may_collapse, may_flip, may_split
-from scantruss.kernels.trial import total_energy
+from scantruss.kernels.boundary import curves
+from scantruss.kernels.mesh import equalize as kernels
+from scantruss.kernels.mesh import local_search
+from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
+from scantruss.kernels.mesh.trial import total_energy
 
 MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
 
@@ -94,9 +94,9 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
             for move, allowed in enumerate((may_flip, may_collapse, may_split)):
                 if allowed(net, v, u):
                     worth = 0.0 if move == 0 else (99.0 if move == 1 else -99.0)
-                    if search.disorder(net, move, v, u) > 0 or move > 0:
+                    if local_search.disorder(net, move, v, u) > 0 or move > 0:
                         assert (
-                            not search.try_move(
+                            not local_search.try_move(
                                 net, relief.patches, relief.rim, scratch, move, v, u, length, WEIGHT, worth
                             )
                             or move == 0
@@ -137,7 +137,9 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
-                search.try_move(net, relief.patches, relief.rim, scratch, search.FLIP, v, u, relief.length, WEIGHT, 0.0)
+                local_search.try_move(
+                    net, relief.patches, relief.rim, scratch, local_search.FLIP, v, u, relief.length, WEIGHT, 0.0
+                )
                 after = total_energy(net, scratch, relief.length, WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after

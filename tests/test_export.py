@@ -15,8 +15,8 @@ from hypothesis import strategies as some
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, rich, two_pieces
 
 import scantruss as st
-from scantruss.export.files import write_files
 from scantruss.export.formats import FORMATS, check_output
+from scantruss.runtime.files import write_files
 
 GRIDS = [fan, icosahedron, two_pieces, rich, dome]
 NOBODY = 65534  # user

@@ -9,15 +9,15 @@ from rough import rough_disc, rough_sphere, same_topology
 from scipy.spatial import Delaunay
 from small_grids import dome, fan, make_grid
 
-from scantruss.grid.flips import FOLD, flip_by_angle, flip_edges
-from scantruss.grid.relief import open_net
-from scantruss.kernels import flips as kernels
-from scantruss.kernels.grid import flip, may_flip
+from scantruss.improve.flips import FOLD, flip_by_angle, flip_edges
+from scantruss.improve.working_mesh import open_net
+from scantruss.kernels.mesh import flips as kernels
+from scantruss.kernels.mesh.grid import flip, may_flip
 
 
 def scrambled(grid, seed, count=40):
     """The grid with random flips, none of which folds it."""
-    from scantruss.grid.relief import close_net
+    from scantruss.improve.working_mesh import close_net
 
     net, source = open_net(grid)
     rng = np.random.default_rng(seed)

@@ -11,15 +11,15 @@ from small_clouds import HandFront, ball, cap, ring, sheet, tire, turn_of
 from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
-from scantruss import front as driver
-from scantruss.boundary import characteristic_points
-from scantruss.kernels import front as lists
-from scantruss.kernels import gaps
-from scantruss.kernels.boxes import new_boxes
-from scantruss.kernels.cases import choose_by_case
-from scantruss.kernels.fits import near_nodes
-from scantruss.kernels.triangles import shape_quality
-from scantruss.rows import Rows
+from scantruss.boundary.find import characteristic_points
+from scantruss.front import advance as driver
+from scantruss.front.orientation_field import Rows
+from scantruss.kernels.front import front as lists
+from scantruss.kernels.front import gaps
+from scantruss.kernels.front.cases import choose_by_case
+from scantruss.kernels.front.fits import near_nodes
+from scantruss.kernels.geometry.boxes import new_boxes
+from scantruss.kernels.geometry.triangles import shape_quality
 
 METHODS = ("default", "paper")
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as some
 from rough import rough_disc, rough_sphere, same_topology, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
-from scantruss.grid.relief import close_net, join_again, open_net
-from scantruss.kernels import grid as kernels
+from scantruss.improve.working_mesh import close_net, join_again, open_net
+from scantruss.kernels.mesh import grid as kernels
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.2), (2, 1, 0), (3, 0, 1)]
 SOUND = {"fan": fan, "icosahedron": icosahedron, "dome": lambda: dome(6), "ring": lambda: strip_of(9)}

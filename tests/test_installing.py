@@ -107,7 +107,7 @@ def test_where_it_cannot_compile_it_says_so_and_the_first_run_does(project, comm
     assert wheel.name.endswith("py3-none-any.whl") and not machine_code_in_wheel(wheel)
     assert "not compiled now but by the first run" in said
     with zipfile.ZipFile(wheel) as content:
-        assert "scantruss/kernels/compile.py" in content.namelist()
+        assert "scantruss/runtime/jit.py" in content.namelist()
 
 
 def test_a_source_distribution_can_compile(project):

@@ -1,65 +1,98 @@
-"""Imports go one way: scan -> boundary -> front -> grid -> files, kernels below, the command line above."""
+"""Imports go one way, in the order of the tree, and nowhere in a circle."""
 
 import ast
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "scantruss"
-LAYERS = (  # lowest first; a module imports from its own line and from lines above
-    ("errors", "kernels", "vectors", "__init__"),  # __init__: the version
-    ("selection", "settings", "machine", "workers"),
-    ("scan", "clean"),
-    ("splice",),
-    ("grid.grid", "grid.quality"),  # the type that front, grid and export share
-    ("curves",),
-    ("rolls", "corners", "fill", "lines"),
-    ("edge",),
-    ("boundary",),
-    ("lines.find",),
-    ("rows", "slits"),
+LAYERS = (  # lowest first; a module imports from its own row and from rows above
+    ("__init__", "errors", "runtime"),  # __init__: the version
+    ("kernels",),
+    ("selection", "settings"),
+    ("scan",),
+    ("surface", "scan.register"),
+    ("boundary", "constraints"),
+    ("grid",),  # the record, which front, improve and check share
     ("front",),
-    ("grid",),
-    ("candidates",),
-    ("pipeline",),
-    ("structure",),
-    ("export",),
-    ("sweep",),
-    ("report", "demo"),
-    ("options", "studio", "commands"),
-    ("cli", "__main__"),
+    ("improve", "check"),
+    ("pipeline", "candidates"),
+    ("structure", "layouts", "schedules", "export", "sweep"),
+    ("report", "studio", "cli", "__main__"),
 )
-MODULES = sorted(path.relative_to(SOURCE).with_suffix("").parts for path in SOURCE.rglob("*.py"))
+MODULES = {
+    ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): path
+    for path in sorted(SOURCE.rglob("*.py"))
+}
+ROOT = 8  # modules that lie on the root at most
 
 
-def layer_of(parts):
+def package_of(name):
+    """Return the package that a module lies in; a module of the root stands for itself."""
+    return name if MODULES[name].name == "__init__.py" else name.rpartition(".")[0] or name
+
+
+def layer_of(name):
     """Return the layer of a module by its longest name in the table."""
-    for end in range(len(parts), 0, -1):
+    words = name.split(".")
+    for end in range(len(words), 0, -1):
         for layer, names in enumerate(LAYERS):
-            if ".".join(parts[:end]) in names:
+            if ".".join(words[:end]) in names:
                 return layer
-    raise AssertionError(f"{'.'.join(parts)} has no place in the layers")
+    raise AssertionError(f"{name} has no place in the layers")
 
 
-def imports_of(tree, parts):
-    """Yield the modules of the package that a module imports, wherever it does; not what only type checkers see."""
+def imports_of(name, with_types=False):
+    """Return the modules of the package that a module imports, wherever it does; `with_types`: also for type checkers only."""
+    path = MODULES[name]
+    tree = ast.parse(path.read_text(encoding="utf-8"))
     skipped = {
         inner for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
-        for inner in ast.walk(node)
+        for inner in ast.walk(node) if not with_types
     }  # fmt: skip
-    for node in (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node not in skipped):
-        if node.level == 0 and (node.module or "").split(".")[0] != "scantruss":
+    found = set()
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.ImportFrom) or node in skipped:
             continue
-        base = list(parts[: len(parts) - node.level]) if node.level else []
-        base += [name for name in (node.module or "").split(".") if name and name != "scantruss"]
+        if node.level:
+            base = list(path.relative_to(SOURCE).parts[: -node.level])
+        elif (node.module or "").split(".")[0] == "scantruss":
+            base = []
+        else:
+            continue
+        base += [word for word in (node.module or "").split(".") if word and word != "scantruss"]
         for alias in node.names:
-            inner = (*base, alias.name)
-            yield inner if inner in MODULES or (*inner, "__init__") in MODULES else tuple(base) or ("__init__",)
+            inner = ".".join([*base, alias.name])
+            found.add(inner if inner in MODULES else ".".join(base) or "__init__")
+    return found - {name}
 
 
-@pytest.mark.parametrize("parts", [parts for parts in MODULES if parts != ("__init__",)], ids=".".join)
-def test_a_module_imports_only_from_its_own_layer_and_below(parts):
-    tree = ast.parse(SOURCE.joinpath(*parts).with_suffix(".py").read_text(encoding="utf-8"))
-    for found in imports_of(tree, parts):
-        assert layer_of(found) <= layer_of(parts), f"{'.'.join(parts)} imports {'.'.join(found)}"
-        assert parts[0] != "kernels" or found[0] == "kernels", "kernels import nothing else of the package"
+@pytest.mark.parametrize("name", sorted(MODULES.keys() - {"__init__"}))
+def test_a_module_imports_only_from_its_own_layer_and_below(name):
+    for found in imports_of(name):
+        assert layer_of(found) <= layer_of(name), f"{name} imports {found}"
+
+
+def test_kernels_import_kernels_and_runtime_only():
+    for name in MODULES:
+        if name.startswith("kernels."):
+            assert {found.split(".")[0] for found in imports_of(name)} <= {"kernels", "runtime"}, name
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    tuple(
+        TopologicalSorter({name: imports_of(name) for name in MODULES}).static_order()
+    )  # else a CycleError names them
+
+
+def test_no_packages_import_each_other_in_a_circle_for_types_neither():
+    packages = {package_of(name): set() for name in MODULES}
+    for name in MODULES.keys() - {"__init__"}:
+        found = {package_of(found) for found in imports_of(name, with_types=True) if found != "__init__"}
+        packages[package_of(name)] |= found - {package_of(name)}
+    tuple(TopologicalSorter(packages).static_order())
+
+
+def test_few_modules_lie_on_the_root():
+    assert len(list(SOURCE.glob("*.py"))) <= ROOT

@@ -7,9 +7,9 @@ import pytest
 from small_clouds import cap, sheet
 
 import scantruss as st
-from scantruss.cli import main
+from scantruss.cli.main import main
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.lengths import read_lengths
+from scantruss.scan.formats.lengths import read_lengths
 from scantruss.settings import Settings
 
 ROWS = ((1.0, 2.0, -3.0, 1.5), (4.0, 5.0, 6.5, 2.0))

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scan_files import MOVED, TURN, TURNED, axes, e57, pcd, plate
 
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.e57 import e57_scans, read_e57
-from scantruss.scan.e57_writer import Column
-from scantruss.scan.pcd import read_pcd
-from scantruss.scan.readers import read_points
+from scantruss.scan.formats.e57 import e57_scans, read_e57
+from scantruss.scan.formats.e57_writer import Column
+from scantruss.scan.formats.pcd import read_pcd
+from scantruss.scan.formats.reading import read_points
 from scantruss.selection import Selection
 
 P = plate()

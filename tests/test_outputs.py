@@ -8,9 +8,10 @@ import pytest
 from shapes import make
 from small_grids import fan
 
-from scantruss.cli import main
+from scantruss.cli.main import main
 from scantruss.export.formats import write
-from scantruss.scan import fit, opened, readers  # here, so that none of them is loaded while another is barred
+from scantruss.scan.formats import reading  # here, so that none of them is loaded while another is barred
+from scantruss.scan.stream import fit, opened
 from scantruss.settings import Settings
 
 RING = "-99,-99\n99,-99\n99,99\n-99,99\n"
@@ -46,7 +47,7 @@ def refused(capsys, words):
 @pytest.fixture
 def unread(place, monkeypatch):
     """The same, where no scan may be read."""
-    for module, name in ((readers, "read_points"), (opened, "open_scan"), (fit, "spacing_to_fit")):
+    for module, name in ((reading, "read_points"), (opened, "open_scan"), (fit, "spacing_to_fit")):
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("a scan was read"))
     return place
 

@@ -9,14 +9,14 @@ from hypothesis import strategies as some
 from range_scans import body, random_pose, scans_of
 from scipy.spatial import cKDTree
 
-from scantruss.kernels import blend as blending
-from scantruss.kernels import features as feature_kernels
-from scantruss.kernels import overlap as kernels
-from scantruss.splice.features import BINS, find_features, flip
-from scantruss.splice.fine import align, judge, solve
-from scantruss.splice.matching import fit_pose
-from scantruss.splice.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
-from scantruss.splice.views import boxes_of, make_view
+from scantruss.kernels.scan import blend as blending
+from scantruss.kernels.scan import features as feature_kernels
+from scantruss.kernels.scan import overlap as kernels
+from scantruss.scan.register.features import BINS, find_features, flip
+from scantruss.scan.register.fine import align, judge, solve
+from scantruss.scan.register.matching import fit_pose
+from scantruss.scan.register.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
+from scantruss.scan.register.views import boxes_of, make_view
 
 pytestmark = pytest.mark.kernels
 SPACING = 0.12

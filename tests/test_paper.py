@@ -14,14 +14,14 @@ from small_clouds import HandFront, cap, ring, sheet
 from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
-from scantruss.boundary import characteristic_points
-from scantruss.front import new_front, start_front
-from scantruss.grid.flips import flip_edges
-from scantruss.kernels import cases, fits
-from scantruss.kernels import front as lists
-from scantruss.kernels.advance import advance_by_cases
-from scantruss.kernels.boxes import box_index, new_boxes
-from scantruss.kernels.triangles import (
+from scantruss.boundary.find import characteristic_points
+from scantruss.front.advance import new_front, start_front
+from scantruss.improve.flips import flip_edges
+from scantruss.kernels.front import cases, fits
+from scantruss.kernels.front import front as lists
+from scantruss.kernels.front.advance import advance_by_cases
+from scantruss.kernels.geometry.boxes import box_index, new_boxes
+from scantruss.kernels.geometry.triangles import (
     on_unmeshed_side,
     onto_tangent_plane,
     quality,
@@ -29,7 +29,7 @@ from scantruss.kernels.triangles import (
     shape_quality,
     size_quality,
 )
-from scantruss.scan.sites import sample_surface
+from scantruss.surface.samples import sample_surface
 
 ROOT3 = math.sqrt(3.0)
 A, B = (0.0, 0.0), (1.0, 0.0)  # the candidate segment AB; the unmeshed area is above it

@@ -7,10 +7,10 @@ import pytest
 from PIL import Image
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
-from scantruss.export.camera import choose_camera, map_depth
-from scantruss.export.picture import PANELS, SIZE, draw_panels, encode_picture
+from scantruss.export.drawing.camera import choose_camera, map_depth
+from scantruss.export.drawing.picture import PANELS, SIZE, draw_panels, encode_picture
+from scantruss.export.drawing.strokes import MARK, PAPER
 from scantruss.export.solid import build_solid
-from scantruss.export.strokes import MARK, PAPER
 
 
 def pixels(data):

@@ -10,11 +10,12 @@ import pytest
 from scan_files import pcd
 
 from scantruss.errors import FormatError, InputError
-from scantruss.scan import chunks, text
-from scantruss.scan.chunks import read_chunks
-from scantruss.scan.readers import add_counts, read_points
-from scantruss.scan.streaming import thin_scan
-from scantruss.scan.tiles import find_source, tiles_of
+from scantruss.scan.formats import text
+from scantruss.scan.formats.reading import add_counts, read_points
+from scantruss.scan.stream import chunks
+from scantruss.scan.stream.chunks import read_chunks
+from scantruss.scan.stream.thin_scan import thin_scan
+from scantruss.scan.stream.tiles import find_source, tiles_of
 from scantruss.selection import Selection
 
 P = np.round(np.random.default_rng(5).random((60, 3)) * [90, 70, 20] - 10, 3)

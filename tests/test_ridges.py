@@ -9,11 +9,11 @@ from shapes import make
 from steps import steps_of
 
 from scantruss import PointCloud, Settings, candidates, grid_from_points
+from scantruss.constraints.ridges import Tracer, find_ridges, is_ridge, join_ends
 from scantruss.errors import FrontError
-from scantruss.kernels.quadric import COLUMNS, WEIGHT
-from scantruss.kernels.ridges import FOUND, TERMS, fit_fold, fold_error, turned_frame
-from scantruss.lines.ridges import Tracer, find_ridges, is_ridge, join_ends
-from scantruss.scan.sites import sample_surface
+from scantruss.kernels.geometry.quadric import COLUMNS, WEIGHT
+from scantruss.kernels.surface.ridges import FOUND, TERMS, fit_fold, fold_error, turned_frame
+from scantruss.surface.samples import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
 

@@ -11,12 +11,12 @@ import pytest
 from steps import boundary_of
 
 import scantruss as st
-from scantruss.cli import main
-from scantruss.commands import scaling
-from scantruss.machine import available_memory
-from scantruss.options import size_of_memory
-from scantruss.scan import fit
-from scantruss.scan.thin import thin_points
+from scantruss.cli import thin
+from scantruss.cli.main import main
+from scantruss.cli.options import size_of_memory
+from scantruss.runtime.memory import available_memory
+from scantruss.scan.stream import fit
+from scantruss.scan.stream.thinning import thin_points
 
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
@@ -90,7 +90,7 @@ def test_thin_refuses_in_one_line_and_writes_nothing(words, line, place, capsys)
 CODE = """
 import resource, sys
 import numpy as np
-from scantruss.scan.streaming import thin_scan
+from scantruss.scan.stream.thin_scan import thin_scan
 peaks = []
 for name in sys.argv[1:]:
     found = thin_scan([name], 1.0, rim=True)
@@ -301,12 +301,12 @@ def test_a_sweep_into_a_file_is_refused(place, capsys):
 def test_several_workers_are_announced(capsys, monkeypatch):
     from argparse import Namespace
 
-    from scantruss import workers as crew
     from scantruss.report.terminal import Bars
+    from scantruss.runtime import cluster as crew
 
     monkeypatch.setattr(crew, "has_dask", lambda: False)
     with Bars() as bars:
-        scaling._workers(Namespace(workers=3, scheduler=""), bars, None)
+        thin._workers(Namespace(workers=3, scheduler=""), bars, None)
     assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out
 
 

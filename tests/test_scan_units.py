@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scan_files import e57, las, plate, text, written
 
-from scantruss.cli import main
+from scantruss.cli.main import main
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.fit import read_thinned
-from scantruss.scan.heights import look_like_feet
-from scantruss.scan.paths import files_of
-from scantruss.scan.readers import read_points
-from scantruss.scan.streaming import thin_scan
-from scantruss.scan.systems import from_wkt
-from scantruss.scan.writers import write_points
+from scantruss.scan.formats.heights import look_like_feet
+from scantruss.scan.formats.paths import files_of
+from scantruss.scan.formats.reading import read_points
+from scantruss.scan.formats.systems import from_wkt
+from scantruss.scan.formats.writing import write_points
+from scantruss.scan.stream.fit import read_thinned
+from scantruss.scan.stream.thin_scan import thin_scan
 from scantruss.selection import Selection
 from scantruss.settings import Settings
 

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scan_files import las, parquet_file, pcd, plate, text, written
 
-from scantruss.cli import main
+from scantruss.cli.main import main
+from scantruss.cli.options import Parser, add_reading, selection_of
 from scantruss.errors import FormatError, InputError
-from scantruss.options import Parser, add_reading, selection_of
-from scantruss.scan import chunks
-from scantruss.scan.choose import in_polygon
-from scantruss.scan.readers import read_points
-from scantruss.scan.streaming import thin_scan
+from scantruss.scan.formats.choose import in_polygon
+from scantruss.scan.formats.reading import read_points
+from scantruss.scan.stream import chunks
+from scantruss.scan.stream.thin_scan import thin_scan
 from scantruss.selection import Selection, polygon_text, read_crop
 from scantruss.settings import Settings
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scantruss.cli.options import Parser as OptionParser
+from scantruss.cli.options import add_settings, option_of, read_positions, settings_of
 from scantruss.errors import FormatError, InputError
-from scantruss.options import Parser as OptionParser
-from scantruss.options import add_settings, option_of, read_positions, settings_of
 from scantruss.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapes import make
 
-from scantruss.cli import main
-from scantruss.commands.shared import say_of_cloud
+from scantruss.cli.main import main
+from scantruss.cli.shared import say_of_cloud
 from scantruss.report.terminal import Bars
 from scantruss.scan.cloud import PointCloud
 

@@ -9,12 +9,12 @@ from small_clouds import sheet
 from steps import steps_of
 
 import scantruss as st
-from scantruss.grid.proof import certify
-from scantruss.grid.sheets import faults_on_sheets, nodes_of_sites
-from scantruss.kernels import boundary as kernels
-from scantruss.kernels import normals as facing
+from scantruss.check.certify import certify
+from scantruss.check.sheets import faults_on_sheets, nodes_of_sites
+from scantruss.kernels.boundary import loops as kernels
+from scantruss.kernels.surface import normals as facing
 from scantruss.pipeline import grid_from_cloud
-from scantruss.scan.sites import sample_surface
+from scantruss.surface.samples import sample_surface
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
-from scantruss.grid.smoothing import (
+from scantruss.improve.smoothing import (
     State,
     deviation_allowed,
     lengths_no_longer_even_out,
@@ -13,8 +13,8 @@ from scantruss.grid.smoothing import (
     shape_no_longer_improves,
     smooth,
 )
-from scantruss.kernels import smoothing as kernels
-from scantruss.kernels.grid import REST, RIM
+from scantruss.kernels.mesh import smoothing as kernels
+from scantruss.kernels.mesh.grid import REST, RIM
 
 
 @pytest.fixture(scope="module")

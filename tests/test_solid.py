@@ -10,7 +10,7 @@ import trimesh
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
 import scantruss as st
-from scantruss.demo import save_demo
+from scantruss.cli.demo_files import save_demo
 from scantruss.export.solid import Solid, build_solid, is_watertight
 from scantruss.export.solid_files import encode_3mf, encode_stl, lattice_step, put_on_lattice
 

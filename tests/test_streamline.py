@@ -8,11 +8,11 @@ from shapes import make
 from steps import boundary_of
 
 import scantruss as st
-from scantruss import machine
-from scantruss.scan import streamline
+from scantruss.runtime import parallel
 from scantruss.scan.cloud import bounds_of
-from scantruss.scan.sites import sample_surface
-from scantruss.scan.streamline import is_dense, points_near, streamlined
+from scantruss.surface import streamline
+from scantruss.surface.samples import sample_surface
+from scantruss.surface.streamline import is_dense, points_near, streamlined
 
 
 def slow(points, size):
@@ -41,7 +41,7 @@ def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
     monkeypatch.setattr(streamline, "MOST_ROOM", room)
     found = []
     for count in (1, 2, 5):
-        monkeypatch.setattr(machine, "processors", lambda count=count: count)
+        monkeypatch.setattr(parallel, "processors", lambda count=count: count)
         monkeypatch.setattr(streamline, "processors", lambda count=count: count)
         found.append(streamlined(points, bounds_of(points), 0.1).tolist())
     assert found[0] == found[1] == found[2] == slow(points, 0.1)

@@ -11,8 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from scantruss.errors import FormatError
-from scantruss.scan.columns import find_columns
-from scantruss.scan.readers import read_points
+from scantruss.scan.formats.columns import find_columns
+from scantruss.scan.formats.reading import read_points
 
 SHIFT = np.array([500_000.0, 4_500_000.0, 100.0])
 POINTS = np.round(np.random.default_rng(3).random((40, 3)) * [90, 70, 20] - 10 + SHIFT, 3)

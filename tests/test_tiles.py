@@ -6,11 +6,11 @@ from copc_file import copc
 
 import scantruss as st
 from scantruss.errors import FormatError
-from scantruss.scan import chunks
-from scantruss.scan.chunks import read_ahead, read_chunks
-from scantruss.scan.readers import READERS
-from scantruss.scan.streaming import thin_scan
-from scantruss.scan.tiles import find_source, tiles_of
+from scantruss.scan.formats.reading import READERS
+from scantruss.scan.stream import chunks
+from scantruss.scan.stream.chunks import read_ahead, read_chunks
+from scantruss.scan.stream.thin_scan import thin_scan
+from scantruss.scan.stream.tiles import find_source, tiles_of
 
 COUNT = 700
 
@@ -177,7 +177,7 @@ def test_a_damaged_file_is_refused_in_words(way, tmp_path):
 
 def test_thinned_points_are_those_of_the_scan_in_memory(tmp_path):
     """By way of a file as by way of an array."""
-    from scantruss.scan.thin import thin_points
+    from scantruss.scan.stream.thinning import thin_points
 
     points = cloud()
     write_las(tmp_path / "scan.laz", points)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from scantruss.kernels import triangles as t
+from scantruss.kernels.geometry import triangles as t
 
 pytestmark = pytest.mark.kernels
 

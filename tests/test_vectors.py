@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scantruss.kernels.vectors import across, along, cross, dot, norm, row, smallest_eigenvector, subtract, unit
+from scantruss.kernels.geometry.vectors import (
+    across,
+    along,
+    cross,
+    dot,
+    norm,
+    row,
+    smallest_eigenvector,
+    subtract,
+    unit,
+)
 
 pytestmark = pytest.mark.kernels
 

@@ -9,25 +9,26 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+from .check.certify import certified
+from .constraints.ridges import find_ridges
 from .errors import FrontError
-from .front import advance_front
-from .grid.equalize import energy_of_node
-from .grid.optimize import improve_first, improve_last
-from .grid.proof import certified
-from .lines.ridges import find_ridges
-from .machine import processors
-from .rows import Field, Rows
-from .scan.sites import sample_surface, with_own_scratch
+from .front.advance import advance_front
+from .front.orientation_field import Field, Rows
+from .improve.equalize import energy_of_node
+from .improve.optimize import improve_first, improve_last
+from .runtime.parallel import processors
 from .settings import SITE
+from .surface.samples import sample_surface
+from .surface.scratch import with_own_scratch
 
 if TYPE_CHECKING:
-    from .boundary import Boundary
+    from .boundary.find import Boundary
+    from .constraints.find import Constraints
     from .grid.grid import Grid
-    from .grid.relief import Relief
-    from .lines.find import Constraints
+    from .improve.working_mesh import Relief
     from .scan.cloud import PointCloud
-    from .scan.sites import Sites
     from .settings import Settings
+    from .surface.samples import Sites
 
 Progress = Callable[[str, float], None]
 Job = TypeVar("Job")
@@ -116,7 +117,7 @@ def advance_fronts(
     *,
     progress: Progress | None = None,
 ) -> list[Grid]:
-    """Return what the fronts leave behind that advance over a scan, one for each field (Fig. 4); see `front.advance_front`.
+    """Return what the fronts leave behind that advance over a scan, one for each field (Fig. 4); see `front.advance.advance_front`.
 
     Raises
     ------

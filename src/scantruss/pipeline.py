@@ -8,17 +8,17 @@ from time import perf_counter
 
 import numpy as np
 
-from .boundary import find_boundary
+from .boundary.find import find_boundary
 from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
+from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, ScanTrussError
+from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
-from .lines.find import find_constraints
-from .rows import orientation_fields
 from .scan.cloud import PointCloud
-from .scan.fit import read_to_fit
 from .scan.member_length import check_length
-from .scan.sites import sample_surface
+from .scan.stream.fit import read_to_fit
 from .settings import Settings
+from .surface.samples import sample_surface
 
 Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
 

@@ -11,9 +11,9 @@ from .errors import FrontError, InputError
 from .pipeline import grid_from_cloud
 
 if TYPE_CHECKING:
+    from .runtime.cluster import Workers
     from .scan.cloud import PointCloud
     from .settings import Settings
-    from .workers import Workers
 
 Progress = Callable[[str, float], None]
 
@@ -95,8 +95,8 @@ def sweep(
 
 def try_settings(settings: Settings, cloud: PointCloud) -> Outcome:
     """Return the grid of a cloud by some settings, or why there is none: the work of a worker."""
-    from .export.json_file import encode_json
-    from .export.picture import encode_picture
+    from .export.drawing.picture import encode_picture
+    from .export.json import encode_json
 
     try:
         grid = grid_from_cloud(cloud, settings)

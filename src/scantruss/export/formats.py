@@ -7,13 +7,13 @@ from pathlib import Path
 
 from ..errors import FormatError
 from ..grid.grid import Grid
+from ..runtime.files import check_place, write_files
 from ..scan.cloud import PointCloud
-from .csv_file import encode_csv, nodes_path
-from .files import check_place, write_files
-from .json_file import encode_json
-from .obj_file import encode_obj
-from .picture import encode_picture
-from .ply_file import encode_ply
+from .csv import encode_csv, nodes_path
+from .drawing.picture import encode_picture
+from .json import encode_json
+from .obj import encode_obj
+from .ply import encode_ply
 
 Encoder = Callable[[Grid, Path, PointCloud | None], dict[Path, bytes]]
 

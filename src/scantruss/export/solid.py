@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
-from .files import check_place, write_files
+from ..runtime.files import check_place, write_files
 from .solid_files import encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")

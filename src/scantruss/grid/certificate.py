@@ -1,4 +1,4 @@
-"""The certificate of a grid: what was checked, what was found, and where it is worst; `proof.certify` makes it."""
+"""The certificate of a grid: what was checked, what was found, and where it is worst; `check.certify.certify` makes it."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernels import figures
+from ..kernels.mesh import figures
 
 if TYPE_CHECKING:
     from .grid import Grid

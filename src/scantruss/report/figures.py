@@ -11,7 +11,7 @@ from ..errors import words_of_place
 from ..grid.quality import labels
 
 if TYPE_CHECKING:
-    from ..boundary import Boundary
+    from ..boundary.find import Boundary
     from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud

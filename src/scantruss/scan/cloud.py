@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
-from ..machine import in_parts, processors
+from ..runtime.parallel import in_parts, processors
+from .invalid import CAUSE, check_sensible, find_wild, said_of_wild
 from .units import check_unit
-from .wild import CAUSE, check_sensible, find_wild, said_of_wild
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
@@ -131,7 +131,7 @@ def bounds_of(array: np.ndarray) -> Bounds:
     """Return the smallest and largest coordinates, (3,) each; NaN where one is NaN or infinite."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
-    from ..kernels.origin import widen_bounds
+    from ..kernels.geometry.bounds import widen_bounds
 
     array = np.ascontiguousarray(array)
     found = np.empty((processors(), 2, 3))
@@ -167,7 +167,7 @@ def _local_origin(lower: np.ndarray, upper: np.ndarray, extent: float) -> np.nda
 
 def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the points from their own origin (N, 3), and the sums (9,) of their coordinates and of the products of these."""
-    from ..kernels.origin import BLOCK, move_points
+    from ..kernels.geometry.bounds import BLOCK, move_points
 
     blocks = -(-len(points) // BLOCK)
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
@@ -288,8 +288,8 @@ def _refine(
 
 def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
     """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
-    from ..kernels import nearby
-    from ..kernels.boxes import new_boxes
+    from ..kernels.geometry.boxes import new_boxes
+    from ..kernels.scan import nearby
 
     copies = nearby.COPIES * len(sample)
     boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.5 * size, copies, copies)

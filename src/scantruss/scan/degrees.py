@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .apart import bulk_of
 from .cloud import PointCloud
+from .extent import bulk_of
 
 SAMPLE = 10_000  # points that tell it
 WIDEST = 1.0  # degrees that a scan spans at most

@@ -1,0 +1,1 @@
+"""The boundary of the scan: ordered loops, smooth curves and corners."""

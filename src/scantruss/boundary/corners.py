@@ -1,0 +1,182 @@
+"""Corners of a boundary curve: where they are, found from the curve at both sides (Sec. 3.6)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..settings import Settings
+
+STEP = 0.05  # distance of the points of a boundary curve, in member lengths
+ROUND = 0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
+CUT = 0.4  # the same where the disc has cut off a sharp re-entrant corner
+REACH = 2.0  # part of the curve at each side that tells the place of a corner, in member lengths
+SHORTEST = 0.6  # the same where another corner is near
+SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
+APART = 0.5  # corners nearer to each other are one, in member lengths
+STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
+BENT = 1.3  # a corner turns at most so many times more between the sides as they seem than between quadratics
+SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
+WOBBLY = 1.8  # and so many times more than three quarters of them,
+SHARP = 70.0  # or by this angle [degree]
+
+
+def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a closed curve has corners and their exact places.
+
+    A corner may be where lines fitted to the curve before and after a place differ most in direction. It is one if quadratics do so
+    too: they tell a corner from a bend, lines are not misled by a ragged rim. On a loop that turns everywhere, as a ragged one
+    does, a corner must turn more than the rest. Its place is where the two sides meet.
+
+    Parameters
+    ----------
+    curve : (M, 3) closed curve of steps `STEP * length`
+    settings : Settings
+        `corner_angle`, `length`.
+    coarser : float
+        How many times larger parts of the curve to look at: more where few points tell its course.
+
+    Returns
+    -------
+    at : (C,) int64 points of the curve next to the corners
+    places : (C, 3) the corners
+    """
+    step = STEP / coarser
+    if len(curve) < 2 * round(SIGHT[1] / step) + 2:
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    turn = _turns(curve, step)
+    usual = max(SHARPER * float(np.median(turn)), WOBBLY * float(np.quantile(turn, 0.75)))
+    enough = max(settings.corner_angle, min(usual, SHARP))
+    found: list[tuple[float, int, np.ndarray]] = []
+    peaks = _peaks(turn, enough)
+    for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve), step), strict=True):
+        for rounded in (ROUND, CUT) if turn[i] > SHARP else (ROUND,):
+            place, angle = _corner(curve, i, reaches, round(rounded / step))
+            if angle > enough and np.linalg.norm(place - curve[i]) < APART * settings.length:
+                found.append((angle, i, place))
+                break
+    return _apart(found, APART * settings.length)
+
+
+def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
+    """Places (P,) of a closed curve that turn most within `APART` to both sides, and by more than enough."""
+    half = round(APART / STEP)
+    around = np.concatenate([turn[-half:], turn, turn[:half]])
+    highest = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1).max(axis=1)
+    peaks = np.flatnonzero((turn >= highest) & (turn > enough))
+    return peaks[np.diff(peaks, append=peaks[:1] + len(turn)) > half]
+
+
+def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]]:
+    """Steps of the curve before and after each peak that tell its place: up to the next one."""
+    reaches = []
+    for k in range(len(peaks)):
+        rooms = (peaks[k] - peaks[k - 1], peaks[(k + 1) % len(peaks)] - peaks[k])
+        before, after = (int(room) % count if len(peaks) > 1 else count for room in rooms)
+        reaches.append((_reach(before, count, step), _reach(after, count, step)))
+    return reaches
+
+
+def _reach(room: int, count: int, step: float) -> int:
+    """Steps of one side with so much room to the next corner, on a curve of so many steps."""
+    return min(max(room - round(ROUND / step), round(SHORTEST / step)), round(REACH / step), count // 2)
+
+
+def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of corners (angle, point of the curve, place) nearer to each other than a distance the sharpest, in order."""
+    kept: list[tuple[int, np.ndarray]] = []
+    for _, i, place in sorted(found, key=lambda corner: (-corner[0], corner[1])):
+        if all(np.linalg.norm(place - other) > distance for _, other in kept):
+            kept.append((i, place))
+    kept.sort(key=lambda corner: corner[0])
+    at, places = [i for i, _ in kept], [place for _, place in kept]
+    return np.array(at, np.int64), np.array(places, float).reshape(-1, 3)
+
+
+def _turns(curve: np.ndarray, step: float) -> np.ndarray:
+    """Angle (M,) between lines fitted to the curve before and after each place [degree]."""
+    offsets = np.arange(round(SIGHT[0] / step), round(SIGHT[1] / step) + 1)
+    slope = (offsets - offsets.mean()) / ((offsets - offsets.mean()) ** 2).sum()
+    count, most = len(curve), int(offsets[-1])
+    around = np.concatenate([curve[-most:], curve, curve[:most]])
+    after = sum(s * around[most + o : most + o + count] for s, o in zip(slope, offsets.tolist(), strict=True))
+    before = -sum(s * around[most - o : most - o + count] for s, o in zip(slope, offsets.tolist(), strict=True))
+    cosine = (before * after).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-300)
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
+def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) -> tuple[np.ndarray, float]:
+    """Place where the two sides meet near a point of the curve, and the angle between them there [degree].
+
+    Both come from lines where a side is straight; the angle is at most `BENT` times that between quadratics, which tell a bend.
+    """
+    half = round(APART / STEP)
+    centre = at
+    for _ in range(3):
+        sides = [
+            _side(curve, centre, tuple(range(sign * rounded, sign * (reach + 1), sign)))
+            for sign, reach in zip((-1, 1), reaches, strict=True)
+        ]
+        place = _meeting(sides[0][0], sides[1][0])
+        window = np.arange(at - half, at + half + 1) % len(curve)
+        away = ((curve[window] - place) ** 2).sum(axis=1)
+        nearest = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
+        if nearest == centre:
+            break
+        centre = nearest
+    cosines = [_cosine(sides[0][k][1], sides[1][k][1]) for k in (0, 1)]
+    straight, bent = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).tolist()
+    return place, min(straight, BENT * bent)
+
+
+def _cosine(a: np.ndarray, b: np.ndarray) -> float:
+    """Cosine of the angle between two vectors."""
+    return float(a @ b) / max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1e-300)
+
+
+def _side(curve: np.ndarray, at: int, offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The curve at some steps before or after a place: the better of line and quadratic, and the quadratic.
+
+    Returns
+    -------
+    better, quadratic : (3, 3) coefficients of 1, s, s^2 [steps]
+    """
+    steps, terms, to_quadratic, to_line = _fits(offsets)
+    places = curve[(at + steps) % len(curve)]
+    quadratic, line = to_quadratic @ places, to_line @ places
+    error, least = (float(((terms @ found - places) ** 2).sum()) for found in (line, quadratic))
+    straight = error < STRAIGHT * least + 1e-6 * float(((places[-1] - places[0]) ** 2).sum())
+    return line if straight else quadratic, quadratic
+
+
+@lru_cache(maxsize=256)
+def _fits(offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Least-squares fits at some steps (K,): the steps, terms (K, 3), and what takes places to the coefficients, (3, K) each."""
+    steps = np.array(offsets)
+    terms = np.vander(steps.astype(float), 3, increasing=True)
+    to_line = np.zeros((3, len(steps)))
+    to_line[:2] = np.linalg.pinv(terms[:, :2])
+    return steps, terms, np.linalg.pinv(terms), to_line
+
+
+def _meeting(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Place where two quadratic curves come nearest to each other, near their parameter 0 (Gauss-Newton)."""
+    s = t = 0.0
+    for _ in range(6):
+        gap = after[0] + t * after[1] + t * t * after[2] - before[0] - s * before[1] - s * s * before[2]
+        a, b = before[1] + 2 * s * before[2], -(after[1] + 2 * t * after[2])
+        aa, ab, bb, ag, bg = (float(u @ v) for u, v in ((a, a), (a, b), (b, b), (a, gap), (b, gap)))
+        room = aa * bb - ab * ab
+        if room > 1e-12 * aa * bb:
+            change = (bb * ag - ab * bg) / room, (aa * bg - ab * ag) / room
+        else:  # parallel: half the way each
+            change = 0.5 * ag / max(aa, 1e-300), 0.5 * bg / max(bb, 1e-300)
+        s, t = (min(max(p + c, -0.6 / STEP), 0.6 / STEP) for p, c in zip((s, t), change, strict=True))
+        if max(map(abs, change)) < 1e-9:
+            break
+    middle: np.ndarray = 0.5 * (
+        before[0] + s * before[1] + s * s * before[2] + after[0] + t * after[1] + t * t * after[2]
+    )
+    return middle

@@ -1,0 +1,332 @@
+"""Boundary of a point cloud: ordered loops, corners and the characteristic points on them (Sec. 3.3, 3.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.boundary import loops as kernels
+from ..kernels.boundary.curves import Rim
+from ..kernels.mesh.point_location import nearest_site
+from ..kernels.surface.local_surface import Surface, walk
+from ..kernels.surface.size_field import lengths_along
+from ..runtime.parallel import in_parts
+from ..scan.normals import check_two_sided
+from ..settings import Settings
+from ..surface.samples import Sites, broad_normals, is_graded, sites_with, with_whole_rim
+from ..surface.scratch import with_own_scratch
+from .corners import STEP
+from .curves import cut_spikes, length_around, resample, smooth_turns
+from .holes import fill_holes
+from .offset import ON_THE_EDGE, Chance, chance_of, curve_of_edge
+from .rolling_disc import boundary_loops
+
+Progress = Callable[[str, float], None]
+
+SPIKES = (0.6, 0.3, 0.16)  # tongues and bays narrower than this are cut off, in member lengths, short ones by the last
+OPEN = 0.6  # share of a loop beside which there must be room for a disc
+NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
+BACK = 16  # steps within which a boundary point that is touched again was never left
+PART = 500  # fewest places of a loop for a thread of their own
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One boundary loop, the surface to its left."""
+
+    points: np.ndarray  #: (M, 3) smoothed closed curve, relative to the cloud's origin
+    corner_at: np.ndarray  #: (C,) int64, points of the curve that are corners
+    external: bool  #: the outer boundary of its piece; False: a hole
+    length: float  #: [scan unit]
+    piece: int  #: number of the piece of the cloud it bounds
+    desired: np.ndarray | None = (
+        None  #: (M,) desired length at each point, in lengths; None where it is the same for all
+    )
+    line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(C, 3) the corners."""
+        return self.points[self.corner_at]
+
+    @property
+    def stop_at(self) -> np.ndarray:
+        """(S,) int64, points of the curve that become nodes and stay: corners and ends of lines."""
+        return np.union1d(self.corner_at, self.line_at) if len(self.line_at) else self.corner_at
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """All boundary loops of a cloud."""
+
+    loops: tuple[Loop, ...]
+
+    @property
+    def external(self) -> tuple[Loop, ...]:
+        """The outer boundaries."""
+        return tuple(loop for loop in self.loops if loop.external)
+
+    @property
+    def internal(self) -> tuple[Loop, ...]:
+        """The boundaries of holes."""
+        return tuple(loop for loop in self.loops if not loop.external)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(C, 3) the corners of all loops."""
+        return np.concatenate([np.zeros((0, 3)), *(loop.corners for loop in self.loops)])
+
+    @property
+    def stops(self) -> np.ndarray:
+        """(S, 3) the places on all loops that become nodes and stay: corners and ends of lines."""
+        return np.concatenate([np.zeros((0, 3)), *(loop.points[loop.stop_at] for loop in self.loops)])
+
+    @property
+    def rim(self) -> Rim:
+        """The curves of all loops as arrays for the kernels."""
+        points = [loop.points for loop in self.loops]
+        steps = [np.linalg.norm(np.roll(p, -1, axis=0) - p, axis=1) for p in points]
+        arcs = [np.concatenate([[0.0], np.cumsum(s)[:-1]]) for s in steps]
+        start = np.cumsum([0, *(len(p) for p in points)]).astype(np.int64)
+        return Rim(
+            np.concatenate([np.zeros((0, 3)), *points]),
+            np.concatenate([np.zeros(0), *arcs]),
+            start,
+            np.array([s.sum() for s in steps], float),
+        )
+
+
+def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None = None) -> tuple[Sites, Boundary]:
+    """Return the ordered boundary loops of a scan (Sec. 3.3), and its samples with small holes closed (Sec. 3.6).
+
+    Parameters
+    ----------
+    sites : Sites
+        The surface samples of the scan.
+    settings : Settings
+        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`.
+    progress : callable, optional
+        Called with ("boundary", share); may raise to stop.
+
+    Returns
+    -------
+    sites : Sites
+        Those given, with made-up ones over the holes that are closed.
+    boundary : Boundary
+        External loops first, each piece's longest loop being external; empty for a closed surface.
+
+    Raises
+    ------
+    InputError
+        The scan falls apart into pieces that are all smaller than a member.
+    """
+    if sites.area == 0.0:
+        raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
+    check_two_sided(sites.surface, sites.thickness)
+    if progress:
+        progress("boundary", 0.4)
+    loops = _external_first(_find_loops(sites, settings))
+    holes = [loop for loop in loops if loop.length < settings.closed_rim and _is_hole(loop, sites)]
+    if holes:
+        made_up = fill_holes(sites, [loop.points for loop in holes])
+        sites = sites_with(sites, made_up, settings)
+        loops = _external_first([loop for loop in _find_loops(sites, settings) if not _over_filling(loop, sites)])
+    if progress:
+        progress("boundary", 1.0)
+    return sites, Boundary(loops)
+
+
+def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
+    """All loops but those of small holes, none of them external yet."""
+    length = settings.length
+    radius = max(settings.boundary_radius * length, 1.3 * sites.surface.radius, 1.9 * sites.spacing)
+    found: list[tuple[np.ndarray, int, Chance]] = []
+    surface = sites.surface._replace(normals=broad_normals(sites.surface))
+    rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)
+    loops = [(loop, piece) for loop, piece in rolled if piece in sites.pieces]
+    disc = max(0.5 * radius, 2.5 * sites.spacing)
+    slid = boundary_points(sites, surface, [loop for loop, _ in loops], disc, STEP * length)
+    for points, (loop, piece) in zip(slid, loops, strict=True):
+        if len(points) < 3:
+            continue
+        if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
+            continue
+        curve = resample(points, STEP * length)
+        for width in SPIKES:
+            curve = cut_spikes(surface, curve, width * length, STEP * length)
+        if len(curve) >= 8:
+            paper = settings.method == "paper"
+            chance = ON_THE_EDGE if paper else chance_of(surface, points, sites.density, disc)
+            found.append((curve, piece, chance))
+    return [kept for each in found if (kept := smooth_loop(*each, settings, surface)) is not None]
+
+
+def _is_hole(loop: Loop, sites: Sites) -> bool:
+    """Whether a loop bounds a hole: any but the outer rim of a piece, and that too where the piece is nearly closed."""
+    share = float((sites.piece == loop.piece).mean())
+    return not loop.external or share * sites.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
+
+
+def _over_filling(loop: Loop, sites: Sites) -> bool:
+    """Whether a loop runs over what has been made up."""
+    surface, over = sites.surface, 0
+    site = nearest_site(surface, *loop.points[0].tolist())
+    for place in loop.points:
+        site = walk(surface, site, tuple(place))
+        over += site >= sites.measured
+    return over > 0.5 * len(loop.points)
+
+
+def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
+    """Return a loop with places (K, 3) on it, the ends of lines, among its points."""
+    points, corner_at, line_at, desired = loop.points, loop.corner_at, loop.line_at, loop.desired
+    for place in places:
+        ahead = np.roll(points, -1, axis=0) - points
+        share = ((place - points) * ahead).sum(axis=1) / np.maximum((ahead**2).sum(axis=1), 1e-300)
+        share = np.clip(share, 0.0, 1.0)
+        i = int(((points + share[:, None] * ahead - place) ** 2).sum(axis=1).argmin())
+        if share[i] * np.linalg.norm(ahead[i]) < 1e-9 * loop.length:
+            line_at = np.append(line_at, i)
+        elif (1.0 - share[i]) * np.linalg.norm(ahead[i]) < 1e-9 * loop.length:
+            line_at = np.append(line_at, (i + 1) % len(points))
+        else:
+            points = np.insert(points, i + 1, place, axis=0)
+            desired = None if desired is None else np.insert(desired, i + 1, desired[i])
+            corner_at, line_at = corner_at + (corner_at > i), np.append(line_at + (line_at > i), i + 1)
+    return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
+
+
+def boundary_points(
+    sites: Sites, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
+) -> list[np.ndarray]:
+    """Return the boundary points (M, 3) along each loop of sites: what a disc slid from outside touches, in order.
+
+    Where the surface has only some of the points, the disc slides once more, against all points beside what it touched at first.
+    """
+    along = [_places_along(surface, loop, step) for loop in loops]
+    if sites.smooth:
+        # a loop of larger sites cuts re-entrant corners; on a rough scan its own sites are the ones to trust
+        for places, near in along:
+            kernels.come_nearer(surface, places, near)
+    touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
+    dense = with_whole_rim(sites, surface, np.concatenate(touched)) if touched else surface
+    if dense is not surface:
+        touched = [_touch_points(dense, places, near, radius, 8) for places, near in along]
+    touched = [
+        _touch_points(dense, smooth_turns(points), near, radius, 4)
+        for points, (_, near) in zip(touched, along, strict=True)
+    ]
+    return [_in_order(points, step) for points in touched]
+
+
+def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places (M, 3) so far apart along a loop of sites, and the site near each (M,)."""
+    turns = smooth_turns(surface.mean[loop])
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
+    places = resample(turns, step)
+    at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
+    return places, loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
+
+
+def _in_order(touched: np.ndarray, step: float) -> np.ndarray:
+    """Return the points that go on along a loop, those that are hardly farther than the one before left out."""
+    touched = touched[_onwards(touched)]
+    forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
+    return touched[forward]
+
+
+def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius: float, reach: int) -> np.ndarray:
+    """Return what a disc touches at each place of a loop (M, 3), which runs from the places so many before to those after."""
+    touched, ahead = np.empty_like(places), np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
+
+    def touch(part: int, begin: int, end: int) -> None:
+        own = surface if part == 0 else with_own_scratch(surface)
+        kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
+
+    in_parts(len(places), PART, touch)
+    return touched
+
+
+def _onwards(touched: np.ndarray) -> list[int]:
+    """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
+    ahead = np.zeros(len(touched), np.int64)
+    x, y, z = touched.T.copy()
+    for k in range(1, BACK + 1):
+        ahead[:-k][(x[:-k] == x[k:]) & (y[:-k] == y[k:]) & (z[:-k] == z[k:])] = k
+    kept, at = [], 0
+    while at < len(touched):
+        kept.append(at)
+        at += int(ahead[at]) + 1
+    return kept
+
+
+def smooth_loop(curve: np.ndarray, piece: int, chance: Chance, settings: Settings, surface: Surface) -> Loop | None:
+    """Make a loop of a closed curve of equal steps through boundary points; None where it is too short to keep."""
+    smoothed, corner_at = curve_of_edge(curve, chance, settings, surface)
+    length, field = length_around(smoothed), field_along(surface, smoothed)
+    in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
+    if (in_lengths if settings.fill_holes is None else length) < settings.bridged_rim:
+        return None
+    return Loop(smoothed, corner_at, False, length, piece, field)
+
+
+def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
+    """Return the desired length at each point of a curve (M, 3), in lengths; None where it is the same for all."""
+    if not is_graded(surface):
+        return None
+    field = np.empty(len(curve))
+    lengths_along(surface, np.ascontiguousarray(curve), field)
+    return field
+
+
+def _steps(curve: np.ndarray) -> np.ndarray:
+    """Distance of each point of a closed curve to the next (M,)."""
+    return np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1)
+
+
+def _between(field: np.ndarray) -> np.ndarray:
+    """Mean of each value along a closed curve and the next (M,)."""
+    return 0.5 * (field + np.roll(field, -1))
+
+
+def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
+    """Mark the longest loop of each piece as external; external loops first, then by length."""
+    longest: dict[int, int] = {}
+    for i, loop in enumerate(loops):
+        if loop.piece not in longest or loop.length > loops[longest[loop.piece]].length:
+            longest[loop.piece] = i
+    marked = [replace(p, external=longest[p.piece] == i) for i, p in enumerate(loops)]
+    return tuple(sorted(marked, key=lambda p: (not p.external, -p.length)))
+
+
+def characteristic_points(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the characteristic points of a loop (Sec. 3.3): about `length` apart, equally between corners, corners among them.
+
+    With a length field they are equally far apart in desired lengths: in the integral of ds / l. The ends of lines are nodes too.
+
+    Returns
+    -------
+    nodes : (H, 3), at least three
+    is_corner : (H,) bool, corners and ends of lines
+    """
+    count = len(loop.points)
+    stops = loop.stop_at
+    ends = stops if len(stops) else np.zeros(1, np.int64)
+    least = 3 if len(ends) == 1 else (2 if len(ends) == 2 else 1)
+    nodes, is_corner = [], []
+    for i, begin in enumerate(ends):
+        end = ends[i + 1] if i + 1 < len(ends) else ends[0] + count
+        at_curve = np.arange(begin, end + 1) % count
+        part = loop.points[at_curve]
+        steps = np.linalg.norm(np.diff(part, axis=0), axis=1)
+        if loop.desired is not None:
+            steps /= 0.5 * (loop.desired[at_curve[1:]] + loop.desired[at_curve[:-1]])
+        arc = np.concatenate([[0.0], np.cumsum(steps)])
+        pieces = max(int(round(arc[-1] / length)), least)
+        at = np.arange(pieces) * (arc[-1] / pieces)
+        nodes.append(np.stack([np.interp(at, arc, part[:, c]) for c in range(3)], axis=1))
+        is_corner += [len(stops) > 0] + [False] * (pieces - 1)
+    return np.concatenate(nodes), np.array(is_corner, bool)

@@ -1,0 +1,149 @@
+"""Made-up points over holes that are closed: the surface goes on as a thin plate that is bent as little as possible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels.mesh.point_location import nearest_site
+from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..surface.samples import Sites
+
+APART = 0.1  # made-up points lie so far apart, in member lengths
+RIM = 60  # places along a rim from which the surroundings are looked at
+STEP = 0.3  # of these looks, away from the hole, in member lengths
+SIGHT = (1.5, 0.25)  # how far they go, in member lengths and in diameters of the hole; the larger counts
+LOST = 0.6  # member lengths from the nearest site at which a look has left the scan
+STEEP = 0.35  # cosine between the surroundings and the loop's own plane under which that plane does not show the hole
+FEW = 12  # places around a hole from which on a plate can be laid through them
+SMOOTHING = 1e-6  # of the plate against the places it is fitted to, in squared diameters
+
+
+def fill_holes(sites: Sites, curves: list[np.ndarray]) -> np.ndarray:
+    """Return points (F, 3) that continue the surface over holes [scan unit].
+
+    Parameters
+    ----------
+    sites : Sites
+    curves : list of (M, 3)
+        The closed boundary curve of each hole, of equal steps, the surface to its left.
+    """
+    parts = [_fill_hole(sites.surface, curve) for curve in curves]
+    return np.concatenate([np.zeros((0, 3)), *parts])
+
+
+def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
+    """Made-up points (F, 3) over one hole.
+
+    All happens in a flat picture of the hole: what is seen around it is laid out there, and a thin plate for each coordinate passes
+    through it.
+    """
+    length = surface.length
+    around = float(np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1).sum())
+    start, away, places, normals = _look_around(surface, curve, max(SIGHT[0] * length, SIGHT[1] * around / np.pi))
+    if len(places) < FEW:
+        return np.zeros((0, 3))
+    axis = _axis(curve)
+    least = float((normals @ axis).min())
+    if least > STEEP:
+        frame = _frame(axis)
+        flat, rim = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
+        fine = min(1.0, 1.5 * least)
+    else:  # the hole reaches around a bend: its rim is drawn as a circle, what surrounds it as rings
+        radius, turn = around / (2 * np.pi), -2 * np.pi * np.arange(len(curve)) / len(curve)
+        rim = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        flat = rim[start] * (1 + away / radius)[:, None]
+        fine = 0.7
+    inside = _lattice(rim, APART * fine * length)
+    return _thin_plate(flat, places, inside, SMOOTHING * (around / np.pi) ** 2)
+
+
+def _look_around(
+    surface: Surface, curve: np.ndarray, sight: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Go out over the scan from places along a rim, at right angles to it, and note what is there.
+
+    Returns
+    -------
+    start : (K,) int64 point of the curve that each look began at
+    away : (K,) way from there [scan unit]
+    places, normals : (K, 3) on the scanned surface
+    """
+    length, patch = surface.length, np.zeros(PATCH)
+    found: list[tuple[int, float, np.ndarray, np.ndarray]] = []
+    site = nearest_site(surface, *curve[0].tolist())
+    for i in range(0, len(curve), max(1, len(curve) // RIM)):
+        ahead = curve[(i + 3) % len(curve)] - curve[i - 3]
+        site = at = walk(surface, site, tuple(curve[i]))
+        place, normal = curve[i], surface.normals[site]
+        out = np.cross(normal, ahead)
+        for k in range(1, int(sight / (STEP * length)) + 1):
+            out = out - normal * (out @ normal)
+            place = place + STEP * length * out / max(float(np.linalg.norm(out)), 1e-300)
+            at = walk(surface, at, tuple(place))
+            if np.linalg.norm(surface.mean[at] - place) > LOST * length:
+                break
+            fit_patch(surface, patch, at, tuple(place))
+            place = np.array(onto_patch(patch, tuple(place)))
+            normal = np.array(patch_normal(patch, tuple(place)))
+            found.append((i, k * STEP * length, place, normal))
+    start, away = [i for i, _, _, _ in found], [far for _, far, _, _ in found]
+    places, normals = ([look[k] for look in found] for k in (2, 3))
+    return np.array(start, np.int64), np.array(away), np.array(places), np.array(normals)
+
+
+def _axis(curve: np.ndarray) -> np.ndarray:
+    """Unit normal (3,) of the plane in which a closed curve encloses most; the side from which the surface to its left is seen."""
+    arms = curve - curve.mean(axis=0)
+    area = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
+    axis: np.ndarray = -area / max(float(np.linalg.norm(area)), 1e-300)
+    return axis
+
+
+def _frame(axis: np.ndarray) -> np.ndarray:
+    """Two unit vectors (2, 3) at right angles to an axis and to each other."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)])
+
+
+def _lattice(rim: np.ndarray, step: float) -> np.ndarray:
+    """Places (F, 2) of a triangular pattern inside a closed polyline (M, 2), half a step from it."""
+    low, high = rim.min(axis=0), rim.max(axis=0)
+    rows, columns = np.arange(low[1], high[1], step * np.sqrt(0.75)), np.arange(low[0], high[0], step)
+    x = columns + 0.5 * step * (np.arange(len(rows)) % 2)[:, None]
+    places = np.column_stack([x.ravel(), np.repeat(rows, len(columns))])
+    start, end = rim, np.roll(rim, -1, axis=0)
+    kept = np.zeros(len(places), np.bool_)
+    for part in np.array_split(np.arange(len(places)), 1 + len(places) * len(rim) // 1_000_000):
+        p = places[part, None]
+        crosses = (start[:, 1] <= p[..., 1]) != (end[:, 1] <= p[..., 1])
+        rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
+        left = p[..., 0] < start[:, 0] + (p[..., 1] - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
+        near = ((p - start) ** 2).sum(axis=2).min(axis=1) < (0.5 * step) ** 2
+        kept[part] = ((crosses & left).sum(axis=1) % 2 == 1) & ~near
+    return places[kept]
+
+
+def _thin_plate(flat: np.ndarray, values: np.ndarray, wanted: np.ndarray, smoothing: float) -> np.ndarray:
+    """Values (F, 3) at wanted places (F, 2) of the thin plates of least bending through values (K, 3) at places (K, 2)."""
+    size = float(np.ptp(flat, axis=0).max())
+    middle = flat.mean(axis=0)
+    at, to = (flat - middle) / size, (wanted - middle) / size
+    count = len(at)
+    matrix = np.zeros((count + 3, count + 3))
+    matrix[:count, :count] = _bending(at, at) + smoothing / size**2 * np.eye(count)
+    matrix[:count, count:] = np.column_stack([np.ones(count), at])
+    matrix[count:, :count] = matrix[:count, count:].T
+    weights = np.linalg.solve(matrix, np.concatenate([values, np.zeros((3, 3))]))
+    parts = [
+        _bending(part, at) @ weights[:count] + np.column_stack([np.ones(len(part)), part]) @ weights[count:]
+        for part in np.array_split(to, 1 + len(to) * count // 1_000_000)
+    ]
+    return np.concatenate(parts)
+
+
+def _bending(places: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The plate bent by a point load, r^2 log r, at each place (P, 2) for each of the others (Q, 2); (P, Q)."""
+    squared = ((places[:, None] - others) ** 2).sum(axis=2)
+    bent: np.ndarray = 0.5 * squared * np.log(np.maximum(squared, 1e-300))
+    return bent

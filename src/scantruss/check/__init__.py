@@ -1,0 +1,1 @@
+"""Checking a grid against its scan."""

@@ -1,0 +1,103 @@
+"""What is wrong with a grid, in words and with a place."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Certificate, Fault, Place, place_of
+from ..grid.quality import labels, pinched_nodes
+from .crossings import ENOUGH
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..grid.grid import Grid
+    from ..settings import Settings
+
+LEFT_OUT = 0.2  #: share of the scan that a grid may leave out of reach
+ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
+UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
+FOLDED = 10.0  #: angle between neighbouring triangles below which one lies on the other [degree]
+OFF = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
+
+
+def faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> list[Fault]:
+    """Return what is wrong with a grid apart from where it lies."""
+    faults = []
+    if not found.manifold:
+        faults.append(Fault("manifold", "is not manifold", _seam(grid)))
+    if not found.orientable:
+        faults.append(Fault("orientable", "is not orientable"))
+    if found.pieces != found.scan_pieces:
+        words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}"
+        faults.append(Fault("pieces", words, _smallest_piece(grid)))
+    if found.boundary_loops != found.scan_loops:
+        words = f"has {found.boundary_loops} boundary loops where the scan has {found.scan_loops}"
+        faults.append(Fault("loops", words, _odd_loop(grid, boundary)))
+    return faults
+
+
+def _seam(grid: Grid) -> Place | None:
+    """Return a place where a grid is not manifold: a member of three triangles, or a node of two fans."""
+    wide = np.flatnonzero(grid.edge_uses > 2)
+    if len(wide):
+        return place_of(grid.nodes[grid.edges[wide[0]]].mean(axis=0) + grid.origin)
+    pinched = pinched_nodes(grid)
+    return place_of(grid.nodes[pinched[0]] + grid.origin) if len(pinched) else None
+
+
+def _smallest_piece(grid: Grid) -> Place:
+    """Return a place on the piece of fewest triangles."""
+    piece = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])[grid.triangles[:, 0]]
+    found, count = np.unique(piece, return_counts=True)
+    return place_of(grid.nodes[found[np.argmin(count)]] + grid.origin)
+
+
+def _odd_loop(grid: Grid, boundary: Boundary) -> Place:
+    """Return a place on the loop that lies farthest from all others: of the grid where it has more loops, else of the scan."""
+    own, theirs = [grid.nodes[loop] for loop in grid.boundary_loops], [loop.points for loop in boundary.loops]
+    many, few = (own, theirs) if len(own) > len(theirs) else (theirs, own)
+    if not few:
+        return place_of(min(many, key=len)[0] + grid.origin)
+    others = np.concatenate(few)
+    away = [np.median([np.linalg.norm(others - place, axis=1).min() for place in loop[::4]]) for loop in many]
+    return place_of(many[int(np.argmax(away))][0] + grid.origin)
+
+
+def _length_at(grid: Grid, where: Place, settings: Settings) -> float:
+    """Return the length desired at a place: that at the nearest node [scan unit]."""
+    if grid.desired is None:
+        return settings.length
+    away = ((grid.nodes + grid.origin - np.array(where)) ** 2).sum(axis=1)
+    return float(grid.desired[away.argmin()])
+
+
+def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, settings: Settings) -> list[Fault]:
+    """Return what is wrong with where the nodes are; `crossings` (P, 2) are triangles that cut each other."""
+    faults = []
+    if len(crossings):
+        pairs = "a pair" if len(crossings) == 1 else f"{len(crossings)} pairs"
+        more = " or more" if len(crossings) == ENOUGH else ""
+        where = place_of(grid.nodes[grid.triangles[crossings[0]]].mean(axis=(0, 1)) + grid.origin)
+        faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
+    if found.sharpest_fold and found.sharpest_fold.value < FOLDED:
+        faults.append(Fault("folded", "is folded over onto itself", found.sharpest_fold.where))
+    quality = grid.quality
+    uneven = quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
+    if uneven > UNEVEN and found.longest_member:
+        words = f"has members whose lengths are {uneven:.0%} apart"
+        faults.append(Fault("uneven", words, found.longest_member.where))
+    if 1.0 - found.scan_within_reach > LEFT_OUT and found.farthest_scan:
+        faults.append(
+            Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
+        )
+    gone = ASTRAY + settings.bridged_rim / (2 * math.pi * settings.length)
+    for worst in (found.farthest_triangle, found.node_deviation):
+        if worst and worst.value > gone * _length_at(grid, worst.where, settings):
+            faults.append(Fault("astray", "covers what the scan does not", worst.where))
+            break
+    if found.fixed_error and not found.fixed_error.value <= OFF * settings.length:
+        faults.append(Fault("fixed", "has no node at a fixed position", found.fixed_error.where))
+    return faults

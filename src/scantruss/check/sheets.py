@@ -1,0 +1,61 @@
+"""Whether a grid hangs together as its scan does: a handle that was cut off or a sheet that was joined to another shows here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Fault, place_of
+from ..kernels.mesh.sheets import first_torn, nearest_nodes
+from ..surface.scratch import with_own_scratch
+from .defects import LEFT_OUT
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..surface.samples import Sites
+
+COVER = 1.2  #: members from the nearest node on its sheet at which a part of the scan counts as left out
+TORN = 4  #: members from node to node at which their parts of the scan, side by side, count as torn apart
+LINKS = 3  #: so many links between such parts are no chance
+
+
+def nodes_of_sites(grid: Grid, sites: Sites, length: float) -> np.ndarray:
+    """Return the node nearest to each site on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
+    surface = with_own_scratch(sites.surface)  # grids are certified side by side
+    nearest = np.empty(len(sites.piece), np.int64)
+    nearest_nodes(surface, sites.boxes, grid.nodes, COVER * length, nearest)
+    return nearest
+
+
+def faults_on_sheets(grid: Grid, sites: Sites, nearest: np.ndarray) -> list[Fault]:
+    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_sites`."""
+    left = np.flatnonzero((nearest < 0) & sites.kept)
+    share = len(left) / max(int(sites.kept.sum()), 1)
+    faults = []
+    if share > LEFT_OUT:
+        where = place_of(sites.surface.mean[left[0]] + grid.origin)
+        faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
+    torn = torn_place(grid, sites, nearest)
+    if torn is not None:
+        words = "is torn where the scan is whole, as at a handle thinner than its members"
+        faults.append(Fault("torn", words, place_of(torn + grid.origin)))
+    return faults
+
+
+def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | None:
+    """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
+
+    Each node has a part of the scan, the sites nearest to it. Where two parts meet, their nodes must be near each other in the grid:
+    joined by fewer than `TORN` members one after the other.
+
+    Parameters
+    ----------
+    nearest : (S,) int64
+        Node of each site, as `nodes_of_sites`.
+    """
+    pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
+    first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
+    ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
+    site = first_torn(sites.surface.neighbors, nearest, first, ends, TORN - 1, LINKS)
+    return sites.surface.mean[site] if site >= 0 else None

@@ -1,0 +1,136 @@
+"""``scantruss clean``: a scan in, a clean cloud out, and a line on what each step did."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from .outputs import claim, cloud_output, inputs_of
+from .shared import note_compiling, read_scan, said_of_cloud_file
+
+if TYPE_CHECKING:
+    from ..scan.clean.steps import CleanCloud
+    from .options import Parser
+
+SHARES = {  # option, step that it steers, metavar, default, what it is
+    "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
+    "stray-distance": (
+        "NUMBER",
+        3.0,
+        "points so many times farther from others than their neighbours are left out; 0: none",
+    ),
+    "loose-pieces": (
+        "SHARE",
+        0.005,
+        "pieces with fewer than this share of all points, away from all, are left out; narrow clouds with any number of points; 0: none",
+    ),
+    "layer-distance": ("NUMBER", 2.0, "two layers up to so many spacings apart become one"),
+}
+KEEP = {
+    "duplicates": ("keep-duplicates", "leave repeated points as they are"),
+    "stray-distance": ("keep-strays", "leave stray points as they are"),
+    "loose-pieces": ("keep-pieces", "leave loose small pieces as they are"),
+    "layer-distance": ("keep-layers", "leave doubled layers as they are"),
+}
+
+
+def clean_parser() -> Parser:
+    """Options of ``scantruss clean``."""
+    from .options import Parser, add_reading, number
+
+    parser = Parser(
+        "clean",
+        "SCAN OUT [options]",
+        "Take repeated and stray points, loose pieces, doubled layers and noise off a scan; find normals.",
+    )
+    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("out", metavar="OUT", help="clean cloud; the suffix names the format")
+    parser.add_argument("--report", metavar="FILE.json", help="save what each step did")
+    steps = parser.add_argument_group("steps, in their order")
+    for name, (metavar, default, words) in SHARES.items():
+        steps.add_argument(
+            f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
+        )
+        keep, said = KEEP[name]
+        steps.add_argument(f"--{keep}", action="store_true", help=said)
+    steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: no noise is taken off")
+    steps.add_argument(
+        "--spacing",
+        metavar="NUMBER",
+        type=number,
+        help="one point stays in each search box of this width, in scan units",
+    )
+    steps.add_argument("--no-normals", action="store_true", help="write no normals")
+    add_reading(parser)
+    return parser
+
+
+def clean(values: Namespace) -> None:
+    """Clean a scan and save it."""
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars, print_lines
+    from ..scan.formats.writing import write_points
+    from .options import READING, settings_of
+
+    out, report = _outputs(values)
+    chosen = {name: value for name, value in vars(values).items() if name in READING}  # steps share names with settings
+    settings = settings_of(Namespace(**chosen, length=1.0))
+    steps = _steps(values)
+    with Bars() as bars:
+        cloud = read_scan(values.scan, settings, bars)
+        from ..scan.clean import clean_points
+
+        with note_compiling(bars):
+            result = clean_points(cloud, **steps, progress=bars)
+    with SaveTogether() as save:
+        points = result.points + result.origin
+        write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
+        if report is not None:
+            save.json(report, report_of(result, len(cloud.points)))
+    lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
+    written = [str(out), *([str(report)] if report else [])]
+    said = said_of_cloud_file(out, result.unit)
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
+
+
+def _outputs(values: Namespace) -> tuple[Path, Path | None]:
+    """Return where the results go, checked before anything is read."""
+    from ..runtime.files import check_place
+
+    out = cloud_output(values.out)
+    report = check_place(values.report, (".json",)) if values.report else None
+    taken = inputs_of(values)
+    claim(out, "clean cloud", taken)
+    if report is not None:
+        claim(report, "report", taken)
+    return out, report
+
+
+def _steps(values: Namespace) -> dict[str, Any]:
+    """Return the arguments of `clean_points`."""
+    given = vars(values)
+    steps: dict[str, Any] = {
+        "smooth": not values.no_smooth,
+        "normals": not values.no_normals,
+        "spacing": values.spacing,
+    }
+    for name in SHARES:
+        field = name.replace("-", "_")
+        steps[field] = None if given[KEEP[name][0].replace("-", "_")] else given[field]
+        if steps[field] is not None and not 0 <= steps[field] < float("inf"):
+            raise InputError(f"--{name} must be a number of 0 or more, got {given[field]:g}")
+    if values.spacing is not None and not 0 < values.spacing < float("inf"):
+        raise InputError(f"--spacing must be a positive length in the scan's unit, got {values.spacing:g}")
+    return steps
+
+
+def report_of(result: CleanCloud, points: int) -> dict[str, Any]:
+    """Return all figures of a run, ready for JSON."""
+    return {
+        "points_read": points,
+        "points": len(result.points),
+        "unit": result.unit,
+        "steps": [{"name": step.name, "count": step.count, "words": step.words} for step in result.steps],
+    }

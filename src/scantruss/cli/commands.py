@@ -1,0 +1,33 @@
+"""The commands: what each one takes, does and says.
+
+Outputs and settings are checked before anything is read; everything heavy is imported inside the functions.
+"""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from .clean import clean, clean_parser
+from .demo import demo, demo_parser
+from .grid import grid, grid_parser
+from .info import info, info_parser
+from .print import print_parser, print_solid
+from .splice import splice, splice_parser
+from .sweep import sweep, sweep_parser
+from .thin import thin, thin_parser
+
+if TYPE_CHECKING:
+    from .options import Parser
+
+COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
+    "info": (info_parser, info),
+    "clean": (clean_parser, clean),
+    "grid": (grid_parser, grid),
+    "thin": (thin_parser, thin),
+    "sweep": (sweep_parser, sweep),
+    "print": (print_parser, print_solid),
+    "splice": (splice_parser, splice),
+    "demo": (demo_parser, demo),
+}

@@ -1,0 +1,40 @@
+"""The command ``scantruss demo``: the main job on the bundled scan."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from .grid import make_grid, show_grid
+from .outputs import result_folder
+from .shared import read_scan
+
+if TYPE_CHECKING:
+    from .options import Parser
+
+
+def demo_parser() -> Parser:
+    """Options of ``scantruss demo``."""
+    from .options import Parser
+
+    parser = Parser(
+        "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
+    )
+    parser.add_argument(
+        "folder", metavar="FOLDER", nargs="?", default="scantruss-demo", help="default ./scantruss-demo"
+    )
+    return parser
+
+
+def demo(values: Namespace) -> None:
+    """Do the main job on the bundled scan."""
+    from ..report.terminal import Bars
+    from .demo_files import SCAN, demo_settings, save_demo
+
+    folder = result_folder(values.folder)
+    with Bars() as bars:
+        cloud = read_scan(str(SCAN), demo_settings(), bars)
+        result = make_grid(cloud, demo_settings(), bars)
+        bars("picture, solid", 0.0)
+        written = save_demo(folder, result, cloud)
+    show_grid(result, len(cloud.points), written)

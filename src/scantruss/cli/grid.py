@@ -1,0 +1,130 @@
+"""The command ``scantruss grid``: a scan in, a grid and its settings out."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from ..errors import CertificateError, FormatError
+from .outputs import claim, inputs_of
+from .shared import SCAN, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..report.terminal import Bars
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+    from .options import Parser
+
+
+def grid_parser() -> Parser:
+    """Options of ``scantruss grid``."""
+    from .options import Parser, add_settings
+
+    parser = Parser(
+        "grid",
+        "SCAN OUT [OUT ...] --length L [options]",
+        "Turn a scan into a triangular grid truss of a desired member length.",
+    )
+    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    parser.add_argument("outs", metavar="OUT", nargs="+", help="results; the suffix names the format")
+    files = parser.add_argument_group("files")
+    files.add_argument(
+        "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here win"
+    )
+    files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    files.add_argument("--report", metavar="FILE.json", help="save all figures of the run")
+    files.add_argument(
+        "--keep-failed",
+        action="store_true",
+        help="write a grid that fails its certificate too; the exit status is 3 either way",
+    )
+    add_memory(parser)
+    add_settings(parser)
+    return parser
+
+
+def grid(values: Namespace) -> None:
+    """Make a grid and save it with its settings."""
+    from ..report.figures import report_of
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars
+    from .options import settings_of
+
+    settings = settings_of(values)
+    outs = [Path(out) for out in values.outs]
+    settings_file = outs[0].with_suffix(".settings.json")
+    report = Path(values.report) if values.report else None
+    check_outputs(values, outs, settings_file, report)
+    with Bars() as bars:
+        started = perf_counter()
+        settings = thin_to_fit(values.scan, settings, values.memory)
+        cloud = read_scan(values.scan, settings, bars)
+        spent = perf_counter() - started
+        result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+    from ..export.formats import write
+
+    written: list[Path] = []
+    with SaveTogether() as save:
+        for out in outs:
+            written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud)]
+        save.json(settings_file, (result.settings or settings).to_dict())
+        if report is not None:
+            save.json(report, report_of(result, len(cloud.points)))
+    show_grid(result, len(cloud.points), [*written, settings_file, *([report] if report else [])])
+    if result.certificate is not None and not result.certificate.passed:
+        raise CertificateError("the grid fails its certificate, and was written because of --keep-failed")
+
+
+def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
+    """Refuse outputs that cannot be written, before anything is read or computed."""
+    from ..export.csv import nodes_path
+    from ..export.formats import check_output
+    from ..runtime.files import check_place
+
+    taken = inputs_of(values)
+    for out in outs:
+        claim(check_output(out), "grid", taken)
+        if out.suffix.lower() == ".csv":
+            claim(nodes_path(out), "table of nodes", taken)
+    if report is not None:
+        claim(check_place(report, (".json",)), "report", taken)
+    check_place(settings_file, (".json",))
+    if taken.get(settings_file.resolve(), "settings") != "settings":  # a run may repeat the settings it saved itself
+        raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
+
+
+def make_grid(
+    cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
+) -> Grid:
+    """Run the chain, and say so where kernels must be compiled."""
+    from ..pipeline import grid_from_cloud
+    from ..scan.member_length import check_length
+
+    check_length(cloud, settings)
+    with note_compiling(bars):
+        grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
+    if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
+        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
+    if grid.settings is not None and grid.settings.box_size != settings.box_size:
+        bars.note(
+            f"the first look at this scan gives no grid that passes, so it is made as with --box-size {grid.settings.box_size:g}"
+        )
+    if grid.settings is not None and grid.settings.method != settings.method:
+        bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
+    note_strays(bars, cloud, settings)
+    return grid
+
+
+def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
+    """Print the figures of Table 2, the worst places and what was written."""
+    from ..report.figures import certificate_rows, grid_lines, quality_rows
+    from ..report.terminal import print_lines, print_table
+
+    print_table(("", "before", "after optimization"), quality_rows(result))
+    if result.certificate is not None:
+        print_table(("worst", "", "at"), certificate_rows(result.certificate))
+    print_lines([*grid_lines(result, points), "wrote " + " ".join(map(str, written))])

@@ -1,0 +1,141 @@
+"""The command line: the front that reads words, and the only place that says what went wrong and leaves.
+
+A refusal is one line on stderr and an exit status of `HELP`; nothing is written then. Heavy imports wait for a command.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType, ModuleType
+from typing import cast
+
+from .. import __version__
+from ..errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
+
+HELP = f"""\
+scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
+
+  scantruss info  SCAN                     points, extent, spacing, boundaries, a sensible --length
+  scantruss clean SCAN OUT                 without repeated and stray points, loose pieces, layers, noise
+  scantruss grid  SCAN OUT [OUT ...] --length L
+                                           the grid; the suffix of each OUT names its format
+  scantruss thin  SCAN... -o OUT --spacing S
+                                           a scan of any size, thinned to one point a box while it is read
+  scantruss sweep SCAN --length 3,4,5 --effort quick,normal -o FOLDER
+                                           many grids side by side: a table and pictures, for choosing
+  scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
+                                           one watertight solid of a grid saved as .json
+  scantruss splice SCAN SCAN [SCAN ...] -o OUT
+                                           one cloud of overlapping scans in frames of their own
+  scantruss demo  [FOLDER]                 all of it on a bundled scan
+
+scantruss COMMAND --help lists the options of a command; --version prints the version.
+
+Exit status; one line says why it is not 0:
+  0    done
+  1    a fault of ScanTruss
+  2    refused: a scan, setting or file does not do
+  3    the grid fails its certificate; it is written only with --keep-failed
+  130  interrupted (Ctrl-C)
+  141  the reader of the output has left, as in "| head -1"; no line
+  143  stopped (SIGTERM)
+"""
+
+
+def run(words: Sequence[str]) -> None:
+    """Run one command."""
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(HELP, end="")
+        return
+    if words[0] in ("--version", "-V"):
+        print(f"scantruss {__version__}")
+        return
+    from .commands import COMMANDS
+
+    if words[0] not in COMMANDS:
+        raise InputError(f"no command {words[0]!r}; use one of {' '.join(COMMANDS)}, or --help")
+    make_parser, command = COMMANDS[words[0]]
+    parser = make_parser()
+    if "-h" in words or "--help" in words:
+        print(parser.format_help(), end="")
+        return
+    values = parser.read(words[1:])
+    import_numba_without_blas()
+    command(values)
+
+
+def import_numba_without_blas() -> None:
+    """Import numba without scipy.linalg, which it looks for where scipy is installed: a seventh of a short command.
+
+    Only products of matrices in kernels need it, of which a process of ours has none.
+    """
+    if (name := "scipy.linalg.cython_blas") not in sys.modules:
+        sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
+        try:
+            import numba.np.arraymath  # noqa: F401
+        finally:
+            del sys.modules[name]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return the exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words after the name of the program; `sys.argv` by default.
+    """
+    kept = signal.getsignal(signal.SIGTERM)
+    try:
+        try_signal(signal.SIGTERM, _stop)
+        run(sys.argv[1:] if arguments is None else arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:  # the reader of our output has left, as in `scantruss info scan.ply | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 141
+    except _Stopped:
+        return refuse("stopped; nothing was written", 143)
+    except KeyboardInterrupt:
+        return refuse("interrupted; nothing was written", 130)
+    except FrontError as error:
+        place = "" if error.where is None else f" (near {words_of_place(error.where)})"
+        return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)
+    except ScanTrussError as error:
+        return refuse(str(error))
+    except OSError as error:
+        names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name)
+        return refuse(f"{error.strerror or error}{f': {names}' if names else ''}")
+    except MemoryError:
+        return refuse("not enough memory; use fewer points or a larger --length")
+    except Exception as error:
+        if os.environ.get("SCANTRUSS_TRACEBACK"):
+            raise
+        words = f"{type(error).__name__}: {error}"
+        return refuse(f"a fault of ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
+    finally:
+        try_signal(signal.SIGTERM, kept)
+    return 0
+
+
+def refuse(message: str, status: int = 2) -> int:
+    """Say why in one line and return the exit status."""
+    print("scantruss:", " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+class _Stopped(BaseException):
+    """Somebody ended the process politely; what is half-written is taken away."""
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise _Stopped
+
+
+def try_signal(number: int, handler: object) -> None:
+    """Set a signal handler where that is possible (only the main thread may)."""
+    with contextlib.suppress(ValueError, TypeError):
+        signal.signal(number, handler)  # type: ignore[arg-type]

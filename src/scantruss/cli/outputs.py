@@ -1,0 +1,58 @@
+"""Where results go: asked before anything is read, so that no run ends in vain and no input is written over."""
+
+from __future__ import annotations
+
+import os
+from argparse import Namespace
+from pathlib import Path
+
+from ..errors import FormatError
+from ..settings import CURVATURE
+
+Taken = dict[Path, str]  # place of a file -> what is there
+
+
+def inputs_of(values: Namespace) -> Taken:
+    """Return the files that a command line names for reading."""
+    from ..scan.formats.paths import files_of
+
+    given = vars(values)
+    named = [(str(file), "scan") for file in files_of(given.get("scans") or given["scan"])]
+    single = (("settings", "settings"), ("poses", "poses"), ("fixed_file", "list of fixed nodes"))
+    named += [(given.get(name) or "", what) for name, what in single]
+    named += [(name, "file of lengths") for name in _lengths(given.get("length")) if not name.startswith(CURVATURE)]
+    named += [(name, "fixed line") for name in given.get("fixed_lines", ())]
+    named += [(name, "polygon") for name in given.get("crop", ()) if Path(name).is_file()]
+    return {Path(name).resolve(): what for name, what in named if name}
+
+
+def _lengths(given: object) -> list[str]:
+    """Return the words of ``--length`` that are no numbers: its value, or several values each with its word."""
+    values = [value for _, value in given] if isinstance(given, list) else [given]
+    return [value for value in values if isinstance(value, str)]
+
+
+def claim(path: Path, what: str, taken: Taken) -> None:
+    """Claim a path for an output, unless an input or another output is there."""
+    if (before := taken.get(path.resolve())) is not None:
+        raise FormatError(f"the {what} {path} would overwrite the {before}; choose another name")
+    taken[path.resolve()] = what
+
+
+def cloud_output(path: str | Path) -> Path:
+    """Return the path of a cloud to be written, if its format is known and a file can be written there."""
+    from ..runtime.files import check_place
+    from ..scan.formats.writing import WRITERS, check_cloud_output
+
+    return check_place(check_cloud_output(path), WRITERS)
+
+
+def result_folder(path: str | Path) -> Path:
+    """Return the folder for results, if it can be written to, or made."""
+    folder = Path(path)
+    there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+    if not there.is_dir():
+        raise FormatError(f"{there} is a file; name a folder for the results")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FormatError(f"cannot write to {folder}: no permission to write in the folder {there}; choose another")
+    return folder

@@ -1,0 +1,65 @@
+"""The command ``scantruss print``: one watertight solid of a saved grid."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .outputs import claim
+
+if TYPE_CHECKING:
+    from .options import Parser
+
+
+def print_parser() -> Parser:
+    """Options of ``scantruss print``."""
+    from .options import Parser, number
+
+    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
+    parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
+    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    parser.add_argument("out", metavar="OUT", help="model, .3mf or .stl")
+    parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
+    parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
+    parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
+    return parser
+
+
+def print_solid(values: Namespace) -> None:
+    """Make the printable model of a saved grid."""
+    from ..report.saving import SaveTogether
+    from ..report.terminal import print_lines
+    from ..runtime.files import check_place
+
+    out = check_place(values.out, (".3mf", ".stl"))
+    if not Path(values.grid).exists():
+        raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
+    claim(out, "model", {Path(values.grid).resolve(): "grid"})
+    from ..export.json import read_grid
+    from ..export.solid import print_model
+
+    result = read_grid(values.grid)
+    with SaveTogether() as save:
+        solid = print_model(
+            result,
+            save.beside(out),
+            member_diameter=values.member_diameter,
+            node_diameter=values.node_diameter,
+            scale=values.scale,
+        )
+    size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
+    bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
+    print_lines([*solid.notes, *said_of_model(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+
+
+def said_of_model(out: Path, unit: str) -> list[str]:
+    """What to say of the unit that a printer will take a model for."""
+    if out.suffix.lower() == ".stl" and unit != "mm":
+        return [
+            f"STL holds no unit and printers take it for mm; its numbers are {unit or 'of a unit that is not known'}"
+        ]
+    if not unit:
+        return ["the unit of the grid is not known, so the model says mm; scantruss grid --unit says it"]
+    return []

@@ -1,0 +1,118 @@
+"""What several commands do alike: read a scan, thin it to fit, and say what a user should know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..report.terminal import Bars
+    from ..scan.cloud import PointCloud
+    from ..scan.stream.thin_scan import Thinned
+    from ..settings import Settings
+    from .options import Parser
+
+SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
+
+
+def add_memory(parser: Parser) -> None:
+    """Add the option that says how large a scan may be."""
+    from .options import size_of_memory
+
+    parser.add_argument(
+        "--memory",
+        metavar="SIZE",
+        type=size_of_memory,
+        help="a larger scan is thinned, as 4GB (default: half of what is free)",
+    )
+
+
+def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan, and say so where points were left out."""
+    from ..scan.formats.reading import read_points
+
+    bars("read", 0.0)
+    if settings.thin_spacing:
+        cloud = read_thinned_scan(path, settings, bars)
+    else:
+        cloud = read_points(path, unit=settings.unit, selection=settings.selection)
+    bars("read", 1.0)
+    say_of_cloud(bars, cloud)
+    return cloud
+
+
+def say_of_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
+    """Say what was left out of a cloud or converted in it, with its name where it is one of several."""
+    said = list(cloud.notes)
+    if cloud.dropped:
+        said.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
+    for note in said:
+        bars.note(note if name in note else f"{name}: {note}")
+
+
+def said_of_cloud_file(out: Path, unit: str, *, selects: bool = True) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes.
+
+    `selects`: the command has options for taking points by class and return.
+    """
+    suffix = out.suffix.lower()
+    if suffix in (".las", ".laz"):
+        more = "; --class and --returns choose before" if selects else ""
+        return [f"classes, returns, colours and reference system are not kept{more}"]
+    if suffix == ".e57" and not unit:
+        return [
+            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
+        ]
+    return []
+
+
+def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings:
+    """Return the settings with the spacing to which a scan must be thinned, where it is larger than memory."""
+    from ..scan.stream.fit import spacing_to_fit
+
+    spacing = spacing_to_fit(path, settings, memory)
+    return settings.replace(thin_spacing=spacing) if spacing else settings
+
+
+def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
+    """Read a scan that is thinned while it is read, and say so."""
+    from ..scan.stream.fit import read_thinned
+
+    with note_compiling(bars):
+        cloud, read = read_thinned(path, settings, bars)
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    bars.note(
+        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
+        " --thin-spacing 0 takes all"
+    )
+    return cloud
+
+
+def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
+    """Say so where points of the scan were left out, and the option that keeps them, of another command where this one has none."""
+    from ..surface.samples import sample_surface
+
+    sites = sample_surface(cloud, settings)
+    say = f"{command} " if command else ""
+    if sites.repeated:
+        bars.note(f"{sites.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")
+    if sites.strays:
+        bars.note(f"{sites.strays:,} stray points are left out; {say}--stray-distance 0 keeps them")
+    pieces, share = sites.left_out
+    if pieces:
+        bars.note(
+            f"{pieces:,} of the pieces, {100 * share:.2g} % of the scanned surface, are left out:"
+            " too small beside the others or for this length"
+        )
+
+
+@contextmanager
+def note_compiling(bars: Bars) -> Iterator[None]:
+    """Say so, once a run, when kernels are compiled, which takes long."""
+    from ..runtime.jit import FOLDER, tell_of_compiling
+
+    words = "compiling kernels, once on this machine" if FOLDER else "compiling kernels"
+    with tell_of_compiling(lambda: bars.note_once(words)):
+        yield

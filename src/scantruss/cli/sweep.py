@@ -1,0 +1,171 @@
+"""``scantruss sweep``: a grid for every combination of settings."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import FormatError, InputError
+from .outputs import Taken, claim, inputs_of, result_folder
+from .shared import add_memory, note_compiling, read_scan, thin_to_fit
+from .thin import _add_workers, _workers
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from ..sweep import Trial
+    from .options import Parser
+
+TABLES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
+
+
+def sweep_parser() -> Parser:
+    """Options of ``scantruss sweep``."""
+    from .options import Parser, add_settings
+
+    parser = Parser(
+        "sweep",
+        "SCAN --length 3,4,5 [--effort quick,normal ...] -o FOLDER [options]",
+        "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
+        "Every setting takes one value, or several with commas between them; the scan is read once, in one way.",
+    )
+    parser.add_argument("scan", metavar="SCAN", help="scan file")
+    parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
+    parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
+    parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    add_memory(parser)
+    _add_workers(parser)
+    add_settings(parser)
+    for action in parser._actions:
+        if action.dest not in ("help", "scan", "out", "settings", *ONE) and action.type is not None:
+            action.type = _several(action.type)
+    return parser
+
+
+ONE = (
+    "memory",
+    "workers",
+    "fixed",
+    "fixed_lines",
+    "unit",
+    "z_unit",
+    "returns",
+    "confidence",
+    "thin_spacing",
+)  # no several values
+
+
+def _several(kind: Any) -> Callable[[str], list[Any]]:
+    """Return a reader of values with commas between them, each kept with its word."""
+
+    def read(text: str) -> list[Any]:
+        words = [word.strip() for word in text.split(",") if word.strip()]
+        if not words:
+            raise argparse.ArgumentTypeError(f"needs a value, or several with commas between them, got {text!r}")
+        return [(word, kind(word)) for word in words]
+
+    return read
+
+
+def sweep(values: Namespace) -> None:
+    """Make many grids and tell of them."""
+    from ..report.choosing import head_of, rows_of
+    from ..report.terminal import Bars, print_lines, print_table
+    from ..sweep import sweep as make_grids
+
+    folder = result_folder(values.out)
+    trials, varied = trials_of_words(values)
+    claim_results(folder, trials, inputs_of(values))
+    shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
+    with Bars() as bars:
+        fitting = thin_to_fit(values.scan, shortest, values.memory)
+        cloud = read_scan(values.scan, fitting, bars)
+        if fitting.thin_spacing:
+            trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
+        said = note_compiling(bars)
+        with said, _workers(values, bars, None if len(trials) > 1 else 1) as workers:
+            outcomes = make_grids(cloud, trials, workers, bars)
+        head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
+        if not any(outcome.grid for outcome in outcomes):
+            raise InputError(f"no grid came out of {len(trials)} trials; the first: {outcomes[0].fault}")
+        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
+    print_table(head, rows)
+    print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+
+
+def claim_results(folder: Path, trials: list[Trial], taken: Taken) -> None:
+    """Refuse a folder in which a result cannot be written, or would be where something else is."""
+    from ..runtime.files import check_place
+
+    for name in (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png"))):
+        claim(folder / name, "result", taken)
+        if folder.exists():
+            check_place(folder / name, (Path(name).suffix,))
+    _refuse_earlier_sweep(folder, {trial.name for trial in trials})
+
+
+def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
+    """Refuse a folder with grids that the new table would not know, though they stand beside it."""
+    if not (folder / TABLES[0]).exists():
+        return
+    grids = (path.stem for path in sorted(folder.glob("*.json")) if path.with_suffix(".png").exists())
+    if others := [name for name in grids if name not in names]:
+        more = f" and {len(others) - 1:,} more" if len(others) > 1 else ""
+        raise FormatError(
+            f"{folder} holds grids of another sweep, {others[0]}{more}; name another folder, or remove these first"
+        )
+
+
+def _thinned(trial: Trial, spacing: float) -> Trial:
+    from dataclasses import replace
+
+    return replace(trial, settings=trial.settings.replace(thin_spacing=spacing))
+
+
+def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:
+    """Return a trial for every combination of the values on the command line, and the names of what is varied."""
+    from ..sweep import trials_of
+    from .options import option_of, settings_of
+
+    lists = {name: value for name, value in vars(values).items() if _is_list(value)}
+    varied = {name: value for name, value in lists.items() if len(value) > 1}
+
+    def choose(pick: tuple[int, ...]) -> Settings:
+        one = {name: value[0][1] for name, value in lists.items()}
+        one |= {name: varied[name][number][1] for name, number in zip(varied, pick, strict=True)}
+        return settings_of(Namespace(**(vars(values) | one)))
+
+    words = {option_of(name).removeprefix("--"): [word for word, _ in value] for name, value in varied.items()}
+    return trials_of(words, choose), tuple(words)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], tuple) and len(value[0]) == 2
+
+
+def _save(
+    folder: Path, title: str, trials: list[Trial], outcomes: list[Any], head: tuple[str, ...], rows: list[Any]
+) -> None:
+    """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
+    from ..export.drawing.sheet import encode_sheet
+    from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
+    from ..report.saving import SaveTogether
+
+    with SaveTogether() as save:
+        save.make_folder(folder)
+        for trial, outcome in zip(trials, outcomes, strict=True):
+            if outcome.grid:
+                save.beside(folder / f"{trial.name}.json").write_bytes(outcome.grid)
+                save.beside(folder / f"{trial.name}.png").write_bytes(outcome.picture)
+        both = zip(trials, outcomes, strict=True)
+        pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
+        page = encode_page(title, head, rows, trials, outcomes)
+        tables = (encode_table_csv(head, rows), encode_table_markdown(head, rows), page, encode_sheet(pictures))
+        for name, content in zip(TABLES, tables, strict=True):
+            save.beside(folder / name).write_bytes(content)
+    for trial, outcome in zip(trials, outcomes, strict=True):
+        if not outcome.grid:  # of an earlier sweep, which this table would say has none
+            for end in (".json", ".png"):
+                (folder / f"{trial.name}{end}").unlink(missing_ok=True)

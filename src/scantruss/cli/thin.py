@@ -1,0 +1,90 @@
+"""The commands for what outgrows memory or a machine: thin a scan of any size, sweep over settings."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import TYPE_CHECKING
+
+from .outputs import claim, cloud_output, inputs_of
+from .shared import note_compiling, said_of_cloud_file, say_of_cloud
+
+if TYPE_CHECKING:
+    from ..report.terminal import Bars
+    from ..runtime.cluster import Workers
+    from .options import Parser
+MANY = 20_000_000  # points of which several workers thin a scan by default
+
+
+def thin_parser() -> Parser:
+    """Options of ``scantruss thin``."""
+    from .options import Parser, add_reading, number
+
+    parser = Parser(
+        "thin",
+        "SCAN... -o OUT --spacing S [options]",
+        "Thin a scan of any size to one point a box, with memory for the result only.",
+    )
+    parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns as 'tiles/*.laz'")
+    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="thinned scan; the suffix names the format")
+    parser.add_argument("--spacing", metavar="S", type=number, required=True, help="side of a box [scan unit]")
+    parser.add_argument(
+        "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
+    )
+    parser.add_argument("--rim", action="store_true", help="also keep the outermost points along the rim")
+    _add_workers(parser)
+    add_reading(parser)
+    return parser
+
+
+def _add_workers(parser: Parser) -> None:
+    from .options import whole_number
+
+    parser.add_argument(
+        "--workers", metavar="N", type=whole_number, help="workers on this machine; 1: this process alone"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="Dask cluster, as tcp://10.0.0.5:8786")
+
+
+def thin(values: Namespace) -> None:
+    """Thin a scan and write it."""
+    from ..report.saving import SaveTogether
+    from ..report.terminal import Bars, print_lines
+    from ..scan.formats.writing import write_points
+    from ..scan.stream.opened import open_scan
+    from ..scan.stream.thin_scan import thin_open_scan
+    from ..scan.stream.thinning import check_spacing
+    from .options import selection_of
+
+    check_spacing(values.spacing)
+    out = cloud_output(values.out)
+    claim(out, "thinned scan", inputs_of(values))
+    scan = open_scan(values.scans, getattr(values, "unit", ""), selection_of(values))
+    sources = scan.sources
+    few = sum(source.points for source in sources) < MANY
+    with Bars() as bars, _workers(values, bars, 1 if few else None) as workers:
+        for source in sources:
+            if source.whole and source.points > MANY:
+                bars.note(f"{source.path} cannot be read in parts, so it is read whole")
+        with note_compiling(bars):
+            result = thin_open_scan(
+                scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars
+            )
+        say_of_cloud(bars, result)
+        bars("write", 0.0)
+        with SaveTogether() as save:
+            write_points(save.beside(out), result.points, unit=result.unit)
+    rim = f", {result.rim:,} of them along the rim" if values.rim else ""
+    told = f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"
+    print_lines([told, *said_of_cloud_file(out, result.unit)])
+
+
+def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
+    """Return the workers of the command line, and say who they are where they are several."""
+    from ..runtime.cluster import NEEDS_DASK, Processes, open_workers
+
+    workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
+    if isinstance(workers, Processes):
+        bars.note(f"{workers.words}; a cluster {NEEDS_DASK}")
+    elif workers.count > 1 or values.scheduler:
+        bars.note(workers.words)
+    return workers

@@ -1,0 +1,67 @@
+"""What a grid must keep: nodes at fixed positions (Sec. 4.2), fixed lines and ridges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..boundary.find import Boundary, with_line_ends
+from .fixed_lines import add_polylines
+from .fixed_nodes import check_positions
+from .network import NO_LINES, Lines, Network
+from .ridges import add_ridges, find_ridges
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from ..surface.samples import Sites
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What a grid must keep."""
+
+    positions: np.ndarray  #: (K, 3) places of fixed nodes, relative to the cloud's origin [scan unit]
+    lines: Lines = NO_LINES  #: fixed lines and ridges
+
+
+def find_constraints(sites: Sites, boundary: Boundary, settings: Settings) -> tuple[Boundary, Constraints]:
+    """Return what the grid must keep: fixed nodes, fixed lines and the ridges of the scan; and the boundary with the ends of lines.
+
+    Parameters
+    ----------
+    sites : Sites
+        The surface samples of the scan.
+    boundary : Boundary
+    settings : Settings
+        `fixed`, `fixed_lines`, `ridge_angle`, `length`, `corner_angle`.
+
+    Returns
+    -------
+    boundary : Boundary
+        The one given, with the places where lines end among the points of its loops.
+    constraints : Constraints
+
+    Raises
+    ------
+    InputError
+        A fixed position is farther than half a member from the scan or nearer than that to another; a fixed line is too short or
+        leaves the scan.
+    """
+    positions = check_positions(settings.fixed, sites, settings.length)
+    lines = find_lines(sites, boundary, settings)
+    ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
+    return Boundary(ended), Constraints(positions, lines)
+
+
+def find_lines(sites: Sites, boundary: Boundary, settings: Settings) -> Lines:
+    """Return the fixed lines and the ridges of a scan, each a curve that becomes a chain of members."""
+    wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not sites.smooth
+    ridges = find_ridges(sites, settings) if wanted else []
+    if not settings.fixed_lines and not ridges:
+        return NO_LINES
+    network = Network([(loop.points, loop.corner_at) for loop in boundary.loops], settings.length)
+    add_polylines(network, sites, settings)
+    add_ridges(network, ridges)
+    return network.lines()

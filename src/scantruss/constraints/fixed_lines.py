@@ -1,0 +1,190 @@
+"""Polylines that the user gives: checked, brought onto the scan in small steps, their corners found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.mesh.point_location import nearest_site
+from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, walk
+from ..surface.samples import Sites, distance_from_scan, narrow_surface
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from .network import Network
+
+STEP = 0.05  # distance of the points of a line, in member lengths
+FINE = 0.005  # what a polyline zigzags by less is straightened before all else, in lengths
+COARSE = 0.03  # ... and before its corners are looked for
+FIT = 120.0  # points of the scan that a patch below a line is fitted to
+RETURN = 1.5  # a line that comes near to itself after so much of it meets itself, in lengths
+SHORTEST = 0.5  # of an open line, in lengths
+SHORTEST_RING = 2.0
+
+
+def add_polylines(network: Network, sites: Sites, settings: Settings) -> None:
+    """Add the user's lines to a network.
+
+    Raises
+    ------
+    InputError
+        A line is too short for the member, or leaves the scan by more than half a member; names the line and the place.
+    """
+    patches = narrow_surface(sites, FIT)
+    for number, line in enumerate(settings.fixed_lines, 1):
+        given = np.array(line, float) - sites.origin
+        _check_on_scan(given, line, number, sites, settings.length)
+        closed = bool((given[0] == given[-1]).all())
+        _check_length(given, closed, number, sites.unit, settings.length)
+        points, vertices = divide(simplify(given, FINE * settings.length, closed), closed, STEP * settings.length)
+        corners = find_corners(points, vertices, closed, settings)
+        points = _onto_scan(points, number, sites, patches, settings.length)
+        for part, own, ring in _without_returns(points, corners, closed, settings.length):
+            network.add(part, ring, own)
+
+
+def _unit(unit: str) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _text(place: Sequence[float] | np.ndarray) -> str:
+    return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
+
+
+def _check_on_scan(
+    given: np.ndarray, line: Sequence[Sequence[float]], number: int, sites: Sites, length: float
+) -> None:
+    """Refuse a line with a point farther than half a member from the scan."""
+    unit = _unit(sites.unit)
+    for k, place in enumerate(given):
+        distance = distance_from_scan(sites.surface, place)
+        if distance > 0.5 * length:
+            raise InputError(
+                f"fixed line {number}, point {k + 1} {_text(line[k])} is {distance:.4g}{unit} away from the scan;"
+                f" it must lie within half a member, {0.5 * length:.4g}{unit}"
+            )
+
+
+def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, length: float) -> None:
+    """Refuse a line on which no members have room."""
+    total = float(np.linalg.norm(np.diff(given, axis=0), axis=1).sum())
+    least = (SHORTEST_RING if closed else SHORTEST) * length
+    if total < least:
+        what = "ring, that is at least two members" if closed else "line, that is at least half a member"
+        raise InputError(
+            f"fixed line {number} is {total:.4g}{_unit(unit)} long; a {what}, {least:.4g}{_unit(unit)}, is needed"
+        )
+
+
+def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
+    """Return the points (K, 3) of a polyline that are needed to keep it within a tolerance (Douglas and Peucker).
+
+    Of a closed one, whose last point is its first, the point farthest from the first is kept too.
+    """
+    kept = np.zeros(len(points), bool)
+    kept[[0, -1]] = True
+    stack = [(0, len(points) - 1)]
+    if closed:
+        middle = int(((points - points[0]) ** 2).sum(axis=1).argmax())
+        kept[middle] = True
+        stack = [(0, middle), (middle, len(points) - 1)]
+    while stack:
+        first, last = stack.pop()
+        if last - first < 2:
+            continue
+        inner = points[first + 1 : last]
+        chord = points[last] - points[first]
+        share = np.clip((inner - points[first]) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
+        away = np.linalg.norm(inner - points[first] - share[:, None] * chord, axis=1)
+        if away.max() > tolerance:
+            at = first + 1 + int(away.argmax())
+            kept[at] = True
+            stack += [(first, at), (at, last)]
+    found: np.ndarray = points[kept]
+    return found
+
+
+def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (M, 3) at most a step apart along a polyline, its vertices among them, and which those are.
+
+    The first point of a closed line, given again as its last, is not repeated.
+    """
+    parts, at = [], [0]
+    for a, b in pairwise(vertices):
+        count = max(int(np.ceil(np.linalg.norm(b - a) / step)), 1)
+        parts.append(a + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (b - a))
+        at.append(at[-1] + count)
+    if closed:
+        return np.concatenate(parts), np.array(at[:-1])
+    return np.concatenate([*parts, vertices[-1:]]), np.array(at)
+
+
+def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
+    """Return which of the points (M, 3) of a line are corners, the sharpest first: where it turns by more than `corner_angle`."""
+    places = points[vertices]
+    whole = np.concatenate([places, places[:1]]) if closed else places
+    coarse = simplify(whole, COARSE * settings.length, closed)
+    before, after = np.diff(coarse, axis=0), np.diff(coarse, axis=0)[1:]
+    if closed:
+        after = np.concatenate([after, before[:1]])
+    else:
+        before = before[:-1]
+    cosine = (before * after).sum(axis=1)
+    cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-300)
+    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    sharp = np.flatnonzero(turn > settings.corner_angle)
+    sharp = sharp[np.argsort(-turn[sharp], kind="stable")]
+    return [int(vertices[((places - coarse[k + 1]) ** 2).sum(axis=1).argmin()]) for k in sharp]
+
+
+def _onto_scan(points: np.ndarray, number: int, sites: Sites, surface: Surface, length: float) -> np.ndarray:
+    """Bring the points (M, 3) of a line down onto the scan; refuse a line that leaves it between its own points."""
+    patch, feet, site = np.zeros(PATCH), np.empty_like(points), -1
+    for k, place in enumerate(points.tolist()):
+        at = (place[0], place[1], place[2])
+        site = walk(surface, site, at) if site >= 0 else nearest_site(surface, *at)
+        if np.linalg.norm(surface.mean[site] - points[k]) > 0.5 * length:
+            site = nearest_site(surface, *at)
+        fit_patch(surface, patch, site, at)
+        feet[k] = onto_patch(patch, at)
+        gap = float(np.linalg.norm(feet[k] - points[k]))
+        beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.radius
+        if (gap := max(gap, beside)) > 0.5 * length:
+            unit = _unit(sites.unit)
+            raise InputError(
+                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + sites.origin)};"
+                f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
+            )
+    return feet
+
+
+def _without_returns(
+    points: np.ndarray, corners: list[int], closed: bool, length: float
+) -> list[tuple[np.ndarray, list[int], bool]]:
+    """Cut a line that crosses or touches itself into parts that do not: (points, corners, closed) each."""
+    sparse = np.arange(0, len(points), 3)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(steps)])
+    total = float(arc[-1] + np.linalg.norm(points[0] - points[-1]))
+    places = points[sparse]
+    for k, i in enumerate(sparse.tolist()):
+        along = arc[sparse[:k]]
+        gap = arc[i] - along
+        gap = np.minimum(gap, total - gap) if closed else gap
+        back = np.flatnonzero(
+            (gap > RETURN * length) & (((places[:k] - places[k]) ** 2).sum(axis=1) < (0.3 * length) ** 2)
+        )
+        if len(back):
+            middle = (int(sparse[back[-1]]) + i) // 2
+            first, second = points[: middle + 1], points[middle:]
+            if closed:
+                second = np.concatenate([second, points[:1]])
+            return [
+                *_without_returns(first, [c for c in corners if c <= middle], False, length),
+                *_without_returns(second, [c - middle for c in corners if c > middle], False, length),
+            ]
+    return [(points, corners, closed)]

@@ -1,0 +1,44 @@
+"""Fixed nodes: the positions that the user appoints (Sec. 4.2), checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..surface.samples import Sites, distance_from_scan, local_field
+
+
+def check_positions(fixed: Sequence[Sequence[float]] | np.ndarray, sites: Sites, length: float) -> np.ndarray:
+    """Return fixed positions relative to the cloud's origin, (K, 3) [scan unit].
+
+    Raises
+    ------
+    InputError
+        A position is farther than length / 2 from the scan, or closer than that to another.
+    """
+    places = np.array(fixed, float).reshape(-1, 3)
+    unit = f" {sites.unit}" if sites.unit else ""
+    relative = places - sites.origin
+    for k, place in enumerate(relative):
+        distance = distance_from_scan(sites.surface, place)
+        local = length * local_field(sites.surface, place)
+        if distance > 0.5 * local:
+            raise InputError(
+                f"fixed position {place_text(places[k])} is {distance:.4g}{unit} away from the scan;"
+                f" it must lie within half a member, {0.5 * local:.4g}{unit}"
+            )
+        gaps = np.linalg.norm(relative[:k] - place, axis=1)
+        if k and gaps.min() < 0.5 * local * (1 - 1e-9):
+            other = places[int(gaps.argmin())]
+            raise InputError(
+                f"fixed positions {place_text(other)} and {place_text(places[k])} are {gaps.min():.4g}{unit} apart;"
+                f" they need half a member, {0.5 * local:.4g}{unit}"
+            )
+    return relative
+
+
+def place_text(place: np.ndarray) -> str:
+    """Return a place as words: its coordinates in brackets."""
+    return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"

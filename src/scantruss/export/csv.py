@@ -1,0 +1,64 @@
+"""CSV: the members in the named file, the nodes in a second one beside it.
+
+`grid.csv` holds one line per member, `grid_nodes.csv` one line per node. Coordinates are in the scan's own frame; the
+header names the unit of every column that has one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..grid.grid import Grid
+from .obj import own_frame
+
+
+def nodes_path(path: Path) -> Path:
+    """Return the path of the nodes that belong to a file of members: `grid.csv` -> `grid_nodes.csv`."""
+    return path.with_name(f"{path.stem}_nodes{path.suffix}")
+
+
+def encode_csv(grid: Grid, path: Path) -> dict[Path, bytes]:
+    """Return the two files: members at `path`, nodes beside it."""
+    return {path: _members(grid), nodes_path(path): _nodes(grid)}
+
+
+def _table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> bytes:
+    """Return the text of a table; numbers with every digit of a float64, nothing for None."""
+    lines = [",".join(header), *(",".join("" if value is None else repr(value) for value in row) for row in rows)]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _with_unit(names: str, unit: str) -> list[str]:
+    """Return column names, each followed by the unit where it is known."""
+    return [f"{name} [{unit}]" if unit else name for name in names.split()]
+
+
+def _members(grid: Grid) -> bytes:
+    """Return the table of members: both nodes, their places, the length, whether on a boundary."""
+    nodes = own_frame(grid)
+    start, end = grid.edges[:, 0], grid.edges[:, 1]
+    columns = _with_unit("start_x start_y start_z end_x end_y end_z length", grid.unit)
+    places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
+    boundary = (grid.edge_triangles[:, 1] < 0).astype(int)
+    rows = zip(range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), strict=True)
+    return _table(["id", "start", "end", *columns, "boundary"], rows)
+
+
+def _nodes(grid: Grid) -> bytes:
+    """Return the table of nodes: place, members meeting there, whether on a boundary, fixed, distance from the scan."""
+    valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
+    boundary = np.zeros(len(grid.nodes), int)
+    boundary[grid.edges[grid.edge_triangles[:, 1] < 0].ravel()] = 1
+    header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed"]
+    columns = [*own_frame(grid).T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
+    if grid.deviation is not None:
+        header += _with_unit("deviation", grid.unit)
+        columns.append([None if value != value else value for value in np.asarray(grid.deviation, float).tolist()])
+    if grid.desired is not None:
+        header += _with_unit("desired_length", grid.unit)
+        columns.append(np.asarray(grid.desired, float).tolist())
+    return _table(header, zip(range(len(grid.nodes)), *columns, strict=True))

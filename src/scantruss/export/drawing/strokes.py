@@ -1,0 +1,232 @@
+"""What is painted in a picture: shaded triangles, members, points, marks and shadows as a camera sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...grid.grid import Grid
+from ...scan.cloud import PointCloud
+from .camera import Camera, map_depth
+
+MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
+PAPER = np.array([0.984, 0.980, 0.969])
+GROUND = np.array([0.925, 0.918, 0.898])
+INK = np.array([0.098, 0.180, 0.290])  # members
+RIM = np.array([0.047, 0.098, 0.176])  # members on a boundary
+OUTSIDE = (np.array([0.345, 0.525, 0.620]), np.array([0.835, 0.925, 0.930]))  # triangles in the shade, in the light
+INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
+CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
+PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
+MARK = np.array([0.851, 0.290, 0.180])  # fixed nodes
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Things to paint: filled triangles, lines and dots alike."""
+
+    key: np.ndarray  #: (N,) what is smaller is painted first
+    shape: np.ndarray  #: (N, 3, 2) corners [pixel]; a line repeats one, a dot is a very short line
+    fill: np.ndarray  #: (N, 4) colour
+    line: np.ndarray  #: (N, 4) colour
+    width: np.ndarray  #: (N,) of the line [pixel]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A surface as seen by a camera."""
+
+    camera: Camera
+    corners: np.ndarray  #: (T, 3, 2) [pixel]
+    key: np.ndarray  #: (T,) nearness of the middle of each triangle [scan unit]
+    light: np.ndarray  #: (T,) how much light each gets, 0 to 1
+    outside: np.ndarray  #: (T,) bool, whether its outside is seen
+    depth: tuple[float, float]  #: nearness of the farthest and the nearest node [scan unit]
+    nearest: np.ndarray  #: (rows, columns) nearness of what is in front at each pixel
+    front: np.ndarray  #: (rows, columns) the triangle in front, -1 where none is
+
+    def fade(self, near: np.ndarray) -> np.ndarray:
+        """Return how far back things are, (N,) 0 in front to 1."""
+        low, high = self.depth
+        return np.clip((high - near) / max(high - low, 1e-300), 0, 1)
+
+
+def look(
+    nodes: np.ndarray, triangles: np.ndarray, camera: Camera, size: tuple[int, int], *, mapped: bool = True
+) -> View:
+    """Return how a surface looks from a camera; the map of what is in front only if asked for."""
+    flat, near = camera.project(nodes)
+    corners, depth = flat[triangles], near[triangles]
+    normal = _soft_normals(nodes, triangles)
+    a, b, c = nodes[triangles.T]
+    eye = camera.middle + camera.distance * camera.back
+    outside = ((eye - a) * np.cross(b - a, c - a)).sum(axis=1) > 0
+    normal = np.where(outside[:, None], normal, -normal)
+    key_light = _unit(-0.55 * camera.right + 0.75 * camera.up + 0.65 * camera.back)
+    fill_light = _unit(0.8 * camera.right + 0.1 * camera.up + 0.6 * camera.back)
+    light = 0.16 + 0.70 * np.clip(normal @ key_light, 0, 1) + 0.22 * np.clip(normal @ fill_light, 0, 1)
+    used = near[np.unique(triangles)]
+    rows, columns = (size[1] // 2, size[0] // 2) if mapped else (0, 0)
+    nearest, front = map_depth(corners / 2, depth, (rows, columns))
+    span = (float(used.min()), float(used.max()))
+    return View(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    """Return the vector with length 1."""
+    unit: np.ndarray = vector / np.linalg.norm(vector)
+    return unit
+
+
+def _soft_normals(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return (T, 3) unit normals, halfway between flat triangles and a smooth surface."""
+    a, b, c = nodes[triangles.T]
+    normal = np.cross(b - a, c - a)
+    at_node = np.zeros_like(nodes)
+    for axis in range(3):
+        at_node[:, axis] = np.bincount(triangles.ravel(), np.repeat(normal[:, axis], 3), len(nodes))
+    smooth = at_node[triangles].sum(axis=1)
+    return _rows_to_unit(_rows_to_unit(normal) + _rows_to_unit(smooth))
+
+
+def _rows_to_unit(rows: np.ndarray) -> np.ndarray:
+    """Return each row with length 1; zero rows stay zero."""
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    unit: np.ndarray = np.divide(rows, length, out=np.zeros_like(rows), where=length > 0)
+    return unit
+
+
+def _mix(colours: tuple[np.ndarray, np.ndarray], share: np.ndarray, alpha: float = 1.0) -> np.ndarray:
+    """Return (N, 4) colours between the first (share 0) and the second (share 1)."""
+    share = share[:, None]
+    return np.concatenate([(1 - share) * colours[0] + share * colours[1], np.full_like(share, alpha)], axis=1)
+
+
+def _hazy(colour: np.ndarray, fade: np.ndarray, most: float) -> np.ndarray:
+    """Return (N, 4) colours that go towards the paper by up to `most` far back."""
+    colour = np.broadcast_to(np.concatenate([colour, [1.0]]) if colour.ndim == 1 else colour, (len(fade), 4)).copy()
+    share = (most * fade)[:, None]
+    colour[:, :3] = (1 - share) * colour[:, :3] + share * PAPER
+    return colour
+
+
+def _surface_strokes(
+    view: View, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]
+) -> Strokes:
+    """Return the shaded triangles of a view."""
+    colour = np.where(view.outside[:, None], _mix(outside, view.light), _mix(inside, view.light))
+    colour = _hazy(colour, view.fade(view.key), 0.30)
+    return Strokes(view.key, view.corners, colour, colour, np.full(len(colour), 0.6))
+
+
+def fallen_shadow(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (V, 3) where the shadow of each node falls on the ground a little below the lowest."""
+    height = nodes @ camera.ground
+    used = height[np.unique(triangles)]
+    floor = float(used.min()) - 0.02 * float(np.ptp(used))
+    across = float(np.ptp(nodes @ camera.right))
+    slope = min(1.0, 0.6 * across / max(float(np.ptp(used)), 1e-300))  # tall things throw shadows as short as flat ones
+    sun = _unit(camera.ground + slope * (-0.30 * camera.right + 0.12 * np.cross(camera.ground, camera.right)))
+    fallen: np.ndarray = nodes - ((height - floor) / (sun @ camera.ground))[:, None] * sun
+    return fallen
+
+
+def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
+    """Return the shadow that a surface throws on the ground below it."""
+    shape = camera.project(fallen_shadow(nodes, triangles, camera))[0][triangles]
+    colour = np.broadcast_to(np.concatenate([GROUND, [1.0]]), (len(shape), 4))
+    return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))
+
+
+def framed(nodes: np.ndarray, triangles: np.ndarray, camera: Camera, box: tuple[float, float, float, float]) -> Camera:
+    """Return the camera with a surface and its shadow filling a box (left, bottom, right, top) [pixel]."""
+    used = np.unique(triangles)
+    return camera.framed(np.concatenate([nodes[used], fallen_shadow(nodes, triangles, camera)[used]]), box)
+
+
+def grid_strokes(grid: Grid, cloud: PointCloud | None, view: View) -> list[Strokes]:
+    """Return shadow, triangles, members, fixed nodes and, if given, the scan."""
+    strokes = [
+        shadow_strokes(grid.nodes, grid.triangles, view.camera),
+        _surface_strokes(view, OUTSIDE, INSIDE),
+        _member_strokes(grid, view),
+    ]
+    if cloud is not None:
+        strokes.append(dot_strokes(cloud, grid, view, over=True))
+    if grid.fixed.any():
+        strokes += _mark_strokes(grid, view)
+    return strokes
+
+
+def _member_strokes(grid: Grid, view: View) -> Strokes:
+    """Return the members as lines just in front of their triangles, those on a boundary or line bolder."""
+    flat, near = view.camera.project(grid.nodes)
+    ends = grid.edges
+    pair = grid.edge_triangles
+    boundary = pair[:, 1] < 0
+    key = np.maximum(view.key[pair[:, 0]], view.key[np.where(boundary, pair[:, 0], pair[:, 1])])
+    length = np.linalg.norm(flat[ends[:, 0]] - flat[ends[:, 1]], axis=1)
+    width = float(np.clip(0.055 * np.quantile(length, 0.75), 0.4, 2.4))
+    fade = view.fade(near[ends].mean(axis=1))
+    bold = boundary | grid.edge_on_line
+    colour = np.where(bold[:, None], _hazy(RIM, fade, 0.45), _hazy(INK, fade, 0.60))
+    widths = np.where(bold, 1.9 * width, width)
+    return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
+
+
+def _thin(cloud: PointCloud, grid: Grid, most: int) -> np.ndarray:
+    """Return at most so many points of the scan in the frame of the grid; always the same ones."""
+    points = cloud.points
+    if len(points) > most:
+        points = points[np.sort(np.random.default_rng(0).permutation(len(points))[:most])]
+    placed: np.ndarray = points + (np.asarray(cloud.origin, float) - grid.origin)
+    return placed
+
+
+def dot_strokes(cloud: PointCloud, grid: Grid, view: View, *, over: bool) -> Strokes:
+    """Return the points of the scan that are seen, as dots: over the triangles, or alone and shaded."""
+    points = _thin(cloud, grid, MOST_POINTS[over])
+    flat, near = view.camera.project(points)
+    rows, columns = view.front.shape
+    pixel = np.rint(flat / 2).astype(int)
+    inside = (pixel >= 0).all(axis=1) & (pixel[:, 0] < columns) & (pixel[:, 1] < rows)
+    points, flat, near, pixel = points[inside], flat[inside], near[inside], pixel[inside]
+    triangle, nearest = view.front[pixel[:, 1], pixel[:, 0]], view.nearest[pixel[:, 1], pixel[:, 0]]
+    slack = 0.5 * float(np.mean(grid.lengths))
+    seen = (triangle < 0) | (near > nearest - slack)
+    flat, near, triangle, nearest = flat[seen], near[seen], triangle[seen], nearest[seen]
+    on = (triangle >= 0) & (near < nearest + slack)
+    key = np.where(on, np.maximum(view.key[triangle], near), near) + slack
+    light = np.where(triangle >= 0, view.light[triangle], 0.5)
+    colour = _hazy(_mix((INK, OUTSIDE[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
+    return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
+
+
+def _dots(flat: np.ndarray) -> np.ndarray:
+    """Return (N, 3, 2) lines so short that their round ends make a dot; a line of no length is not painted."""
+    shape: np.ndarray = flat[:, None] + np.array([[-0.05, 0.0], [0.05, 0.0], [0.05, 0.0]])
+    return shape
+
+
+def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
+    """Return the marks of the fixed nodes: full where they are seen, faint behind the grid."""
+    flat, near = view.camera.project(grid.nodes[grid.fixed])
+    rows, columns = view.front.shape
+    pixel = np.clip(np.rint(flat / 2).astype(int), 0, (columns - 1, rows - 1))
+    seen = near > view.nearest[pixel[:, 1], pixel[:, 0]] - 0.5 * float(np.mean(grid.lengths))
+    shape = _dots(flat)
+    strokes = []
+    for colour, width in ((PAPER, 15.0), (MARK, 11.0)):
+        shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
+        shown[:, 3] = np.where(seen, 1.0, 0.25)
+        front = np.full(len(flat), np.inf)
+        strokes.append(Strokes(front, shape, np.zeros_like(shown), shown, np.full(len(flat), width)))
+    return strokes
+
+
+def solid_strokes(view: View) -> Strokes:
+    """Return the outside of a solid, shaded."""
+    surface = _surface_strokes(view, PRINT, PRINT)
+    keep = view.outside
+    return Strokes(surface.key[keep], surface.shape[keep], surface.fill[keep], surface.line[keep], surface.width[keep])

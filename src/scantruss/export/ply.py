@@ -1,0 +1,28 @@
+"""PLY: nodes and triangles in the scan's own frame, binary."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..grid.grid import Grid
+from .obj import header_lines, own_frame
+
+
+def encode_ply(grid: Grid) -> bytes:
+    """Return a binary little endian PLY file: double coordinates, one `vertex_indices` list per triangle."""
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *(f"comment {line}" for line in header_lines(grid)),
+        f"element vertex {len(grid.nodes)}",
+        "property double x",
+        "property double y",
+        "property double z",
+        f"element face {len(grid.triangles)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    faces = np.zeros(len(grid.triangles), np.dtype([("count", "u1"), ("nodes", "<i4", 3)]))
+    faces["count"] = 3
+    faces["nodes"] = grid.triangles
+    return ("\n".join(header) + "\n").encode("ascii") + own_frame(grid).astype("<f8").tobytes() + faces.tobytes()

@@ -1,0 +1,1 @@
+"""The advancing front: start, advance and close."""

@@ -1,0 +1,305 @@
+"""The advancing front: drives the kernel, slice by slice (Sec. 3.5, Fig. 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+
+from ..boundary.find import Boundary, characteristic_points
+from ..constraints.embedded_lines import (
+    add_half_edges,
+    chain_places,
+    check_kept,
+    check_links,
+    line_members,
+    link_around,
+)
+from ..constraints.find import Constraints
+from ..constraints.network import Lines
+from ..errors import FrontError
+from ..grid.grid import Grid
+from ..kernels.front import advance as kernels
+from ..kernels.front import front as lists
+from ..kernels.front import gaps
+from ..kernels.front.candidate_nodes import RowNodes, add_still_nodes, offer_nodes
+from ..kernels.geometry import boxes as boxing
+from ..kernels.geometry.boxes import new_boxes
+from ..kernels.geometry.triangles import quality
+from ..kernels.mesh.point_location import nearest_site
+from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..settings import Settings
+from ..surface.samples import Sites, local_field
+from .orientation_field import nodes_at
+
+Progress = Callable[[str, float], None]
+
+STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
+GAP = 60  # gaps with more segments stay open
+CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
+NEARER = 0.33  # the same for an appointed position
+BOX = 2.4  # size of the search boxes of the nodes, in member lengths: as far as a step of the front looks for others
+BUDGET = 500  # segments advanced between two calls of `progress`
+
+
+def advance_front(
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    rows: RowNodes | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Grid:
+    """Return the grid that a front leaves behind when it advances over a scan (Fig. 4).
+
+    Parameters
+    ----------
+    sites : Sites
+        The surface samples of the scan.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges. Method "paper" makes the fixed nodes later.
+    settings : Settings
+    rows : RowNodes, optional
+        Nodes of rows for the front to come to; left out, it makes all nodes itself.
+    progress : callable, optional
+        Called with ("front", share); may raise to stop.
+    """
+    front = start_front(new_front(sites, settings), sites, boundary, constraints, settings, rows)
+    members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
+    rules = lists.Rules(
+        length=settings.length,
+        desired=settings.length,
+        graded=sites.graded,
+        length_weight=settings.length_weight,
+        shape_weight=settings.shape_weight,
+        size_weight=settings.size_weight,
+        search_range=settings.search_range * sites.spacing,
+        nearness=settings.nearness,
+        merge_angle=float(np.radians(settings.merge_angle)),
+        quadrangle=settings.case3 == "quadrangle",
+        strict=1.0,
+    )
+    for strict in STRICTNESS:
+        count = int(front.count[lists.SEGMENTS])
+        for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
+            lists.enqueue(front, s)
+        by_cases = settings.method == "paper" and strict == STRICTNESS[0]
+        front = run(
+            front,
+            sites,
+            rules._replace(strict=strict),
+            progress,
+            kernels.advance_by_cases if by_cases else kernels.advance,
+        )
+    close_gaps(front, sites, settings)
+    triangles = front.triangles[: front.count[lists.TRIANGLES]]
+    check_kept(members, triangles, front.nodes)
+    used, numbered = np.unique(triangles, return_inverse=True)
+    desired = settings.length * sites.surface.field[front.site[used]] if sites.graded else None
+    return Grid(
+        front.nodes[used],
+        numbered.reshape(-1, 3).astype(np.int64),
+        np.zeros(len(used), np.bool_),
+        sites.origin,
+        sites.unit,
+        desired=desired,
+        lines=np.searchsorted(used, members),
+        settings=settings,
+    )
+
+
+def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
+    """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
+
+    Loops of the boundary of which the front has reached no segment are left out. Each turn takes the segments of one loop off the
+    front, at least one, so it ends after no more turns than there are segments.
+    """
+    loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
+    for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
+        while front.state[s] != lists.GONE:
+            count = gaps.gap_loop(front, s, loop)
+            segments = loop[:count].copy()
+            length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
+            unreached = (front.state[segments] == lists.INACTIVE).all()
+            if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
+                gaps.cut_out(front, segments)
+
+
+def new_front(sites: Sites, settings: Settings) -> lists.Front:
+    """Return an empty front with room for the cloud."""
+    mean, room = sites.surface.mean, int(2.0 * sites.graded_area / (0.433 * settings.length**2)) + 2000
+    usual = settings.length * float(np.sqrt(sites.area / sites.graded_area))
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), BOX * usual, room, room)
+    return _blank(room, boxes)
+
+
+def _blank(room: int, boxes: boxing.SearchBoxes) -> lists.Front:
+    def ids(*shape: int) -> np.ndarray:
+        return np.full(shape, -1, np.int64)
+
+    return lists.Front(
+        np.zeros((room, 3)), np.zeros((room, 3)), ids(room), np.zeros(room, np.bool_), ids(room),
+        ids(4 * room), ids(4 * room), ids(4 * room), ids(4 * room), np.zeros(4 * room, np.int64), ids(4 * room),
+        ids(2 * room, 3), ids(room), ids(6 * room), ids(4 * room), np.zeros(8, np.int64), boxes,
+    )  # fmt: skip
+
+
+def grown(front: lists.Front) -> lists.Front:
+    """Return the same front with room for twice as much."""
+    old = front.boxes
+    room = 2 * len(front.nodes)
+    boxes = new_boxes(old.lower, old.lower + old.size * (old.counts - 1), float(old.size.max()), room, room)
+    larger = _blank(room, boxes)
+    for name in lists.Front._fields[:-3]:
+        kept = getattr(front, name)
+        getattr(larger, name)[: len(kept)] = kept
+    waiting = front.queue[np.arange(front.count[lists.FIRST], front.count[lists.LAST]) % len(front.queue)]
+    larger.queue[: len(waiting)] = waiting
+    larger.count[:] = front.count
+    larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
+    for n in range(int(front.count[lists.NODES])):
+        if front.site[n] >= 0:  # the others were merged away
+            boxing.put(boxes, n, *larger.nodes[n])
+    return larger
+
+
+def start_front(
+    front: lists.Front,
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    rows: RowNodes | None = None,
+) -> lists.Front:
+    """Put the initial front into the lists: boundary loops, lines, nodes that it may come to, a seed triangle on closed pieces."""
+    surface = sites.surface
+    for loop in boundary.loops:
+        active = loop.external or settings.advance_from == "all"
+        nodes, _ = characteristic_points(loop, settings.length)
+        rim = np.array(add_nodes(front, surface, nodes), np.int64)
+        lists.add_chain(front, rim, lists.ACTIVE if active else lists.INACTIVE)
+    add_lines(front, surface, constraints.lines, settings)
+    for place in constraints.positions if settings.method != "paper" else ():
+        length = settings.length * local_field(surface, place)
+        front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
+    if rows is not None:
+        front = offer(front, surface, rows, CLEAR * settings.length)
+    bounded = {loop.piece for loop in boundary.loops}
+    bounded |= {int(sites.piece[nearest_site(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
+    for number in sites.pieces:
+        if number not in bounded:
+            site = int(np.flatnonzero(sites.piece == number)[0])
+            length = settings.length * local_field(surface, surface.mean[site])
+            ids = seed_of_rows(front, surface, site, length)
+            add_seed(front, ids or new_seed(front, surface, site, length))
+    return front
+
+
+def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -> lists.Front:
+    """Offer nodes to a front, which grows until there is room for them."""
+    while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
+        front = grown(front)
+    offer_nodes(front, surface, nodes, clear)
+    return front
+
+
+def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Settings) -> None:
+    """Add the lines to a front that holds the boundary loops."""
+    if not lines.curves:
+        return
+    count = int(front.count[lists.NODES])
+    at_stop = {}
+    for stop, place in enumerate(lines.stops):
+        if lines.on_loop[stop] >= 0:
+            at_stop[stop] = int(((front.nodes[:count] - place) ** 2).sum(axis=1).argmin())
+        else:
+            at_stop[stop] = add_nodes(front, surface, place[None])[0]
+    node_stop = {node: stop for stop, node in at_stop.items()}
+    heads = front.head[: front.count[lists.SEGMENTS]].tolist()
+    rim = zip(front.tail[: len(heads)].tolist(), heads, strict=True)
+    beside = ((node_stop[a], node_stop[b]) for a, b in rim if a in node_stop and b in node_stop)
+    taken = {(min(pair), max(pair)) for pair in beside}
+    chains = []
+    divided = chain_places(lines, surface, settings.length, taken)
+    for places, (first, last) in zip(divided, lines.ends.tolist(), strict=True):
+        middle = add_nodes(front, surface, places)
+        chain = [at_stop[first], *middle, at_stop[last]] if first >= 0 else [*middle, middle[0]]
+        add_half_edges(front, chain)
+        chains.append(chain)
+    for node in sorted({node for chain in chains for node in chain}):
+        link_around(front, node)
+    check_links(front)
+
+
+def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
+    """Add nodes (K, 3) that stay in place: of the boundary or of lines, each near the one before; returns their numbers."""
+    first = add_still_nodes(front, surface, np.ascontiguousarray(nodes))
+    return list(range(first, first + len(nodes)))
+
+
+def add_seed(front: lists.Front, ids: list[int]) -> None:
+    """Add a seed triangle of three nodes, and the front around it."""
+    lists.add_triangle(front, *ids)
+    lists.add_chain(front, np.array([ids[1], ids[0], ids[2]]), lists.ACTIVE)
+
+
+def seed_of_rows(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+    """Return three nodes of the rows near a site that make a good triangle; none where the rows do not offer them."""
+    count = int(front.count[lists.NODES])
+    free = np.flatnonzero(front.out[:count] < 0)
+    away = np.linalg.norm(front.nodes[free] - surface.mean[site], axis=1)
+    near = free[np.argsort(away, kind="stable")[:12]]
+    near = near[(front.normals[near] @ surface.normals[site] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
+    best, ids = 0.8, []
+    for a, b, c in combinations(near.tolist(), 3):
+        pa, pb, pc = (tuple(front.nodes[q].tolist()) for q in (a, b, c))
+        value = quality(pa, pb, pc, length, 0.5, 0.5)
+        if value > best:
+            turned = np.dot(np.cross(np.subtract(pb, pa), np.subtract(pc, pa)), surface.normals[site]) < 0
+            best, ids = value, [a, c, b] if turned else [a, b, c]
+    return ids
+
+
+def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+    """Add three nodes of a regular triangle around a site."""
+    patch = np.zeros(PATCH)
+    centre = surface.mean[site]
+    fit_patch(surface, patch, site, tuple(centre))
+    normal = patch[3:6].copy()
+    towards = surface.mean[surface.neighbors[site, 0]] - centre
+    u = towards - normal * (towards @ normal)
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    ids = []
+    for angle in np.radians([0.0, 120.0, 240.0]):
+        place = centre + length / np.sqrt(3.0) * (np.cos(angle) * u + np.sin(angle) * v)
+        own = np.zeros(PATCH)
+        fit_patch(surface, own, site, tuple(place))
+        foot = onto_patch(own, tuple(place))
+        near = walk(surface, int(own[15]), foot)
+        ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
+        lists.add_node(front)
+    return ids
+
+
+def run(
+    front: lists.Front, sites: Sites, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
+) -> lists.Front:
+    """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
+    expected = sites.graded_area / (0.433 * rules.desired**2)
+    while True:
+        status = step(sites.surface, front, rules, BUDGET)
+        if progress:
+            progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
+        if status == lists.DONE:
+            return front
+        if front.count[lists.TRIANGLES] > 4 * expected + 1000:
+            x, y, z = front.nodes[front.count[lists.NODES] - 1].tolist()
+            raise FrontError(
+                "the front runs over itself: the scan is too rough or too sparse for this length", where=(x, y, z)
+            )
+        if status == lists.FULL:
+            front = grown(front)

@@ -1,0 +1,231 @@
+"""Rows for the front to advance in: nodes of a lattice that follows a smooth direction field of the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ..boundary.find import Boundary, Loop, characteristic_points
+from ..kernels.front.candidate_nodes import RowNodes
+from ..kernels.geometry.vectors import Vector
+from ..kernels.surface import orientation_field as kernels
+from ..kernels.surface.local_surface import Surface
+from ..kernels.surface.orientation_field import Posts
+from ..runtime.parallel import side_by_side, two_at_once
+from ..scan.vectors import dots
+from ..settings import Settings
+from ..surface.samples import Sites
+
+APART = 0.55  # distance of the posts, in member lengths
+COARSER = 2.0  # how much farther apart the posts of the next level are
+FEWEST = 12  # posts of the coarsest level
+LINKS = 12  # links of a post
+PASSES = 3  # of smoothing, on each level,
+MANY = 5000  # whose posts are divided where there are so many
+WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
+CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
+DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
+
+
+@dataclass(frozen=True)
+class Rows:
+    """How the nodes of one front are laid out."""
+
+    turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
+    scale: float = 1.0  #: length of their members, in desired lengths
+    laid: bool = True  #: False: no rows are laid, the front makes all of its nodes itself
+
+
+TURNS = {  # directions of the rows of several fronts
+    "quick": (Rows(),),
+    "normal": tuple(Rows(10.0 * turn) for turn in range(6)),
+    "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
+}
+SCALES = {  # lengths of the fronts instead, where the desired length differs from place to place: no rows can be laid
+    "quick": (1.0,),
+    "normal": (1.0, 0.97, 1.03),
+    "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
+}
+SMALL = 600.0  # area up to which `normal` tries all its directions, in squares of the desired length: the boundary decides there
+
+
+class Field(NamedTuple):
+    """What one front comes to."""
+
+    way: Rows
+    nodes: RowNodes | None  #: of its rows; None where the front makes all of its nodes itself
+
+
+class Hierarchy(NamedTuple):
+    """The multiresolution hierarchy of a scan, from fine to coarse; see `make_levels`."""
+
+    levels: list[Posts]
+    owners: list[np.ndarray]  #: for each level the post of each place of the level below (sites at first)
+    shares: list[tuple[np.ndarray, ...]]  #: posts of each level that are smoothed at once
+
+    def copy(self) -> Hierarchy:
+        """Return it with directions and lattices of its own."""
+        own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in self.levels]
+        return self._replace(levels=own)
+
+
+def usual_ways(sites: Sites, settings: Settings) -> tuple[Rows, ...]:
+    """Return how the fronts are laid out that the effort allows."""
+    if settings.method == "paper":
+        return (Rows(laid=False),)
+    if sites.graded:
+        return tuple(Rows(scale=scale, laid=False) for scale in SCALES[settings.effort])
+    large = sites.graded_area > SMALL * settings.length**2
+    return TURNS[settings.effort][: 1 if settings.effort == "normal" and large else None]
+
+
+def orientation_fields(
+    sites: Sites, boundary: Boundary, settings: Settings, ways: Sequence[Rows] | None = None
+) -> list[Field]:
+    """Return for each front the nodes of rows that it may come to: an orientation and a position field (Jakob et al. 2015).
+
+    Both are smoothed over a hierarchy of levels from coarse to fine, from a start at the boundary on.
+
+    Parameters
+    ----------
+    sites : Sites
+        The surface samples of the scan.
+    boundary : Boundary
+    settings : Settings
+        `length`; `effort` decides how many fields there are.
+    ways : sequence of Rows, optional
+        How they are laid out; left out, as the effort allows.
+    """
+    ways = usual_ways(sites, settings) if ways is None else ways
+    closed = 1.0 if boundary.loops else CLOSED
+    scales = {way.scale for way in ways if way.laid}
+    hierarchies = {scale: make_levels(sites.surface, closed * scale * settings.length) for scale in scales}
+
+    def field_of(way: Rows) -> Field:
+        if not way.laid:
+            return Field(way, None)
+        length = closed * way.scale * settings.length
+        return Field(way, lay_rows(hierarchies[way.scale].copy(), sites, boundary, length, way.turn))
+
+    return list(side_by_side(*(partial(field_of, way) for way in ways)))
+
+
+def lay_rows(hierarchy: Hierarchy, sites: Sites, boundary: Boundary, length: float, turn: float) -> RowNodes:
+    """Return the nodes of rows of a length [scan unit] that start at an angle [degree] to the longest side of the boundary."""
+    levels, owners, shares = hierarchy
+    start, direction, node = first_row(sites, boundary, length, turn)
+    for owner in owners:
+        start = int(owner[start])
+    kernels.lay_first(levels[-1], start, direction, node, length, np.empty(len(levels[-1].mean), np.int64))
+    for smooth in (_smooth_directions, kernels.smooth_lattice):
+        for k in range(len(levels) - 1, -1, -1):
+            if k < len(levels) - 1:
+                kernels.hand_down(levels[k + 1], owners[k + 1], levels[k], length)
+            for _ in range(PASSES):
+                two_at_once(partial(smooth, levels[k], length), shares[k])
+    return _chosen(levels[0], owners[0], length)
+
+
+def _smooth_directions(posts: Posts, _: float, some: np.ndarray) -> None:
+    kernels.smooth_directions(posts, some)
+
+
+def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
+    """Nodes of the finest posts, each once: those nearest to their posts first."""
+    away = ((posts.node - posts.mean) ** 2).sum(axis=1)
+    order = np.argsort(away, kind="stable")
+    order = order[away[order] < (WITHIN * length) ** 2]
+    chosen, scratch = np.empty(len(away), np.int64), np.full((3, len(away)), -1, np.int64)
+    scratch[0] = 0
+    chosen = chosen[: kernels.list_nodes(posts, order, length, DISTANCE * length, chosen, scratch)]
+    first = np.empty(len(away), np.int64)
+    first[owner[::-1]] = np.arange(len(owner) - 1, -1, -1)
+    return RowNodes(posts.node[chosen], posts.normals[chosen], first[chosen], length)
+
+
+def make_levels(surface: Surface, length: float) -> Hierarchy:
+    """Return the posts of a surface for members of a length [scan unit], level by level from fine to coarse."""
+    mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
+    levels: list[Posts] = []
+    owners: list[np.ndarray] = []
+    radius = APART * length
+    while True:
+        owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
+        count = kernels.choose_posts(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
+        if levels and (count < FEWEST or count > 0.8 * len(mean)):
+            return Hierarchy(levels, owners, [_shares(posts) for posts in levels])
+        posts = Posts(
+            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS), -1, np.int64),
+            np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
+        )  # fmt: skip
+        kernels.link_posts(mean, normals, neighbors, owner, posts)
+        levels.append(posts)
+        owners.append(owner)
+        mean, normals, neighbors = posts.mean, posts.normals, posts.neighbors
+        radius *= COARSER
+
+
+def _shares(posts: Posts) -> tuple[np.ndarray, ...]:
+    """Posts that two threads may smooth at once, and those between, which depend on both; few posts are not divided."""
+    count = len(posts.mean)
+    if count < MANY:
+        return (np.arange(count),)
+    away, queue = np.empty((2, count), np.int64), np.empty(count, np.int64)
+    end = kernels.links_away(posts.neighbors, 0, away[0], queue)  # of the links, not of where the scan lies
+    kernels.links_away(posts.neighbors, kernels.links_away(posts.neighbors, end, away[0], queue), away[1], queue)
+    ahead = away[0] - away[1]
+    late = ahead > np.median(ahead)
+    across = (posts.neighbors >= 0) & (late[posts.neighbors] != late[:, None])
+    between = across.any(axis=1)
+    between[posts.neighbors[across]] = True
+    return np.flatnonzero(~late & ~between), np.flatnonzero(late & ~between), np.flatnonzero(between)
+
+
+def first_row(sites: Sites, boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:
+    """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
+
+    On a closed surface they start anywhere.
+    """
+    surface = sites.surface
+    if not boundary.loops:
+        site = int(np.flatnonzero(sites.piece == sites.pieces[0])[0])
+        ahead, place = surface.mean[max(surface.neighbors[site, 0], 0)] - surface.mean[site], surface.mean[site]
+    else:
+        loop, at = longest_side(boundary.loops)
+        count = len(loop.points)
+        nodes, _ = characteristic_points(loop, length)
+        middle = loop.points[at]
+        place = nodes[((nodes - middle) ** 2).sum(axis=1).argmin()]
+        half = min(round(length / np.linalg.norm(loop.points[(at + 1) % count] - middle)), count // 4)
+        ahead = loop.points[(at + half) % count] - loop.points[at - half]
+        arm = surface.mean - place
+        site = int(dots(arm, arm).argmin())
+    normal = surface.normals[site]
+    ahead = ahead - normal * (ahead @ normal)
+    angle = np.radians(turn)
+    ahead = np.cos(angle) * ahead + np.sin(angle) * np.cross(normal, ahead)
+    return site, (*ahead.tolist(),), (*place.tolist(),)
+
+
+def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
+    """Return the loop that has the longest side between two corners, and the point in the middle of that side."""
+    best, found = -1.0, (loops[0], 0)
+    for loop in loops:
+        ends = loop.corner_at if len(loop.corner_at) else np.zeros(1, np.int64)
+        sides = np.diff(ends, append=ends[:1] + len(loop.points))
+        longest = int(sides.argmax())
+        share = loop.length * sides[longest] / len(loop.points)
+        if share > best:
+            best, found = share, (loop, int(ends[longest] + sides[longest] // 2) % len(loop.points))
+    return found
+
+
+def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> RowNodes:
+    """Return nodes at appointed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
+    sites = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
+    near = np.linalg.norm(surface.mean[sites] - positions, axis=1) < length
+    return RowNodes(np.ascontiguousarray(positions[near]), surface.normals[sites[near]], sites[near], length)

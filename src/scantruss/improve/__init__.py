@@ -1,0 +1,1 @@
+"""Improving a grid: flips, smoothing, equalizing and perturbation."""

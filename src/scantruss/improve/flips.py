@@ -1,0 +1,38 @@
+"""Delaunay optimization: flips by the largest smallest angle (Sec. 4.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..grid.grid import Grid
+from ..kernels.mesh import flips as kernels
+from ..kernels.mesh.grid import Net
+from .working_mesh import close_net, open_net
+
+FOLD = 0.0  # cosine: after a flip two triangles meet at 90 degrees or more, unless they were folded more before
+ROUNDS = 100  # rounds over all edges; a few are enough
+
+
+def flip_edges(grid: Grid) -> tuple[Grid, int]:
+    """Flip every edge whose flip makes the smallest angle of its two triangles larger, until none does.
+
+    Boundary edges stay, no edge comes to be twice, the grid is not folded, and no interior node is left with fewer than
+    four members: the topology cannot change.
+
+    Returns
+    -------
+    Grid
+        Same nodes, other triangles.
+    int
+        Flips made.
+    """
+    if len(grid.triangles) == 0:
+        return grid, 0
+    net, source = open_net(grid)
+    count = flip_by_angle(net)
+    return close_net(net, source, grid), count
+
+
+def flip_by_angle(net: Net) -> int:
+    """Flip the edges of an opened grid in place; returns the flips made."""
+    return int(kernels.flip_by_angle(net, FOLD, ROUNDS, np.full(len(net.arc), -1, np.int64)))

@@ -1,0 +1,136 @@
+"""Grid optimization and adjustment (Sec. 4): what happens to a grid after the front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.grid import Grid
+from ..runtime.parallel import side_by_side
+from ..surface.samples import narrow_surface
+from ..surface.scratch import with_own_scratch
+from .equalize import equalize, finish
+from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
+from .flips import flip_by_angle
+from .perturbation import search_widely
+from .sliding_nodes import with_rim_members
+from .smoothing import smooth
+from .working_mesh import Relief
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..constraints.find import Constraints
+    from ..settings import Settings
+    from ..surface.samples import Sites
+
+Progress = Callable[[str, float], None]
+Report = Callable[[float], None]
+
+
+def optimize_grid(
+    grid: Grid,
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> Grid:
+    """Return a grid with better triangles and more even members, on the scan, with nodes at the fixed positions.
+
+    Parameters
+    ----------
+    grid : Grid
+        What the front has left.
+    sites : Sites
+        The surface samples of the scan, of the same origin.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges.
+    settings : Settings
+        `method`: "paper" is Sec. 4 to the letter, "default" equalizes and searches.
+    progress : callable, optional
+        Called with ("optimize", share); may raise to stop.
+
+    Returns
+    -------
+    Grid
+        With `before`, the quality of `grid`, and `deviation`. The topology is that of `grid`.
+
+    Raises
+    ------
+    InputError
+        No node can be moved to a fixed position.
+    """
+    if len(grid.triangles) == 0:
+        return grid.replace(settings=settings, before=grid.quality)
+    report = (lambda share: progress("optimize", share)) if progress else None
+    if report:
+        report(0.1)
+    relief = improve_first(grid, sites, boundary, constraints, settings, report)
+    better = improve_last(relief, grid, sites, constraints, settings, report)
+    if report:
+        report(1.0)
+    return better
+
+
+def improve_first(
+    grid: Grid,
+    sites: Sites,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    report: Report | None = None,
+) -> Relief:
+    """Open the grid that a front has left and improve it as far as all fronts are, to be compared.
+
+    By the paper: Delaunay flips, then nodes moved to the fixed positions (Sec. 4.1, 4.2). By default: even members.
+    """
+    surface = with_own_scratch(sites.surface)
+    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.stops, settings.length, constraints.lines)
+    if settings.method == "paper":
+        flip_by_angle(relief.net)
+        if len(constraints.positions):
+            fix_nearest_nodes(relief, constraints.positions)
+            flip_by_angle(relief.net)
+    else:
+        hold_nodes(relief, constraints.positions)
+        equalize(relief, report)
+    return relief
+
+
+def improve_last(
+    relief: Relief,
+    front: Grid,
+    sites: Sites,
+    constraints: Constraints,
+    settings: Settings,
+    report: Report | None = None,
+) -> Grid:
+    """Improve an opened grid to the end, and put it down on the scan.
+
+    By the paper: Taubin smoothing (Sec. 4.1). By default: the search that the effort allows, the fixed nodes that are still
+    missing, and a last settling.
+    """
+    if settings.method == "default":
+        search_widely(relief, settings.effort, report)
+        fix_nodes(relief, constraints.positions)
+
+    def come_to_rest() -> None:
+        if settings.method == "paper":
+            smooth(relief, settings)
+        else:
+            finish(relief, settings.prefer)
+        land(relief, sites)
+
+    closed, before, _ = side_by_side(lambda: relief.close(front), lambda: front.quality, come_to_rest)
+    grid = with_rim_members(relief.to_grid(front, closed), constraints.lines, settings.length)
+    return grid.replace(settings=settings, before=before)
+
+
+def land(relief: Relief, sites: Sites) -> None:
+    """Let the nodes down on the scan by patches as narrow as it allows."""
+    relief.land(*(narrow_surface(sites, points) for points in (40.0, 120.0, np.inf)))
+    relief.tell_apart(sites.measured)

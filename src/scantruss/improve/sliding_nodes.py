@@ -1,0 +1,65 @@
+"""Nodes of lines in an opened grid: which slide, and on which curve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..constraints.network import Lines, rim_of
+from ..grid.grid import Grid
+from ..kernels.boundary.curves import Rim, nearest_on_rim
+from ..kernels.mesh.grid import LOCKED, RIM, Net
+
+SNAP = 0.4  # the end of a line is the node of a line nearest to it, within so many lengths
+
+
+def joined(first: Rim, second: Rim) -> Rim:
+    """Return the curves of both, those of the second numbered after those of the first."""
+    return Rim(
+        np.concatenate([first.points, second.points]),
+        np.concatenate([first.arc, second.arc]),
+        np.concatenate([first.start, second.start[1:] + first.start[-1]]),
+        np.concatenate([first.total, second.total]),
+    )
+
+
+def inner_lines(grid: Grid) -> np.ndarray:
+    """Members (K, 2) of lines that are not on the boundary, where nothing can be flipped anyway."""
+    kept: np.ndarray = grid.edges[grid.edge_on_line & (grid.edge_uses > 1)] if len(grid.lines) else grid.lines
+    return kept
+
+
+def with_rim_members(grid: Grid, lines: Lines, length: float) -> Grid:
+    """Return the grid with the members of the boundary that lines run along among its lines."""
+    if not lines.along:
+        return grid
+    track = rim_of(lines.along, [False] * len(lines.along))
+    ends = grid.edges[grid.edge_uses == 1]
+
+    def is_near(place: np.ndarray) -> bool:
+        return nearest_on_rim(track, *place.tolist())[2] < SNAP * length
+
+    near = [is_near(a) and is_near(b) and is_near(0.5 * (a + b)) for a, b in grid.nodes[ends]]
+    return grid.replace(lines=np.unique(np.concatenate([grid.lines, ends[np.array(near, np.bool_)]]), axis=0))
+
+
+def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length: float) -> None:
+    """Let the nodes of lines slide on the nearest curve; ends, corners, meetings and fixed nodes (C,) stay at rest.
+
+    The curves of the lines are numbered from `first` on.
+    """
+    used = net.used
+    nodes = np.flatnonzero((net.line[:used] != 0) & (net.is_open[:used] == 0) & (net.kind[:used] != LOCKED))
+    inside = nodes[[int(line).bit_count() == 2 for line in net.line[nodes].tolist()]] if len(nodes) else nodes
+    at_stop = set()
+    for place in lines.stops if len(nodes) else ():
+        squares = ((net.nodes[nodes] - place) ** 2).sum(axis=1)
+        if squares.min() <= (SNAP * length) ** 2:
+            at_stop.add(int(nodes[squares.argmin()]))
+    rim = lines.rim
+    for v in inside.tolist():
+        if v not in at_stop:
+            curve, arc, distance = nearest_on_rim(rim, *net.nodes[v].tolist())
+            if distance <= SNAP * length:
+                net.curve[v], net.arc[v] = first + curve, arc
+                if not fixed[v]:
+                    net.kind[v] = RIM

@@ -1,0 +1,272 @@
+"""Relief: a grid taken apart for the kernels, on the scanned surface and its boundary curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..constraints.network import NO_LINES, Lines
+from ..errors import FrontError
+from ..grid.grid import Grid
+from ..kernels.boundary.curves import Rim
+from ..kernels.mesh import grid as kernels
+from ..kernels.mesh import point_location
+from ..kernels.mesh.grid import LOCKED, REST, RIM, Net
+from ..kernels.mesh.projection import land_nodes
+from ..kernels.surface.local_surface import PATCH, Surface
+from ..runtime.parallel import in_parts
+from ..surface.samples import is_graded
+from ..surface.scratch import with_own_scratch
+from .sliding_nodes import find_on_lines, inner_lines, joined
+
+NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
+PART = 300  # fewest nodes for a thread of their own
+LANDINGS = 3  # parts of the nodes that a thread lands: those of the rim take less time
+WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
+MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
+
+#: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
+Closed = tuple[Grid, np.ndarray]
+
+
+def no_rim() -> Rim:
+    """Return the curves of a closed scan: none."""
+    return Rim(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
+
+
+def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
+    """Take a grid apart into rings of neighbours.
+
+    A node whose triangles are several fans becomes several nodes of the net; these and the nodes of seams (edges that do
+    not have two triangles of one orientation, yet are no boundary) are LOCKED. Boundary nodes, fixed nodes and those of lines are
+    at REST.
+
+    Returns
+    -------
+    Net
+    (C,) int64 : node of the grid that each node of the net stands for, -1 where there is none yet
+    """
+    count = len(grid.nodes)
+    corner_node, partner = _half_edges(grid.triangles, count)
+    valence = int(np.bincount(grid.edges.ravel(), minlength=1).max()) if len(grid.edges) else 0
+    most = count + int((partner < 0).sum())  # every fan more than one at a node is open
+    capacity = most + len(grid.triangles) // 4 + 64
+    net = Net(
+        nodes=np.zeros((capacity, 3)),
+        ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
+        **{name: np.zeros(capacity, np.int64) for name in ("degree", "is_open", "kind", "ideal", "line")},
+        curve=np.full(capacity, -1),
+        arc=np.zeros(capacity),
+        free=np.zeros(capacity, np.int64),
+        spare=np.zeros(1, np.int64),
+        in_use=np.zeros(1, np.int64),
+        desired=np.ones(capacity),
+    )
+    if len(grid.lines) and net.ring.shape[1] > MOST:
+        raise FrontError(f"a node came out with {valence} members; use another length", grid)
+    source = np.full(capacity, -1, np.int64)
+    fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
+    used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.degree, net.is_open, source, count)
+    net.nodes[:used] = grid.nodes[source[:used]]
+    spare = np.arange(capacity - 1, used - 1, -1)
+    net.free[: len(spare)] = spare
+    net.spare[0], net.in_use[0] = len(spare), used
+    net.kind[:used][net.is_open[:used] == 1] = REST
+    net.kind[:count][grid.fixed] = REST
+    several = np.bincount(source[:used], minlength=count) > 1
+    ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
+    twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
+    for a, b in inner_lines(grid).tolist():
+        for v, u in ((a, b), (b, a)):
+            kernels.mark_line(net, v, u)
+            net.kind[v] = REST
+    net.kind[:used][several[source[:used]] | twice] = LOCKED
+    return net, source
+
+
+def close_net(net: Net, source: np.ndarray, grid: Grid) -> Grid:
+    """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped."""
+    return join_again(net, source, grid)[0]
+
+
+def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
+    """Put the triangles of a net together again; returns them, and the node of the net that each node stands for (V,)."""
+    used = net.used
+    room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
+    triangles = room[: kernels.list_triangles(net, room)]
+    merged = np.where(source[:used] >= 0, source[:used], np.arange(used))
+    kept, inverse = np.unique(merged[triangles], return_inverse=True)
+    closed = grid.replace(
+        nodes=net.nodes[kept],
+        triangles=inverse.reshape(-1, 3).astype(np.int64),
+        fixed=np.append(grid.fixed, np.zeros(used, np.bool_))[kept],
+        lines=_lines_of(net, merged, kept),
+        deviation=None,
+        desired=None,
+    )
+    return closed, kept
+
+
+def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """Members of lines (K, 2) between the nodes kept, smaller first, sorted."""
+    pairs = set()
+    for v in np.flatnonzero((net.line[: net.used] != 0) & (net.degree[: net.used] > 0)).tolist():
+        for i, u in enumerate(net.ring[v, : net.degree[v]].tolist()):
+            if net.line[v] >> i & 1:
+                pairs.add(tuple(sorted(np.searchsorted(kept, merged[[v, u]]).tolist())))
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """What the improvement works on: the net, the scan below it, its boundary curves."""
+
+    net: Net
+    source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 new
+    surface: Surface
+    patches: np.ndarray  #: (C, PATCH) local surface of each node
+    fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
+    rim: Rim
+    length: float  #: desired member length, that of the length field's 1 [scan unit]
+    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before and over closed holes [scan unit]
+    sharp: np.ndarray  #: (N,) bool for each curve of the rim, whether it is a ridge, which the local surface rounds off
+
+    @classmethod
+    def from_grid(
+        cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float, lines: Lines = NO_LINES
+    ) -> Relief:
+        """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
+
+        Boundary nodes and those of lines slide along the nearest curve; corners, ends and meetings of lines and nodes far from
+        every curve stay at rest.
+
+        Parameters
+        ----------
+        grid : Grid
+        surface : Surface
+        rim : Rim
+        corners : (K, 3) float64 corners of the boundary [scan unit]
+        length : desired member length [scan unit]
+        lines : the lines that the grid was made with
+        """
+        net, source = open_net(grid)
+        rim = Rim(*(np.ascontiguousarray(array) for array in rim))
+        fixed = np.zeros(len(net.degree), np.bool_)
+        fixed[: len(grid.fixed)] = grid.fixed
+        point_location.seat_on_rim(net, rim, np.ascontiguousarray(corners).reshape(-1, 3), fixed, length)
+        sharp = np.zeros(len(rim.total), np.bool_)
+        if len(lines.curves):
+            find_on_lines(net, lines, len(rim.total), fixed, length)
+            rim, sharp = joined(rim, lines.rim), np.concatenate([sharp, lines.sharp])
+        patches = np.zeros((len(net.degree), PATCH))
+        queue, seated = np.zeros((2, len(net.degree)), np.int64)
+        point_location.seat_nodes(net, surface, patches, length, queue, seated)
+        relief = cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan), sharp)
+        relief.renew(0.0)
+        return relief
+
+    def land(self, fine: Surface, middle: Surface, broad: Surface) -> None:
+        """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes and those of ridges stay."""
+        self.landed[:] = 0.0
+        stay = self.fixed | self._on_ridge()
+
+        def land_part(part: int, begin: int, end: int) -> None:
+            own = self._scratch(part)
+            narrow, wider, widest = (
+                each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle, broad)
+            )
+            land_nodes(self.net, narrow, wider, widest, self.patches, stay, self.landed, begin, end)
+
+        in_parts(self.net.used, PART // LANDINGS, land_part, LANDINGS)
+
+    @cached_property
+    def graded(self) -> bool:
+        """Whether the desired length differs from node to node."""
+        return is_graded(self.surface)
+
+    def _on_ridge(self) -> np.ndarray:
+        """Which nodes slide on a ridge or stand at an end of one, (C,) bool."""
+        net, stay = self.net, np.zeros(len(self.fixed), np.bool_)
+        if self.sharp.any():
+            sliding = (net.degree > 0) & (net.line != 0) & (net.kind == RIM)
+            stay[sliding] = self.sharp[net.curve[sliding]]
+            for v in np.flatnonzero(stay).tolist():
+                stay[[u for u in net.ring[v, : net.degree[v]].tolist() if kernels.is_line(net, v, u)]] = True
+        return stay
+
+    def tell_apart(self, measured: int) -> None:
+        """Forget the distance from the scan of nodes over closed holes, whose site is none of the first `measured`."""
+        self.landed[self.patches[:, 15] >= measured] = np.nan
+
+    def _scratch(self, part: int) -> Surface:
+        """The scan for one of several threads."""
+        if part not in self._scans:
+            self._scans[part] = self.surface if part == 0 else with_own_scratch(self.surface)
+        return self._scans[part]
+
+    @cached_property
+    def _scans(self) -> dict[int, Surface]:
+        return {}
+
+    def renew(self, near: float) -> None:
+        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; renew the lengths desired there."""
+
+        def renew_part(part: int, begin: int, end: int) -> None:
+            surface = self._scratch(part)
+            point_location.renew_patches(self.net, surface, self.patches, near * self.length, begin, end)
+            if self.graded:
+                point_location.renew_lengths(self.net, surface, self.patches, begin, end)
+
+        in_parts(self.net.used, PART, renew_part)
+
+    def return_to_scan(self, near: float) -> None:
+        """Bring the nodes back onto the scan and the boundary curves; patches no farther than `near` lengths."""
+        self.renew(near)
+        point_location.return_to_scan(self.net, self.patches, self.rim, 0.5 * self.length)
+
+    def deviation(self) -> np.ndarray:
+        """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
+        if not np.isnan(self.landed).all():
+            return self.landed
+        values = np.zeros(len(self.net.degree))
+        self.renew(0.05)
+        point_location.distances_from_scan(self.net, self.patches, values)
+        return values
+
+    def close(self, grid: Grid) -> Closed:
+        """Put the net together again and see what it is, with all else as in `grid`."""
+        closed, kept = join_again(self.net, self.source, grid.replace(fixed=self.fixed))
+        _ = closed.topology, closed.edge_triangles
+        return closed, kept
+
+    def to_grid(self, grid: Grid, closed: Closed | None = None) -> Grid:
+        """Put the net together again, with all else as in `grid`, or as it was `closed` already; deviation measured."""
+        deviation = self.deviation()
+        again, kept = closed or join_again(self.net, self.source, grid.replace(fixed=self.fixed))
+        desired = self.length * self.net.desired[kept] if self.graded else None
+        return again.replace(nodes=self.net.nodes[kept], deviation=deviation[kept], desired=desired)
+
+
+def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the node of each corner (3 T,) and the half-edge opposite to each half-edge (3 T,), -1 where there is none.
+
+    Half-edge 3 t + k runs from corner k of triangle t to the next. Two are partners only if they are the only ones on
+    their edge and run in opposite directions: the grid is cut along all other edges.
+    """
+    start = np.ascontiguousarray(triangles).reshape(-1).copy()
+    end = np.ascontiguousarray(triangles[:, [1, 2, 0]]).reshape(-1)
+    key = np.minimum(start, end) * count + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    new = np.ones(len(key), bool)
+    new[1:] = ordered[1:] != ordered[:-1]
+    first = np.flatnonzero(new)
+    pairs = first[np.diff(np.append(first, len(key))) == 2]
+    a, b = order[pairs], order[pairs + 1]
+    opposite = start[a] == end[b]
+    a, b = a[opposite & (start[a] != end[a])], b[opposite & (start[a] != end[a])]
+    partner = np.full(len(key), -1, np.int64)
+    partner[a], partner[b] = b, a
+    return start, partner

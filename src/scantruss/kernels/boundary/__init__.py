@@ -1,0 +1,1 @@
+"""Compiled loops of the boundary: points, loops and the smoothed curves."""

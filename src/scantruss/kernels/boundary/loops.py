@@ -1,0 +1,386 @@
+"""Boundary points and ordered boundary loops of a point cloud (Sec. 3.3).
+
+A disc is rolled along the edge of the sites in their tangent planes: it touches boundary sites one after the other, which gives
+ordered loops directly. Gaps narrower than the disc do not let it in. Then a disc is slid from outside against the points at each
+place of a loop: what it touches are the boundary points.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, search
+from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
+from ..surface.local_surface import Surface, flood, walk
+
+DIRECTIONS = 64
+BINS = 240
+OVER = 0.4  # sine of the angle over the mean plane of two places from which on they lie on two sheets
+APART = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
+FACING = 0.2  # sites whose normals have a smaller cosine are another sheet, or a plant
+
+
+@kernel
+def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, noise: float) -> tuple[float, float]:
+    """Direction of another place in the tangent plane, and its distance as if the surface were unrolled into the plane.
+
+    Heights over the plane below `noise` do not count: a rough scan is seen as a sheet.
+    """
+    d = subtract(other, place)
+    a, b = dot(d, u), dot(d, v)
+    h = max(abs(dot(d, normal)) - noise, 0.0)
+    return math.atan2(b, a), math.sqrt(a * a + b * b + h * h)
+
+
+@kernel
+def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
+    """Whether the directions to the neighbours of a site leave a gap wider than `widest` [rad]; False where there are none.
+
+    widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the site, each with a number that
+    grows as its angle does.
+    """
+    place, count = row(surface.mean, s), 0
+    for k in range(surface.neighbors.shape[1]):
+        n = surface.neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(surface.mean, n), place)
+            a, b = dot(d, u), dot(d, v)
+            if a == 0.0 and b == 0.0:
+                continue
+            turn = a / (abs(a) + abs(b))
+            turn = 1.0 - turn if b >= 0.0 else 3.0 + turn
+            at = count
+            while at > 0 and ahead[at - 1, 2] > turn:
+                for c in range(3):
+                    ahead[at, c] = ahead[at - 1, c]
+                at -= 1
+            ahead[at, 0], ahead[at, 1], ahead[at, 2] = a, b, turn
+            count += 1
+    if count == 0 or ahead[count - 1, 2] - ahead[0, 2] < 2.0:  # all to one side
+        return count > 0
+    limit = math.cos(widest)
+    for k in range(count):
+        a, b = ahead[k, 0], ahead[k, 1]
+        c, d = ahead[(k + 1) % count, 0], ahead[(k + 1) % count, 1]
+        along_it = a * c + b * d
+        if (
+            along_it <= 0.0
+            or a * d - b * c < 0.0
+            or along_it * along_it < limit * limit * (a * a + b * b) * (c * c + d * d)
+        ):
+            return True
+    return False
+
+
+@kernel
+def _block(
+    surface: Surface,
+    other: int,
+    place: Vector,
+    normal: Vector,
+    u: Vector,
+    v: Vector,
+    noise: float,
+    reach: float,
+    blocked: np.ndarray,
+) -> int:
+    """Mark the directions in which a disc `reach` wide that touches a place would hold another site; how many are new."""
+    if dot(row(surface.normals, other), normal) < FACING:
+        return 0
+    angle, distance = _polar(place, normal, u, v, row(surface.mean, other), noise)
+    new = 0
+    if 0.0 < distance < reach:
+        half = math.acos(distance / reach)
+        low = int(math.ceil((angle - half) * DIRECTIONS / (2.0 * math.pi)))
+        high = int(math.floor((angle + half) * DIRECTIONS / (2.0 * math.pi)))
+        for b in range(low, high + 1):
+            new += not blocked[b % DIRECTIONS]
+            blocked[b % DIRECTIONS] = True
+    return new
+
+
+@kernel
+def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
+    """For each site from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
+
+    Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
+    the middle of the widest free range, counted from `across(normal)`, less than a turn.
+    """
+    blocked = np.zeros(DIRECTIONS, np.bool_)
+    ahead = np.empty((surface.neighbors.shape[1], 3))
+    noise = 0.2 * surface.length
+    for s in range(begin, end):
+        free[s] = 9.0
+        normal, place = row(surface.normals, s), row(surface.mean, s)
+        u = across(normal)
+        v = cross(normal, u)
+        if not has_gap(surface, s, u, v, widest, ahead):
+            continue
+        blocked[:] = False
+        reach, left = 2.0 * radii[s], DIRECTIONS
+        for k in range(surface.neighbors.shape[1]):  # these are enough for most that are inside
+            n = surface.neighbors[s, k]
+            if n < 0 or left == 0:
+                break
+            d = subtract(row(surface.mean, n), place)
+            if dot(d, d) <= reach * reach:
+                left -= _block(surface, n, place, normal, u, v, noise, reach, blocked)
+        if left == 0:
+            continue
+        for i in range(1, flood(surface, s, place, reach)):
+            _block(surface, surface.queue[i], place, normal, u, v, noise, reach, blocked)
+        best, run = 0, 0
+        for b in range(2 * DIRECTIONS):
+            run = 0 if blocked[b % DIRECTIONS] else run + 1
+            if run > best and run <= DIRECTIONS:
+                best = run
+                free[s] = (b - 0.5 * (run - 1)) % DIRECTIONS * 2.0 * math.pi / DIRECTIONS
+
+
+@kernel
+def site_disc(surface: Surface, site: int, direction: float, radius: float) -> Vector:
+    """Centre of the disc that touches a site from its free direction."""
+    normal = row(surface.normals, site)
+    u = across(normal)
+    place = along(row(surface.mean, site), radius * math.cos(direction), u)
+    return along(place, radius * math.sin(direction), cross(normal, u))
+
+
+@kernel
+def _nearest_clear(cover: np.ndarray) -> int:
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS where there is none.
+
+    cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
+    """
+    for b in range(1, BINS):
+        cover[b] += cover[b - 1]
+    for b in range(BINS * 5 // 24):
+        if cover[b] == 0:
+            return b
+        if cover[BINS - 1 - b] == 0:
+            return -1 - b
+    return BINS
+
+
+@kernel
+def roll_disc(
+    surface: Surface,
+    site: int,
+    centre: Vector,
+    radii: np.ndarray,
+    path: np.ndarray,
+    seen: np.ndarray,
+    visit: np.ndarray,
+    banned: np.ndarray,
+) -> tuple[int, int]:
+    """Roll an empty disc along the boundary from a site that it touches, the surface to its left.
+
+    Parameters
+    ----------
+    radii : (S,) radius of the disc at each site
+    path : (M,) int64, filled with the touched sites
+    seen : (S,) int64, for each site the site that followed it on an earlier loop, -1: none
+    visit : (S,) int64 scratch, index in `path` of the last visit
+    banned : (S,) bool, sites that the disc does not feel
+
+    Returns
+    -------
+    first, last : path[first:last] is the loop; first = last where the disc fell off, came to an earlier loop or path is too short
+    """
+    path[0] = site
+    count, came_from = 1, -1
+    noise = 0.2 * surface.length
+    step = 2.0 * math.pi / BINS
+    cover = np.empty(BINS + 1, np.int64)
+    while count < len(path):
+        normal, place, radius = row(surface.normals, site), row(surface.mean, site), radii[site]
+        u = across(normal)
+        v = cross(normal, u)
+        d = subtract(centre, place)
+        phi = math.atan2(dot(d, v), dot(d, u))
+        found = flood(surface, site, place, 2.0 * radius)
+        cover[:] = 0
+        for i in range(1, found):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+                continue
+            angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
+            if distance < 2.0 * radius:
+                half = math.acos(distance / (2.0 * radius))
+                begin = min(int((angle - half - phi) % (2.0 * math.pi) / step), BINS - 1)  # -1e-17 % 2 pi is 2 pi
+                end = min(int((angle + half - phi) % (2.0 * math.pi) / step), BINS - 1) + 1
+                cover[begin] += 1
+                cover[end] -= 1
+                if end <= begin:
+                    cover[0] += 1
+        clear = _nearest_clear(cover)
+        phi += (clear + 0.5) * step if clear < BINS else 0.0
+        slack = 0.0 if clear < BINS else 0.35
+        least, to, to_angle = 1e300, -1, 0.0
+        for i in range(1, found):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+                continue
+            angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
+            if distance < 2.0 * radius:
+                touch = angle - math.acos(distance / (2.0 * radius))
+                turn = (touch - phi) % (2.0 * math.pi)
+                if turn > 2.0 * math.pi - slack and s != came_from:
+                    turn -= 2.0 * math.pi
+                if turn < least:
+                    least, to, to_angle = turn, s, touch
+        if to < 0:
+            return 0, 0
+        centre = along(along(place, radius * math.cos(to_angle), u), radius * math.sin(to_angle), v)
+        if seen[site] == to:
+            return 0, 0
+        i = visit[site]
+        if 0 <= i < count - 1 and path[i] == site and path[i + 1] == to:
+            return i, count - 1
+        visit[site] = count - 1
+        came_from = site
+        site = to
+        path[count] = site
+        count += 1
+    return 0, 0
+
+
+@kernel
+def come_nearer(surface: Surface, places: np.ndarray, sites: np.ndarray) -> None:
+    """Go from the site near each place (M,) on to the nearest one."""
+    for m in range(len(places)):
+        sites[m] = walk(surface, sites[m], row(places, m))
+
+
+@kernel
+def touch_points(
+    surface: Surface,
+    places: np.ndarray,
+    ahead: np.ndarray,
+    sites: np.ndarray,
+    radius: float,
+    touched: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """Slide a disc from outside against the points at each place of a loop from `begin` to `end` - 1.
+
+    Parameters
+    ----------
+    places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
+    sites : (M,) site near each place
+    touched : (M, 3) filled with the point that the disc touches first
+    """
+    noise = 0.35 * surface.length
+    for m in range(begin, end):
+        site, place = sites[m], row(places, m)
+        normal = row(surface.normals, site)
+        out = unit(cross(row(ahead, m), normal))
+        side = cross(normal, out)
+        touched[m, 0], touched[m, 1], touched[m, 2] = place
+        best = -1e300
+        count = flood(surface, site, row(surface.mean, site), radius + 2.0 * surface.radius)
+        for i in range(count):
+            s = surface.queue[i]
+            if dot(row(surface.normals, s), normal) < FACING:
+                continue
+            for p in range(surface.start[s], surface.start[s + 1]):
+                d = subtract(row(surface.points, p), place)
+                y, h = dot(d, side), dot(d, normal)
+                if abs(y) < radius and abs(h) < noise:
+                    x = dot(d, out)
+                    t = x + math.sqrt(radius * radius - y * y)
+                    if t > best + 1e-9 * radius:  # of two alike the first, whatever rounding says
+                        best = t
+                        touched[m, 0], touched[m, 1], touched[m, 2] = row(surface.points, p)
+
+
+@kernel
+def normals_along(surface: Surface, curve: np.ndarray, site: int, normals: np.ndarray) -> None:
+    """Normal of the scan at each place of a curve, from site to site on its sheet; `site` is near the first place."""
+    for m in range(len(curve)):
+        site = walk(surface, site, row(curve, m))
+        normals[m, 0], normals[m, 1], normals[m, 2] = row(surface.normals, site)
+
+
+@kernel
+def _beside(d: Vector, a: Vector, b: Vector) -> bool:
+    """Whether two places at a distance d with normals a and b may lie side by side on one sheet, not one over the other.
+
+    A bend lets the chord dip below the plane at one end and come up through that at the other: only their mean tells.
+    """
+    rise = dot(d, a) + dot(d, b)
+    facing = dot(a, b)
+    return facing > APART and rise * rise <= OVER * OVER * dot(d, d) * 2.0 * (1.0 + facing)
+
+
+@kernel
+def _longest_step(curve: np.ndarray) -> float:
+    """Longest distance from a place of a closed curve (M, 3) to the next."""
+    longest = 0.0
+    for i in range(len(curve)):
+        longest = max(longest, norm(subtract(row(curve, (i + 1) % len(curve)), row(curve, i))))
+    return longest
+
+
+@kernel
+def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int, high: int) -> tuple[int, int]:
+    """Two places of a closed curve nearer than `width` with the most steps between them, more than `low`, at most `high`.
+
+    Places one over the other, by the normals (M, 3) of the scan there, are on different sheets and do not count.
+
+    Returns
+    -------
+    at, gap : the first place and the steps to the second; gap 0 where there are none
+    """
+    count, longest = len(curve), _longest_step(curve)
+    at, gap = 0, 0
+    for i in range(count):
+        k = high
+        while k > max(low, gap):
+            j = (i + k) % count
+            d = subtract(row(curve, j), row(curve, i))
+            away = norm(d)
+            if away < width:
+                if _beside(d, row(normals, i), row(normals, j)):
+                    at, gap = i, k
+                    break
+                k -= 1
+            else:  # so many steps back it may be near enough
+                k -= max(1, int((away - width) / longest))
+    return at, gap
+
+
+@kernel
+def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
+    """Lower the values (M,) to the distance of each place of a closed curve (M, 3) to any more than `low` steps away along it."""
+    count, longest = len(curve), _longest_step(curve)
+    for i in range(count):
+        k = low + 1
+        while k < count - low:
+            away = norm(subtract(row(curve, (i + k) % count), row(curve, i)))
+            if away < room[i]:
+                room[i] = away
+            k += max(1, int((away - room[i]) / longest))  # so many steps on it may be nearer
+
+
+@kernel
+def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, site: int, radius: float) -> float:
+    """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
+
+    places : (M, 3) boundary points in order, the surface to their left. site : one near the first place.
+    """
+    found = np.empty(8, np.int64)
+    free, count = 0, len(places)
+    for m in range(count):
+        place = row(places, m)
+        site = walk(surface, site, place)
+        ahead = subtract(row(places, (m + 3) % count), row(places, (m - 3) % count))
+        out = unit(cross(ahead, row(surface.normals, site)))
+        centre = along(place, radius, out)
+        if search(boxes, surface.mean, centre[0], centre[1], centre[2], 0.6 * radius, found) == 0:
+            free += 1
+    return free / max(count, 1)

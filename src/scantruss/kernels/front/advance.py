@@ -1,0 +1,195 @@
+"""Choosing the triangle of a segment and driving the front (Sec. 3.4, 3.5, Fig. 4)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.triangles import quality, turned
+from ..geometry.vectors import Vector, along, norm, row, subtract
+from ..surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..surface.size_field import length_at
+from .cases import choose_by_case, far_from_front
+from .fits import fits, left_angle, near_nodes, right_angle
+from .front import (
+    ACTIVE,
+    DONE,
+    FIRST,
+    FULL,
+    LAST,
+    MORE,
+    NEAR,
+    NODES,
+    SEGMENTS,
+    TRIANGLES,
+    WAITING,
+    Front,
+    Rules,
+    add_node,
+    attach,
+    propose_node,
+    rules_at,
+)
+
+ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
+
+
+@kernel
+def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
+    """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    ab = subtract(pb, pa)
+    at_a = min(alpha / max(1.0, math.floor(alpha * 3.0 / math.pi + 0.5)), 1.3)
+    at_b = min(beta / max(1.0, math.floor(beta * 3.0 / math.pi + 0.5)), 1.3)
+    if alpha > 3.6:
+        at_a = math.pi / 3.0
+    if beta > 3.6:
+        at_b = math.pi / 3.0
+    from_a = along(pa, side, turned(ab, row(front.normals, a), at_a))
+    from_b = along(pb, side, turned((-ab[0], -ab[1], -ab[2]), row(front.normals, b), -at_b))
+    return 0.5 * (from_a[0] + from_b[0]), 0.5 * (from_a[1] + from_b[1]), 0.5 * (from_a[2] + from_b[2])
+
+
+@kernel
+def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
+    """Propose a node where a place falls onto the surface; False where the scan has no points there."""
+    site = front.site[front.tail[s]]
+    if fit_patch(surface, patch, site, place) < 3:
+        return False
+    foot = onto_patch(patch, place)
+    near = walk(surface, int(patch[15]), foot)
+    gap = norm(subtract(row(surface.mean, near), foot))
+    normal = patch_normal(patch, foot)
+    propose_node(front, foot, normal, near, False)
+    return gap < 0.9 * surface.length * surface.field[near]
+
+
+@kernel
+def choose_by_quality(
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray
+) -> bool:
+    """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
+    length, strict = rules.length, rules.strict
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    before, after = front.previous[s], front.next[s]
+    c, d = front.tail[before], front.head[after]
+    near = near_nodes(surface, front, s, (2.4 + 0.8 * (1.0 - strict)) * length, length, found)
+    alpha, beta = left_angle(front, s), right_angle(front, s)
+    segment = norm(subtract(pb, pa))
+    side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
+    place = ideal_point(front, s, alpha, beta, side)
+    widest = 2.2 + 0.7 * (1.0 - strict)
+    around = (0.75 + 0.9 * (1.0 - strict)) * length
+    room = (0.4 + 0.6 * strict) * rules.nearness * length * 1.1
+    score = np.full(near + 1, -1.0)
+    for i in range(near):
+        q = found[i]
+        if front.out[q] < 0 and front.corner[q] >= 0:
+            continue
+        pq = row(front.nodes, q)
+        value = quality(pa, pb, pq, side, rules.shape_weight, rules.size_weight)
+        if q in (c, d):
+            if (q == c and alpha < widest) or (q == d and beta < widest):
+                score[i] = value
+        elif norm(subtract(pq, place)) < around:
+            if front.out[q] >= 0:
+                score[i] = 0.9 * value
+            elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
+                score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
+    enough = ENOUGH * (rules.shape_weight + rules.size_weight)
+    proposed = False
+    while True:
+        best = -1
+        for i in range(near + 1):
+            if score[i] > 0.0 and (best < 0 or score[i] > score[best]):
+                best = i
+        if not proposed and (best < 0 or score[best] < enough):
+            proposed = True
+            if propose_on_surface(surface, front, s, place, patch):
+                pp = row(front.nodes, front.count[NODES])
+                if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
+                    score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
+            continue
+        if best < 0 or score[best] < 0.5 * strict:
+            return False
+        p = found[best] if best < near else front.count[NODES]
+        good, passage = fits(front, s, p, found, near, length, strict)
+        if good:
+            if best == near:
+                add_node(front)
+            attach(front, s, p, passage)
+            return True
+        score[best] = -1.0
+
+
+@kernel
+def has_room(front: Front) -> bool:
+    """Whether the arrays hold what advancing one segment may add."""
+    return (
+        front.count[NODES] + 2 <= len(front.nodes)
+        and front.count[SEGMENTS] + 4 <= len(front.tail)
+        and front.count[TRIANGLES] + 3 <= len(front.triangles)
+        and front.count[LAST] - front.count[FIRST] + 4 <= len(front.queue)
+    )
+
+
+@kernel
+def take_segment(front: Front) -> int:
+    """Next active segment of the queue, -1 where it is empty."""
+    while front.count[FIRST] < front.count[LAST]:
+        s = front.queue[front.count[FIRST] % len(front.queue)]
+        front.count[FIRST] += 1
+        if front.state[s] == ACTIVE:
+            return s
+    return -1
+
+
+@kernel
+def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Rules:
+    """The rules with the length that is desired where the triangle of a segment will lie."""
+    if not rules.graded:
+        return rules
+    a, b = front.tail[s], front.head[s]
+    pa, pb = row(front.nodes, a), row(front.nodes, b)
+    ab = subtract(pb, pa)
+    height = 0.4 * rules.desired * surface.field[front.site[a]]
+    place = along(along(pa, 0.5, ab), height, turned(ab, row(front.normals, a), 0.5 * math.pi))
+    return rules_at(rules, rules.desired * length_at(surface, front.site[a], place))
+
+
+@kernel
+def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
+    """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
+    found = np.empty(NEAR, np.int64)
+    patch = np.zeros(PATCH)
+    for _ in range(budget):
+        if not has_room(front):
+            return FULL
+        s = take_segment(front)
+        if s < 0:
+            return DONE
+        own = rules_of_segment(surface, front, s, rules)
+        if not choose_by_quality(surface, front, s, own, found, patch):
+            front.state[s] = WAITING
+    return MORE
+
+
+@kernel
+def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
+    """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
+    found = np.empty(NEAR, np.int64)
+    patch = np.zeros(PATCH)
+    for _ in range(budget):
+        if not has_room(front):
+            return FULL
+        s = take_segment(front)
+        if s < 0:
+            return DONE
+        own = rules_of_segment(surface, front, s, rules)
+        if not choose_by_case(surface, front, s, own, found, patch):
+            front.state[s] = WAITING
+    return MORE

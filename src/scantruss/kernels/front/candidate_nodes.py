@@ -1,0 +1,64 @@
+"""Nodes that are there before the front starts: those it starts from, and others offered to it, which it comes to as to its own."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import search
+from ..geometry.triangles import distance_to_segment
+from ..geometry.vectors import dot, norm, row, subtract
+from ..mesh.point_location import nearest_site
+from ..surface.local_surface import PATCH, Surface, fit_patch, patch_normal, walk
+from .front import NEAR, NODES, Front, add_node, propose_node
+
+
+class RowNodes(NamedTuple):
+    """Nodes of the rows that the scan is laid out in, for the front to come to."""
+
+    places: np.ndarray  #: (K, 3)
+    normals: np.ndarray  #: (K, 3) outer normals of the surface there
+    sites: np.ndarray  #: (K,) int64 a site near each
+    length: float
+
+
+@kernel
+def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
+    """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
+    patch = np.zeros(PATCH)
+    first, site = front.count[NODES], -1
+    for i in range(len(nodes)):
+        place = row(nodes, i)
+        if site >= 0:
+            site = walk(surface, site, place)
+        if site < 0 or norm(subtract(row(surface.mean, site), place)) > 2.0 * surface.step:
+            site = nearest_site(surface, place[0], place[1], place[2])
+        fit_patch(surface, patch, site, place)
+        propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)
+        add_node(front)
+    return first
+
+
+@kernel
+def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) -> None:
+    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
+    found = np.empty(NEAR, np.int64)
+    begun = front.count[NODES]
+    for i in range(len(rows.places)):
+        place, normal = row(rows.places, i), row(rows.normals, i)
+        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
+        room = True
+        for k in range(near):
+            q = found[k]
+            if q < begun and dot(normal, row(front.normals, q)) > 0.0:
+                room = room and norm(subtract(place, row(front.nodes, q))) > clear
+                s = front.out[q]
+                while s >= 0:
+                    away = distance_to_segment(place, row(front.nodes, q), row(front.nodes, front.head[s]))
+                    room = room and away > clear
+                    s = front.out_next[s]
+        if room:
+            propose_node(front, place, normal, walk(surface, rows.sites[i], place), False)
+            add_node(front)

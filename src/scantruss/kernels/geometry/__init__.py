@@ -1,0 +1,1 @@
+"""Compiled geometry: vectors, triangles, search boxes and the k-d tree."""

@@ -1,0 +1,134 @@
+"""Search boxes and look-up in them (Sec. 3.2, Eqs. 2-4).
+
+Only occupied boxes are kept, in a hash table from the number of the box to its first item; the items of a box are chained.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runtime.jit import kernel
+
+
+class SearchBoxes(NamedTuple):
+    """Items (points, sites or nodes) by box."""
+
+    lower: np.ndarray  #: (3,) float64 lower bounds
+    size: np.ndarray  #: (3,) float64, D of Eq. 3
+    inverse: np.ndarray  #: (3,) float64, 1 / D: a product takes a fraction of the time of a quotient
+    counts: np.ndarray  #: (3,) int64, N of Eq. 2
+    keys: np.ndarray  #: (H,) int64 number of the box in each slot, -1 free; H is a power of two
+    first: np.ndarray  #: (H,) int64 first item of the box
+    next: np.ndarray  #: (capacity,) int64 next item of the same box, -1 at the end
+
+
+def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, slots: int) -> SearchBoxes:
+    """Return empty search boxes no larger than `box` [scan unit], unless that makes more than 100,000 along an axis.
+
+    Eq. 3 divides by N - 1, zero for a scan thinner than one box, and lets D grow to nearly 2 d_B; here N - 1 is rounded up, so
+    that d_B / 2 < D <= d_B, and a thin direction has one box.
+    """
+    extent = np.asarray(upper, float) - lower
+    parts = np.minimum(np.maximum(np.ceil(extent / box), 1), 100_000).astype(np.int64)
+    size = np.where(extent > 0.5 * box, extent / parts, box)
+    table = 1 << max(int(2 * slots - 1).bit_length(), 4)
+    return SearchBoxes(
+        np.array(lower, float),
+        size,
+        1.0 / size,
+        parts + 1,
+        np.full(table, -1, np.int64),
+        np.full(table, -1, np.int64),
+        np.full(capacity, -1, np.int64),
+    )
+
+
+@kernel
+def box_index(boxes: SearchBoxes, axis: int, x: float) -> int:
+    """Eq. 4, counted from 0; places outside the bounds belong to the outermost box."""
+    i = int((x - boxes.lower[axis]) * boxes.inverse[axis])
+    return min(max(i, 0), boxes.counts[axis] - 1)
+
+
+@kernel
+def slot_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
+    """Slot of a box in the table: where it is, or the free slot where it would go."""
+    key = (i * boxes.counts[1] + j) * boxes.counts[2] + k
+    mask = len(boxes.keys) - 1
+    mixed = key * 613  # at most 1e15 boxes: no overflow
+    slot = (mixed ^ (mixed >> 17)) & mask
+    while boxes.keys[slot] != key and boxes.keys[slot] != -1:
+        slot = (slot + 1) & mask
+    return slot
+
+
+@kernel
+def put_into(boxes: SearchBoxes, item: int, i: int, j: int, k: int) -> int:
+    """Put an item into a box; returns 1 when that box was new."""
+    slot = slot_of(boxes, i, j, k)
+    new = 0
+    if boxes.keys[slot] == -1:
+        boxes.keys[slot] = (i * boxes.counts[1] + j) * boxes.counts[2] + k
+        new = 1
+    boxes.next[item] = boxes.first[slot]
+    boxes.first[slot] = item
+    return new
+
+
+@kernel
+def put(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> int:
+    """Put an item into the box of a place; returns 1 when that box was new."""
+    return put_into(boxes, item, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
+
+
+@kernel
+def take(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> None:
+    """Take an item out of its box; x, y, z as it was put in."""
+    slot = slot_of(boxes, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
+    at = boxes.first[slot]
+    if at == item:
+        boxes.first[slot] = boxes.next[item]
+        return
+    while at >= 0:
+        if boxes.next[at] == item:
+            boxes.next[at] = boxes.next[item]
+            return
+        at = boxes.next[at]
+
+
+@kernel
+def search(
+    boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float, found: np.ndarray
+) -> int:
+    """Items within `reach` of a place, into `found`; returns their number (at most len(found))."""
+    count = 0
+    for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                item = boxes.first[slot_of(boxes, i, j, k)]
+                while item >= 0:
+                    dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
+                    if dx * dx + dy * dy + dz * dz <= reach * reach and count < len(found):
+                        found[count] = item
+                        count += 1
+                    item = boxes.next[item]
+    return count
+
+
+@kernel
+def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float) -> int:
+    """The item nearest to x, y, z within `reach`, the first of equals; -1 where there is none."""
+    best, least = -1, reach * reach
+    for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                item = boxes.first[slot_of(boxes, i, j, k)]
+                while item >= 0:
+                    dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
+                    dd = dx * dx + dy * dy + dz * dz
+                    if dd < least or (dd == least and item < best):
+                        best, least = item, dd
+                    item = boxes.next[item]
+    return best

@@ -1,0 +1,155 @@
+"""Equalizing: nodes move on the scanned surface until the energy of members and triangles is least.
+
+The energy is E = weight * sum (L / l_0 - 1)^2 over the members + sum (1 - G) over the triangles, G negative where a triangle is
+turned over; l_0 is the mean of the lengths desired at both nodes of a member. Its first part is springs, its second is Laplace: for
+a fixed opposite side, G grows towards the middle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..boundary.curves import Rim, slide
+from ..surface.local_surface import onto_patch
+from .grid import INTERIOR, REST, RIM, Net
+
+ROOT = 4.0 * math.sqrt(3.0)
+STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes move together
+LEASH = 0.8  # farther from its middle a patch says nothing of the surface, in lengths
+
+
+@kernel
+def star_energy(
+    net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float, slope: bool
+) -> tuple[float, float, float, float]:
+    """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient, which takes time, if asked for.
+
+    A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
+    """
+    nodes = net.nodes
+    gx = gy = gz = energy = 0.0  # of the members
+    sx = sy = sz = shape = 0.0  # of the triangles
+    nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
+    d, half = net.degree[v], 0.5 * length
+    own = half * net.desired[v]
+    w = net.ring[v, d - 1]
+    cx, cy, cz = nodes[w, 0] - x, nodes[w, 1] - y, nodes[w, 2] - z
+    cc = cx * cx + cy * cy + cz * cz
+    for i in range(d):
+        bx, by, bz, bb = cx, cy, cz, cc  # to the neighbour before
+        w = net.ring[v, i]
+        cx, cy, cz = nodes[w, 0] - x, nodes[w, 1] - y, nodes[w, 2] - z
+        cc = cx * cx + cy * cy + cz * cz
+        size = math.sqrt(cc)
+        if size > 0.0:
+            target = own + half * net.desired[w]
+            stretch = size / target - 1.0
+            energy += weight * stretch * stretch
+            if slope:
+                f = 2.0 * weight * stretch / (target * size)
+                gx, gy, gz = gx - f * cx, gy - f * cy, gz - f * cz
+        if i == 0 and net.is_open[v] == 1:
+            continue
+        energy += 1.0
+        ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx  # twice the area, as a vector
+        ex, ey, ez = cx - bx, cy - by, cz - bz
+        squares = bb + cc + ex * ex + ey * ey + ez * ez
+        doubled = math.sqrt(ux * ux + uy * uy + uz * uz)
+        if squares <= 0.0 or doubled <= 1e-12 * squares:
+            continue
+        f = 0.5 * ROOT / (doubled * squares)
+        if ux * nx + uy * ny + uz * nz < 0.0:
+            f = -f
+        g = f * doubled * doubled
+        shape += g
+        if slope:
+            h = 2.0 * g / squares
+            # the doubled area falls along e x u / |u|, the squares grow along -2 (b + c)
+            sx += h * (bx + cx) - f * (ey * uz - ez * uy)
+            sy += h * (by + cy) - f * (ez * ux - ex * uz)
+            sz += h * (bz + cz) - f * (ex * uy - ey * ux)
+    side = 1.0 if shape >= 0.0 else -1.0
+    return energy - side * shape, gx - side * sx, gy - side * sy, gz - side * sz
+
+
+@kernel
+def settle_node(
+    net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float, stride: float
+) -> float:
+    """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
+
+    Steps shorter than `still`, where members are to have the length, are not made.
+    """
+    kind = net.kind[v]
+    if kind >= REST or net.degree[v] == 0:
+        return 0.0
+    x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
+    before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
+    if kind == INTERIOR:
+        nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
+        across = gx * nx + gy * ny + gz * nz
+        gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
+    local = length * net.desired[v]
+    step = stride * local * local / (net.degree[v] * (weight + 1.3))
+    most = 0.3 * local
+    size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
+    if size < still * net.desired[v]:
+        return 0.0
+    if size > most:
+        step *= most / size
+    arc = net.arc[v]
+    for _ in range(2):
+        place = (x - step * gx, y - step * gy, z - step * gz)
+        if kind == RIM:
+            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
+        else:
+            px, py, pz = onto_patch(patches[v], place)
+            dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
+            if dx * dx + dy * dy + dz * dz > LEASH * LEASH * local * local:
+                step *= 0.3
+                continue
+        after = star_energy(net, patches, v, px, py, pz, length, weight, False)[0]
+        if after < before:
+            net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
+            net.arc[v] = arc
+            return before - after
+        step *= 0.3
+    return 0.0
+
+
+@kernel
+def settle_some(
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    awake: np.ndarray,
+    some: np.ndarray,
+    length: float,
+    weight: float,
+    enough: float,
+    sweeps: int,
+    stride: float,
+) -> tuple[float, int]:
+    """Settle some nodes (K,) again and again until a sweep gains less than `enough` a node; returns the last gain and the sweeps.
+
+    `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.
+    """
+    gain = 0.0
+    for sweep in range(sweeps):
+        gain = 0.0
+        for k in range(len(some)):
+            v = some[k]
+            if awake[v] == 1:
+                awake[v] = 0
+                gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length, stride)
+                gain += gained
+                if gained > 0.1 * enough:
+                    awake[v] = 1
+                    for i in range(net.degree[v]):
+                        awake[net.ring[v, i]] = 1
+        if gain < enough * len(some):
+            return gain, sweep + 1
+    return gain, sweeps

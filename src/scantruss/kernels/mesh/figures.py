@@ -1,0 +1,61 @@
+"""Figures of a grid that are taken triangle by triangle, or link by link."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
+
+
+@kernel
+def _angle_between(u: Vector, w: Vector) -> float:
+    """Angle between two vectors [degree]; 0 where one has no length."""
+    return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w) + 0.0))  # of -0 and 0 it would be 180
+
+
+@kernel
+def angles_of(nodes: np.ndarray, triangles: np.ndarray, angles: np.ndarray) -> None:
+    """Angle of each triangle (T, 3) at each of its nodes, into (T, 3) [degree]."""
+    for t in range(len(triangles)):
+        for k in range(3):
+            corner = row(nodes, triangles[t, k])
+            to = subtract(row(nodes, triangles[t, (k + 1) % 3]), corner)
+            angles[t, k] = _angle_between(to, subtract(row(nodes, triangles[t, (k + 2) % 3]), corner))
+
+
+@kernel
+def _normal_of(nodes: np.ndarray, triangles: np.ndarray, t: int) -> Vector:
+    a = row(nodes, triangles[t, 0])
+    return cross(subtract(row(nodes, triangles[t, 1]), a), subtract(row(nodes, triangles[t, 2]), a))
+
+
+@kernel
+def folds_of(nodes: np.ndarray, triangles: np.ndarray, two: np.ndarray, angles: np.ndarray) -> None:
+    """Angle between the two triangles (E, 2) at each member, into (E,) [degree]: 180 level, 0 folded flat; NaN where there is one."""
+    for e in range(len(two)):
+        angles[e] = math.nan
+        if two[e, 1] >= 0:
+            first = _normal_of(nodes, triangles, two[e, 0])
+            angles[e] = 180.0 - _angle_between(first, _normal_of(nodes, triangles, two[e, 1]))
+
+
+@kernel
+def _lowest(label: np.ndarray, thing: int) -> int:
+    """The lowest thing known to be joined with a thing; the way there is shortened."""
+    while label[thing] != thing:
+        label[thing] = label[label[thing]]
+        thing = label[thing]
+    return thing
+
+
+@kernel
+def join(label: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
+    """Let each of the things labelled 0, 1, 2... get the lowest that the links first-second join it with (union and find)."""
+    for i in range(len(first)):
+        a, b = _lowest(label, first[i]), _lowest(label, second[i])
+        label[max(a, b)] = min(a, b)
+    for thing in range(len(label)):
+        label[thing] = label[label[thing]]

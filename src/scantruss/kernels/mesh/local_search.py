@@ -1,0 +1,293 @@
+"""Local search of the topology: flip, collapse, split, settle the nodes around, keep what lowers the energy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..boundary.curves import Rim, at_arc
+from ..geometry.vectors import cross, dot, norm, row, subtract
+from .equalize import STRIDE, settle_node
+from .grid import (
+    RIM,
+    Net,
+    collapse,
+    flip,
+    may_collapse,
+    may_flip,
+    may_split,
+    slides_on_line,
+    split,
+    target_length,
+    wings,
+)
+from .lines import arc_on_line, halfway
+from .trial import Scratch, gather, local_energy, may_change, put_back
+
+FLIP, COLLAPSE, SPLIT = 0, 1, 2
+TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
+SWEEPS = 2
+EARLY = (0.35, 1.2, 2.0)  # growth of the energy that may still turn out well, once the quadrangle has settled ...
+HOPE = (0.06, 0.3, 0.5)  # ... and once all nodes around have; for a flip, collapse, split
+STRAINED = 0.15  # a member that is longer or shorter by this asks for a move
+SHORT, LONG = 1.05, 1.1  # members shorter are not split, longer are not collapsed, in lengths
+STILL = 0.005  # shorter steps are not made in trials, in lengths
+TIDIED = 6  # growth beyond that which flips around may take back
+FLIPS = 4  # most of these flips
+
+
+@kernel
+def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
+    """Put node v halfway between a and b: along their curve if it is on the rim."""
+    if slides_on_line(net, v):
+        first = arc_on_line(net, rim, v, a, b)
+        middle = halfway(rim, net.curve[v], first, arc_on_line(net, rim, v, b, a))
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.curve[v], middle)
+    elif net.kind[v] == RIM:
+        total = rim.total[net.curve[v]]
+        ahead = (net.arc[b] - net.arc[a]) % total if total > 0.0 else 0.0
+        if ahead > 0.5 * total:
+            ahead -= total
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(
+            rim, net.curve[v], net.arc[a] + 0.5 * ahead
+        )
+    else:
+        for c in range(3):
+            net.nodes[v, c] = 0.5 * (net.nodes[a, c] + net.nodes[b, c])
+
+
+@kernel
+def disorder(net: Net, move: int, a: int, b: int) -> int:
+    """By how much a move at the edge a-b changes the sum of squared differences between neighbours and ideal."""
+    right, left = wings(net, a, b)
+    rim = right < 0 or left < 0
+    da, db = net.degree[a] - net.ideal[a], net.degree[b] - net.ideal[b]
+    change = 0
+    if move == FLIP:
+        change = 2 - 2 * da - 2 * db
+    elif move == COLLAPSE:
+        merged = net.degree[a] + net.degree[b] - (3 if rim else 4) - net.ideal[a]
+        change = merged * merged - da * da - db * db
+    else:
+        change = 1 if rim else 4
+    for v in (right, left):
+        if v >= 0:
+            d = net.degree[v] - net.ideal[v]
+            change += 1 - 2 * d if move == COLLAPSE else 1 + 2 * d
+    return change
+
+
+@kernel
+def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
+    """Flip edges at the first `seeds` nodes of the neighbourhood while that lessens the disorder; returns the change of it."""
+    stamp, total = scratch.trial[0], 0
+    for _ in range(FLIPS):
+        best, a, b = 0, scratch.around[0], scratch.around[0]
+        for k in range(seeds):
+            v = scratch.around[k]
+            d = net.degree[v]
+            for i in range(d):
+                if net.is_open[v] == 1 and (i == 0 or i == d - 1):
+                    continue
+                u, right, left = net.ring[v, i], net.ring[v, (i + d - 1) % d], net.ring[v, (i + 1) % d]
+                if scratch.held[u] == stamp and scratch.held[right] == stamp and scratch.held[left] == stamp:
+                    change = 4 - 2 * (d - net.ideal[v] + net.degree[u] - net.ideal[u])
+                    change += 2 * (net.degree[right] - net.ideal[right] + net.degree[left] - net.ideal[left])
+                    if change < best and may_flip(net, v, u):
+                        best, a, b = change, v, u
+        if best == 0:
+            break
+        flip(net, a, b)
+        total += best
+    return total
+
+
+@kernel
+def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int) -> int:
+    """Make a move at the edge a-b; returns the node that a split adds, else -1."""
+    if move == FLIP:
+        flip(net, a, b)
+        return -1
+    if move == COLLAPSE:
+        if net.kind[a] == net.kind[b]:
+            place_between(net, rim, a, a, b)
+        collapse(net, a, b)
+        return -1
+    added = split(net, a, b)
+    for c in range(patches.shape[1]):
+        patches[added, c] = patches[a, c]
+    place_between(net, rim, added, a, b)
+    net.ideal[added] = 4 if net.is_open[added] == 1 else 6
+    scratch.held[added] = scratch.trial[0]
+    scratch.around[scratch.gathered[0]] = added
+    scratch.gathered[0] += 1
+    return added
+
+
+@kernel
+def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
+    """Put all around back as it was before a move."""
+    if added >= 0:
+        scratch.held[added] = 0
+        scratch.gathered[0] -= 1
+        net.degree[added] = 0
+        net.spare[0] += 1
+    elif move == COLLAPSE:
+        net.spare[0] -= 1
+    put_back(net, scratch)
+
+
+@kernel
+def try_move(
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    scratch: Scratch,
+    move: int,
+    a: int,
+    b: int,
+    length: float,
+    weight: float,
+    worth: float,
+) -> bool:
+    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
+
+    `worth` is what one more node may cost. Moves that leave the numbers of neighbours farther from the ideal hardly ever pay and
+    are not made; those that flips around can make good are.
+    """
+    change = disorder(net, move, a, b)
+    tidied = move != FLIP and change > 0
+    if change > TOLERATED[move] + (TIDIED if tidied else 0):
+        return False
+    gather(net, scratch, a, b)
+    before = after = 0.0
+    rehearse = change > TOLERATED[move]  # whether flips make it good is seen before anything is settled
+    for turn in range(2):
+        if turn == 1 or not rehearse:
+            before = local_energy(net, scratch, length, weight)
+            before += worth if move == SPLIT else (-worth if move == COLLAPSE else 0.0)
+        added = make_move(net, patches, rim, scratch, move, a, b)
+        if tidied:
+            change += tidy(net, scratch, 4)
+        if turn == 0 and rehearse:
+            undo_move(net, scratch, move, added)
+            if change > TOLERATED[move]:
+                return False
+            continue
+        break
+    for turn in range(1 + SWEEPS):
+        for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
+            settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length, STRIDE)
+        if turn == 0 and added >= 0:
+            settle_node(net, patches, rim, added, length, weight, STILL * length, STRIDE)
+        after = local_energy(net, scratch, length, weight)
+        if after > before + (EARLY[move] if turn == 0 else HOPE[move]):
+            break
+    if after < before - 1e-4:
+        for i in range(scratch.gathered[0]):
+            scratch.tried[scratch.around[i]] = 0
+        scratch.paid[0] += 1
+        return True
+    undo_move(net, scratch, move, added)
+    return False
+
+
+@kernel
+def is_regular(net: Net, v: int, length: float) -> bool:
+    """Whether nothing about node v asks for a move: neighbours as ideal, members near their length."""
+    if net.degree[v] != net.ideal[v]:
+        return False
+    for i in range(net.degree[v]):
+        w = net.ring[v, i]
+        size = norm(subtract(row(net.nodes, w), row(net.nodes, v)))
+        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED:
+            return False
+    return True
+
+
+@kernel
+def is_allowed(net: Net, move: int, a: int, b: int) -> bool:
+    """Whether a move at the edge a-b keeps the topology."""
+    if move == FLIP:
+        return may_flip(net, a, b)
+    if move == COLLAPSE:
+        return may_collapse(net, a, b)
+    return may_split(net, a, b)
+
+
+@kernel
+def search(
+    net: Net,
+    patches: np.ndarray,
+    rim: Rim,
+    scratch: Scratch,
+    length: float,
+    weight: float,
+    strain: float,
+    price: float,
+    share: float,
+    count: int,
+) -> int:
+    """One round over all nodes that ask for a move; returns how many moves were kept.
+
+    Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`
+    is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added; V is `count`, the nodes within bounds. The
+    `share` of energy that any node has does not count, or nodes would be taken away for being nodes.
+    """
+    kept, free = scratch.paid[0], net.spare[0]
+    for v in range(net.in_use[0]):
+        i, left = 0, scratch.out[v] == 1
+        if left:
+            continue
+        while i < 4 * net.degree[v] and scratch.paid[0] - kept < count:
+            u, way = net.ring[v, i // 4], i % 4  # flip, draw u into v, draw v into u, split
+            if i == 0 and scratch.tried[v] == 1:
+                break
+            if way == 0:
+                asked = v if i == 0 else u
+                regular = is_regular(net, asked, length)
+                if i == 0 and regular:
+                    break
+                if asked == u and scratch.tried[u] == 1 and not regular:
+                    i += 4  # this edge was tried from its other end
+                    continue
+            scratch.tried[v] = 1
+            i += 1
+            move, a, b = (way + 1) // 2, v, u
+            if way == 2:
+                if net.kind[u] == net.kind[v]:
+                    continue  # both would come to the middle
+                a, b = u, v
+            if not is_allowed(net, move, a, b):
+                continue
+            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
+            if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
+                continue
+            if not may_change(net, scratch, a, b):
+                left = True  # for those who may
+                continue
+            half = 0.5 if move == SPLIT else -0.5
+            worth = share + price * (strain - 0.5 * (free - net.spare[0] + half) / count)
+            if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
+                i = 0
+        if left:
+            scratch.tried[v] = 0
+    return scratch.paid[0] - kept
+
+
+@kernel
+def suit_nodes(net: Net) -> None:
+    """Fill in how many neighbours suit each node: 6 inside, on the boundary as many as its angle has room for."""
+    for v in range(len(net.arc)):
+        net.ideal[v] = 6
+        if net.degree[v] > 0 and net.is_open[v] == 1:
+            angle = 0.0
+            for i in range(net.degree[v] - 1):
+                p = subtract(row(net.nodes, net.ring[v, i]), row(net.nodes, v))
+                q = subtract(row(net.nodes, net.ring[v, i + 1]), row(net.nodes, v))
+                n, d = norm(cross(p, q)), dot(p, q)
+                if n > 0.0 or d != 0.0:
+                    angle += math.atan2(n, d)
+            net.ideal[v] = max(2, int(math.floor(3.0 * angle / math.pi + 0.5)) + 1)

@@ -1,0 +1,80 @@
+"""Which part of a scan belongs to which node of a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, search
+from ..geometry.vectors import dot, row, subtract
+from ..surface.local_surface import Surface, flood
+
+
+@kernel
+def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach: float, nearest: np.ndarray) -> None:
+    """The node (V, 3) nearest to each site among those within `reach` on its own sheet, going over the links; -1 where there is none.
+
+    boxes : of the sites. nearest : (S,) int64, filled.
+    """
+    nearest[:] = -1
+    distance = np.empty(len(nearest))
+    found = np.empty(512, np.int64)
+    for v in range(len(nodes)):
+        place = row(nodes, v)
+        near, least = -1, 1e300
+        for i in range(search(boxes, surface.mean, place[0], place[1], place[2], 0.5 * reach, found)):
+            d = subtract(row(surface.mean, found[i]), place)
+            dd = dot(d, d)
+            if dd < least or (dd == least and found[i] < near):
+                near, least = found[i], dd
+        if near >= 0:
+            for i in range(flood(surface, near, place, reach)):
+                s = surface.queue[i]
+                d = subtract(row(surface.mean, s), place)
+                dd = dot(d, d)
+                if nearest[s] < 0 or dd < distance[s]:
+                    nearest[s], distance[s] = v, dd
+
+
+@kernel
+def first_torn(
+    links: np.ndarray, nearest: np.ndarray, first: np.ndarray, ends: np.ndarray, most: int, enough: int
+) -> int:
+    """The first site whose node is far in the grid from that of a site linked to it; -1 where there are fewer than `enough` such links.
+
+    Parameters
+    ----------
+    links : (S, K) int64, linked sites, -1 for none
+    nearest : (S,) int64, node of each site, -1 for none
+    first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of each node's members
+    most : members one after the other that still lead from node to node
+    """
+    stamp, queue = np.full(len(first) - 1, -1, np.int64), np.empty(len(first) - 1, np.int64)
+    torn, site, number = 0, -1, 0
+    for s in range(len(nearest)):
+        a = nearest[s]
+        for k in range(links.shape[1] if a >= 0 else 0):
+            b = nearest[links[s, k]] if links[s, k] >= 0 else -1
+            if b <= a:
+                continue
+            number += 1
+            queue[0], stamp[a] = a, number
+            begin, end, found = 0, 1, False
+            for _ in range(most):
+                count = end
+                for i in range(begin, end):
+                    for j in range(first[queue[i]], first[queue[i] + 1]):
+                        u = ends[j]
+                        found = found or u == b
+                        if stamp[u] != number:
+                            stamp[u] = number
+                            queue[count] = u
+                            count += 1
+                begin, end = end, count
+                if found:
+                    break
+            if not found:
+                torn += 1
+                if site < 0:
+                    site = s
+    return site if torn >= enough else -1

@@ -1,0 +1,171 @@
+"""Trials: the nodes around an edge, what they were before, and the energy that a trial changes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
+from .equalize import ROOT
+from .grid import Net, target_length, wings
+
+
+class Scratch(NamedTuple):
+    """Room for one trial: what is around, and how it was before."""
+
+    held: np.ndarray  #: (C,) int64 number of the trial that holds the node
+    tried: np.ndarray  #: (C,) int64, 1 where nothing has changed since the node was tried
+    out: np.ndarray  #: (C,) int64, 1 where the node must not change
+    around: np.ndarray  #: (C,) int64 nodes that may move
+    nodes: np.ndarray  #: (C, 3) their places before
+    arc: np.ndarray  #: (C,) their arcs before
+    ring: np.ndarray  #: (C, W) int64 their rings before
+    degree: np.ndarray  #: (C,) int64 their numbers of neighbours before
+    line: np.ndarray  #: (C,) int64 their members along lines before
+    trial: np.ndarray  #: (1,) int64 number of the trial
+    gathered: np.ndarray  #: (1,) int64 how many nodes are around
+    paid: np.ndarray  #: (1,) int64 how many trials have paid
+
+
+@kernel
+def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
+    """List the nodes around the edge a-b: its quadrangle and all their neighbours, as they are now."""
+    scratch.trial[0] += 1
+    stamp = scratch.trial[0]
+    right, left = wings(net, a, b)
+    count = 0
+    for v in (a, b, right, left):
+        if v >= 0 and scratch.held[v] != stamp:
+            scratch.held[v] = stamp
+            scratch.around[count] = v
+            count += 1
+    for i in range(count):
+        v = scratch.around[i]
+        for j in range(net.degree[v]):
+            u = net.ring[v, j]
+            if scratch.held[u] != stamp:
+                scratch.held[u] = stamp
+                scratch.around[count] = u
+                count += 1
+    for i in range(count):
+        v = scratch.around[i]
+        scratch.nodes[i, 0], scratch.nodes[i, 1], scratch.nodes[i, 2] = (
+            net.nodes[v, 0],
+            net.nodes[v, 1],
+            net.nodes[v, 2],
+        )
+        scratch.arc[i] = net.arc[v]
+        scratch.degree[i], scratch.line[i] = net.degree[v], net.line[v]
+        for j in range(net.degree[v]):
+            scratch.ring[i, j] = net.ring[v, j]
+    scratch.gathered[0] = count
+
+
+@kernel
+def may_change(net: Net, scratch: Scratch, a: int, b: int) -> bool:
+    """Whether all that a trial at the edge a-b may change is within bounds."""
+    right, left = wings(net, a, b)
+    for v in (a, b, right, left):
+        if v >= 0:
+            if scratch.out[v] == 1:
+                return False
+            for i in range(net.degree[v]):
+                if scratch.out[net.ring[v, i]] == 1:
+                    return False
+    return True
+
+
+@kernel
+def put_back(net: Net, scratch: Scratch) -> None:
+    """Undo a trial: all around as it was."""
+    for i in range(scratch.gathered[0]):
+        v = scratch.around[i]
+        for c in range(3):
+            net.nodes[v, c] = scratch.nodes[i, c]
+        net.arc[v] = scratch.arc[i]
+        net.degree[v], net.line[v] = scratch.degree[i], scratch.line[i]
+        for j in range(scratch.degree[i]):
+            net.ring[v, j] = scratch.ring[i, j]
+
+
+@kernel
+def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
+    """Whether triangle (v, a, b) of this normal is folded over a-b, a member with no end in the neighbourhood that v is of."""
+    beyond = wings(net, a, b)[0]
+    if beyond < 0 or (beyond < v and scratch.held[beyond] == scratch.trial[0]):
+        return False  # the rim, or counted from the other side
+    p = row(net.nodes, a)
+    other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
+    return dot(normal, other) < 0.0
+
+
+@kernel
+def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> float:
+    """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
+
+    A member is folded where its two triangles meet at less than 90 degrees; those with only a triangle in the neighbourhood count
+    too, or trials beside each other could lower the energy of both in turn for ever.
+    """
+    nodes, held, stamp = net.nodes, scratch.held, scratch.trial[0]
+    energy = 0.0
+    for k in range(scratch.gathered[0]):
+        v = scratch.around[k]
+        d = net.degree[v]
+        if d == 0:
+            continue
+        closed = net.is_open[v] == 0
+        w = net.ring[v, d - 2 if closed else d - 1]
+        cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
+        cc = cx * cx + cy * cy + cz * cz
+        inside = held[w] == stamp
+        ux = uy = uz = 0.0
+        for at in range(-1 if closed else 0, d):
+            bx, by, bz, bb, before, was_inside = cx, cy, cz, cc, w, inside
+            tx, ty, tz = ux, uy, uz  # the triangle before
+            w = net.ring[v, at if at >= 0 else d - 1]
+            inside = held[w] == stamp
+            skipped, counted = was_inside and before < v, inside and w < v
+            cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
+            cc = cx * cx + cy * cy + cz * cz
+            if at >= 0 and not counted:
+                stretch = math.sqrt(cc) / target_length(net, v, w, length) - 1.0
+                energy += weight * stretch * stretch
+            if at == 0 and not closed:
+                continue
+            ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+            if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
+                energy += 1.0
+            if skipped or counted or at < 0:
+                continue
+            ex, ey, ez = cx - bx, cy - by, cz - bz
+            squares = bb + cc + ex * ex + ey * ey + ez * ez
+            energy += 1.0
+            if squares > 0.0:
+                energy -= 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
+            if not inside and not was_inside and folds_outwards(net, scratch, v, before, w, (ux, uy, uz)):
+                energy += 1.0
+    return energy
+
+
+@kernel
+def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
+    """Energy of the whole grid, mean length of its members where `length` is desired, and its nodes."""
+    scratch.trial[0] += 1
+    count = members = 0
+    total = 0.0
+    for v in range(net.in_use[0]):
+        if net.degree[v] > 0:
+            scratch.held[v] = scratch.trial[0]
+            scratch.around[count] = v
+            count += 1
+            for i in range(net.degree[v]):
+                u = net.ring[v, i]
+                if v < u:
+                    members += 1
+                    target = 0.5 * (net.desired[v] + net.desired[u])
+                    total += norm(subtract(row(net.nodes, u), row(net.nodes, v))) / target
+    scratch.gathered[0] = count
+    return local_energy(net, scratch, length, weight), total / max(members, 1), count

@@ -1,0 +1,85 @@
+"""Scans over each other become one layer: how far each point lies off the layers of the others, and whose point it is there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, nearest
+from ..geometry.vectors import dot, row, subtract
+from .overlap import moved, turned
+
+
+@kernel
+def depths(places: np.ndarray, rims: np.ndarray, boxes: SearchBoxes, most: float, depth: np.ndarray) -> None:
+    """Distance of each place (S, 3) from the nearest place at a rim (R, 3), at most `most`; boxes : of the rims."""
+    for s in range(len(places)):
+        n = nearest(boxes, rims, places[s, 0], places[s, 1], places[s, 2], most)
+        depth[s] = most
+        if n >= 0:
+            d = subtract(row(places, s), row(rims, n))
+            depth[s] = np.sqrt(dot(d, d))
+
+
+@kernel
+def own_places(
+    points: np.ndarray,
+    places: np.ndarray,
+    boxes: SearchBoxes,
+    depth: np.ndarray,
+    reach: float,
+    own: np.ndarray,
+    deep: np.ndarray,
+) -> None:
+    """The place of its own scan nearest to each point, -1 where there is none, and how deep inside the scan that is."""
+    for p in range(len(points)):
+        own[p] = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)
+        deep[p] = depth[own[p]] if own[p] >= 0 else 0.0
+
+
+@kernel
+def add_layer(
+    points: np.ndarray,
+    own: np.ndarray,
+    normals: np.ndarray,
+    deep: np.ndarray,
+    places: np.ndarray,
+    place_normals: np.ndarray,
+    boxes: SearchBoxes,
+    depth: np.ndarray,
+    back: np.ndarray,
+    turn: float,
+    first: int,
+    beside: float,
+    off: float,
+    full: float,
+    shift: np.ndarray,
+    weight: np.ndarray,
+    kept: np.ndarray,
+) -> None:
+    """Let one other scan speak for each point (N, 3): where its layer is, and whether the point is its own or the other's.
+
+    own (N,), deep (N,) : as `own_places` gives them; normals : of the places of the point's scan.
+    places to depth : of the other scan. back : (4, 4) from the frame of the points to that of the other scan.
+    first : 1 where of two equally deep scans the other comes first. beside, off : how far the nearest place may be along and across
+    the surface. full : depth from which on a scan has its full weight. shift (N, 3), weight (N,) : sums, added to, in the frame of
+    the points. kept (N,) : 0 where the other scan sees that spot better.
+    """
+    for p in range(len(points)):
+        if own[p] < 0:
+            continue
+        q = moved(back, row(points, p))
+        n = nearest(boxes, places, q[0], q[1], q[2], beside)
+        if n < 0:
+            continue
+        m = row(place_normals, n)
+        d = subtract(q, row(places, n))
+        rise = dot(d, m)
+        if abs(rise) > off or turn * dot(turned(back, row(normals, own[p])), m) < 0.3:
+            continue
+        if depth[n] > deep[p] or (depth[n] == deep[p] and first == 1):
+            kept[p] = 0
+        w = min(depth[n] / full, 1.0)
+        weight[p] += w
+        for c in range(3):  # the inverse of a rotation is its transpose
+            shift[p, c] -= w * rise * (back[0, c] * m[0] + back[1, c] * m[1] + back[2, c] * m[2])

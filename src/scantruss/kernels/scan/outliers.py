@@ -1,0 +1,202 @@
+"""Points that belong to no surface: those that stand alone, those that stand off, and small pieces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.kd_tree import DEEPEST, Tree, nearest
+from ..geometry.quadric import COLUMNS
+from ..geometry.vectors import Vector, dot, norm, row, smallest_eigenvector, spread_along, subtract
+from ..surface.patches import FLAT, FULL, PATCH, doubt, fit
+
+ROUNDS = 3  # fits of a patch, each with the points that lie off the one before weighed down
+BULK = 40  # points around a place that tell a cloud from a crease
+THICK = 0.2  # thickness, in radii, from which on the points around a place are no surface to stand off from
+
+
+@kernel
+def nearest_alive(tree: Tree, alive: np.ndarray, which: np.ndarray, neighbors: np.ndarray, squares: np.ndarray) -> None:
+    """Fill the rows of some points in the table of `nearest_others` anew, from points that are alive (N,) bool."""
+    most = neighbors.shape[1]
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(3 * most, np.int64), np.empty(3 * most)
+    for i in range(len(which)):
+        p = which[i]
+        count = nearest(tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], 3 * most, stack, found, away)
+        held = 0
+        for k in range(count):
+            if found[k] != p and alive[found[k]] and held < most:
+                neighbors[p, held], squares[p, held] = found[k], away[k]
+                held += 1
+        for k in range(held, most):
+            neighbors[p, k], squares[p, k] = -1, np.inf
+
+
+@kernel
+def usual_reaches(
+    neighbors: np.ndarray, reach: np.ndarray, rank: int, low: np.ndarray, middle: np.ndarray, begin: int, end: int
+) -> None:
+    """Of the reaches of the neighbours of each point the one of a rank, counted from the smallest, and the middle one."""
+    most = neighbors.shape[1]
+    held = np.empty(most)
+    for p in range(begin, end):
+        for k in range(most):
+            value = reach[neighbors[p, k]] if neighbors[p, k] >= 0 else np.inf
+            at = k
+            while at > 0 and held[at - 1] > value:
+                held[at] = held[at - 1]
+                at -= 1
+            held[at] = value
+        low[p], middle[p] = held[min(rank, most - 1)], held[most // 2]
+
+
+@kernel
+def stand_off(
+    tree: Tree,
+    alive: np.ndarray,
+    which: np.ndarray,
+    around: int,
+    least: float,
+    off: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """How far some points (P,) stand off the surface of those around them, in what is to be expected of a point there; off (P,), filled.
+
+    A point itself is left out of its surface. What is expected grows with the thickness of the points there and with the doubt
+    about the surface, large at a rim. least : part of the radius that counts as thickness in any case.
+    """
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
+    buffer, matrix, patch = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
+    for i in range(begin, end):
+        p = which[i]
+        off[i] = 0.0
+        place = row(tree.points, p)
+        taken, radius, most = 0, 0.0, around + around // 4
+        while taken < around and most <= 8 * around:  # farther where many around are left out
+            count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
+            taken = 0
+            for k in range(count):
+                if found[k] != p and alive[found[k]] and taken < around:
+                    d = subtract(row(tree.points, found[k]), place)
+                    buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
+                    buffer[taken, 3] = away[k]
+                    radius = 1.1 * math.sqrt(away[k])
+                    taken += 1
+            most *= 2
+        if taken < FULL or radius <= 0.0:
+            continue
+        fit(buffer, taken, radius, ROUNDS, patch, matrix)
+        if patch[12] > THICK * radius:
+            continue
+        doubt(buffer, taken, 6 if patch[14] >= FULL else (3 if patch[14] >= FLAT else 1), patch, matrix)
+        expected = (patch[12] * patch[12]) * (1.0 + patch[13]) + (least * radius) ** 2
+        off[i] = abs(patch[6]) / math.sqrt(max(expected, 1e-300))
+
+
+@kernel
+def _plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, float]:
+    """Mean and plane normal of offsets (>=count, 3), and the sums of squares about the mean: across the plane, and in all."""
+    cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
+    for k in range(count):
+        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        cx, cy, cz = cx + x, cy + y, cz + z
+        xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+        yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+    cx, cy, cz = cx / count, cy / count, cz / count
+    xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
+    yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
+    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+    return (cx, cy, cz), v, max(spread_along(v, xx, xy, xz, yy, yz, zz), 0.0), xx + yy + zz
+
+
+@kernel
+def measure_planes(
+    tree: Tree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
+) -> None:
+    """How thick the nearest of points `which` lie, in radii, and how far off their plane each is, in thicknesses; (P,), filled."""
+    offsets = np.empty((neighbors.shape[1], 3))
+    for i in range(begin, end):
+        p = which[i]
+        place = row(tree.points, p)
+        count = 0
+        for k in range(neighbors.shape[1]):
+            if neighbors[p, k] >= 0:
+                offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(
+                    row(tree.points, neighbors[p, k]), place
+                )
+                count += 1
+        radius = norm(row(offsets, count - 1)) if count else 0.0
+        thick[i], aside[i] = np.inf, np.inf
+        if count < FLAT or radius == 0.0:
+            continue
+        mean, normal, across, _ = _plane_of(offsets, count)
+        rms = math.sqrt(across / count)
+        thick[i] = rms / radius
+        aside[i] = abs(dot(mean, normal)) / max(rms, 1e-9 * radius)
+
+
+@kernel
+def measure_bulk(tree: Tree, alive: np.ndarray, which: np.ndarray, bulk: np.ndarray, begin: int, end: int) -> None:
+    """Share of the spread of the living points around each of `which` that is across their plane; bulk (P,), filled.
+
+    0 on a surface, 1/3 where points lie to all sides alike, and little more than half of that in a sharp crease.
+    """
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
+    offsets = np.empty((BULK, 3))
+    for i in range(begin, end):
+        place = row(tree.points, which[i])
+        count = 0
+        for k in range(nearest(tree, place[0], place[1], place[2], 2 * BULK, stack, found, away)):
+            if alive[found[k]] and count < BULK:
+                offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(row(tree.points, found[k]), place)
+                count += 1
+        bulk[i] = 0.0
+        if count >= FLAT:
+            _, _, across, spread = _plane_of(offsets, count)
+            bulk[i] = across / max(spread, 1e-300)
+
+
+@kernel
+def join_near(neighbors: np.ndarray, squares: np.ndarray, reach: np.ndarray, far: float, piece: np.ndarray) -> None:
+    """Number the pieces of points linked over no more than `far` times the smaller reach of the two; piece (N,) gets the first of each."""
+    for p in range(len(piece)):
+        piece[p] = p
+    for p in range(len(piece)):
+        for k in range(neighbors.shape[1]):
+            n = neighbors[p, k]
+            if n < 0:
+                break
+            limit = far * min(reach[p], reach[n])
+            if squares[p, k] > limit * limit:
+                break
+            a, b = p, n
+            while piece[a] != a:
+                piece[a] = piece[piece[a]]
+                a = piece[a]
+            while piece[b] != b:
+                piece[b] = piece[piece[b]]
+                b = piece[b]
+            piece[max(a, b)] = min(a, b)
+    for p in range(len(piece)):
+        piece[p] = piece[piece[p]]
+
+
+@kernel
+def nearest_of_places(tree: Tree, places: np.ndarray, away: np.ndarray, which: np.ndarray) -> None:
+    """Distance of each place (P, 3) from the nearest point of a tree, and the number that this point had."""
+    stack, found, squares = np.empty(2 * DEEPEST, np.int64), np.empty(1, np.int64), np.empty(1)
+    for i in range(len(places)):
+        nearest(tree, places[i, 0], places[i, 1], places[i, 2], 1, stack, found, squares)
+        away[i], which[i] = math.sqrt(squares[0]), tree.ids[found[0]]
+
+
+@kernel
+def ranked_of_places(tree: Tree, places: np.ndarray, rank: int, squares: np.ndarray) -> None:
+    """Squared distance of each place (P, 3) from the point of a tree that is at a rank of nearness to it, 1 for the nearest."""
+    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(rank, np.int64), np.empty(rank)
+    for i in range(len(places)):
+        count = nearest(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away)
+        squares[i] = away[count - 1]

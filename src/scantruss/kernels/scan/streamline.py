@@ -1,0 +1,68 @@
+"""One point of each search box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, box_index, put_into, slot_of
+
+BITS = 3
+SIDE = 1 << BITS  # boxes along the side of a block
+REST = SIDE - 1
+BYTES = SIDE * SIDE  # a bit for each box of a block
+CHOSEN, BLOCKS = 0, 1  # places in `count`
+
+
+@kernel
+def choose_first(
+    points: np.ndarray,
+    boxes: SearchBoxes,
+    blocks: SearchBoxes,
+    taken: np.ndarray,
+    among: np.ndarray,
+    chosen: np.ndarray,
+    begin: int,
+    end: int,
+    count: np.ndarray,
+) -> int:
+    """Choose the first of the points `among` (M,), of those before `end` where M is 0, in each box that is not taken yet.
+
+    What lies together in space does so in memory: a scan of which all boxes do not fit into the cache has few blocks of them.
+
+    Parameters
+    ----------
+    points : (N, 3)
+    boxes : SearchBoxes, of which only bounds, sizes and counts are used
+    blocks : SearchBoxes of the blocks of boxes, each with its row of `taken` as its first item
+    taken : (B, BYTES) uint8, zero at the start: a bit for each box of a block
+    chosen : (capacity,) int64, filled with the points
+    begin, end : where to go on and to stop in `among`
+    count : (2,) int64 the points and the blocks so far
+
+    Returns
+    -------
+    int : where to go on; less than `end` where `chosen` or `taken` is full
+    """
+    for m in range(begin, end):
+        p = among[m] if len(among) > 0 else m
+        i, j, k = (
+            box_index(boxes, 0, points[p, 0]),
+            box_index(boxes, 1, points[p, 1]),
+            box_index(boxes, 2, points[p, 2]),
+        )
+        block = blocks.first[slot_of(blocks, i >> BITS, j >> BITS, k >> BITS)]
+        if block < 0:
+            block = count[BLOCKS]
+            if block == len(taken):
+                return m
+            put_into(blocks, block, i >> BITS, j >> BITS, k >> BITS)
+            count[BLOCKS] += 1
+        byte, bit = ((i & REST) << BITS) + (j & REST), np.uint8(1 << (k & REST))
+        if taken[block, byte] & bit == 0:
+            if count[CHOSEN] == len(chosen):
+                return m
+            taken[block, byte] |= bit
+            chosen[count[CHOSEN]] = p
+            count[CHOSEN] += 1
+    return end

@@ -1,0 +1,1 @@
+"""Compiled loops over the scanned surface: samples, normals, local quadrics, orientation and size fields."""

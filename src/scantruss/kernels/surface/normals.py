@@ -1,0 +1,228 @@
+"""Normals of the sites: planes through their neighbours, all turned to one side of the sheet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.vectors import Vector, dot, row, smallest_eigenvector, spread_along, subtract, unit
+
+
+@kernel
+def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, float]:
+    """Unit normal of the least-squares plane of a site and its neighbours, and their rms distance from it."""
+    cx = cy = cz = 0.0
+    count = 1
+    o = row(mean, s)
+    for k in range(neighbors.shape[1]):
+        n = neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(mean, n), o)
+            cx, cy, cz = cx + d[0], cy + d[1], cz + d[2]
+            count += 1
+    cx, cy, cz = cx / count, cy / count, cz / count
+    xx, xy, xz, yy, yz, zz = cx * cx, cx * cy, cx * cz, cy * cy, cy * cz, cz * cz
+    for k in range(neighbors.shape[1]):
+        n = neighbors[s, k]
+        if n >= 0:
+            d = subtract(row(mean, n), o)
+            dx, dy, dz = d[0] - cx, d[1] - cy, d[2] - cz
+            xx, xy, xz = xx + dx * dx, xy + dx * dy, xz + dx * dz
+            yy, yz, zz = yy + dy * dy, yz + dy * dz, zz + dz * dz
+    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+    return v, math.sqrt(max(spread_along(v, xx, xy, xz, yy, yz, zz), 0.0) / count)
+
+
+@kernel
+def site_normals(
+    mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray, begin: int, end: int
+) -> None:
+    """Normal of the least-squares plane of each site from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
+
+    The sign is not settled yet.
+    """
+    for s in range(begin, end):
+        v, thickness[s] = _plane_at(mean, neighbors, s)
+        normals[s, 0], normals[s, 1], normals[s, 2] = v
+
+
+@kernel
+def trust_thin_sites(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
+) -> None:
+    """Drop the links of a thick site to thin ones over whose plane it stands, and fit its normal anew.
+
+    At the rim of a sheet the nearest sites may be those of the next sheet; they tilt the plane of the one, not of the other.
+    """
+    for s in range(len(mean)):
+        if thickness[s] <= rough:
+            continue
+        held, count = 0, 0
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            count += 1
+            if thickness[n] > rough or abs(dot(unit(subtract(row(mean, n), row(mean, s))), row(normals, n))) <= steep:
+                neighbors[s, held] = n
+                held += 1
+        for k in range(held, count):
+            neighbors[s, k] = -1
+        if held < count:
+            v, thickness[s] = _plane_at(mean, neighbors, s)
+            normals[s, 0], normals[s, 1], normals[s, 2] = v
+
+
+@kernel
+def cut_steep_links(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
+) -> None:
+    """Drop neighbours that stand over a site from `begin` to `end` - 1 rather than beside it: they lie on another sheet."""
+    for s in range(begin, end):
+        held = 0
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            e = unit(subtract(row(mean, n), row(mean, s)))
+            if abs(dot(e, row(normals, s))) <= steep or abs(dot(e, row(normals, n))) <= steep:
+                neighbors[s, held] = n
+                held += 1
+        for k in range(held, neighbors.shape[1]):
+            neighbors[s, k] = -1
+
+
+@kernel
+def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
+    """Cosine between the normal of site n and that of site s mirrored at the plane half-way; of either sign.
+
+    It follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
+    """
+    e = unit(subtract(row(mean, n), row(mean, s)))
+    a, b = row(normals, s), row(normals, n)
+    return abs(dot(a, b) - 2.0 * dot(e, a) * dot(e, b))
+
+
+@kernel
+def mark_uneven(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, least: float, uneven: np.ndarray, begin: int, end: int
+) -> None:
+    """Mark the sites from `begin` to `end` - 1, (S,) bool, with a link along which the scan is no arc.
+
+    There the normals, one mirrored to the other, have a cosine below `least`.
+    """
+    for s in range(begin, end):
+        uneven[s] = False
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            if _mirrored(mean, normals, s, n) < least:
+                uneven[s] = True
+                break
+
+
+@kernel
+def link_weights(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray, begin: int, end: int
+) -> None:
+    """How much the normals of neighbours disagree when one is mirrored to the other: 254 sqrt(1 - |cosine|), (S, K) uint8; 255 = no link.
+
+    Steps of a third of a degree: links that are as certain are taken in their order, which lie together, not all over the scan.
+    """
+    for s in range(begin, end):
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            weights[s, k] = 255
+            if n >= 0:
+                weights[s, k] = int(254.0 * math.sqrt(max(1.0 - _mirrored(mean, normals, s, n), 0.0)))
+
+
+@kernel
+def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
+    """Root of a site in the union, and its sign against that root; shortens the path."""
+    total = 1
+    while piece[s] != s:
+        parent = piece[s]
+        if piece[parent] != parent:
+            sign[s] *= sign[parent]
+            piece[s] = piece[parent]
+        total *= sign[s]
+        s = piece[s]
+    return s, total
+
+
+@kernel
+def orient_normals(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, order: np.ndarray, piece: np.ndarray
+) -> None:
+    """Turn all normals of a connected piece to the same side, along the spanning tree of the most certain links.
+
+    order : links as s * K + k, most certain first. piece : (S,) filled with the smallest site of each connected piece.
+    """
+    k_most = neighbors.shape[1]
+    sign, joined = np.ones(len(mean), np.int64), 1
+    for s in range(len(mean)):
+        piece[s] = s
+    for i in range(len(order)):
+        if joined == len(mean):
+            break
+        s = order[i] // k_most
+        n = neighbors[s, order[i] - s * k_most]
+        root_s, sign_s = _root(piece, sign, s)
+        root_n, sign_n = _root(piece, sign, n)
+        if root_s == root_n:
+            continue
+        joined += 1
+        e = unit(subtract(row(mean, n), row(mean, s)))
+        a, b = row(normals, s), row(normals, n)
+        agree = 1 if dot(a, b) - 2.0 * dot(e, a) * dot(e, b) >= 0.0 else -1
+        if root_n < root_s:
+            piece[root_s] = root_n
+            sign[root_s] = sign_s * sign_n * agree
+        else:
+            piece[root_n] = root_s
+            sign[root_n] = sign_s * sign_n * agree
+    for s in range(len(mean)):  # parents have smaller numbers, so they are settled first
+        if piece[s] != s:
+            sign[s] *= sign[piece[s]]
+            piece[s] = piece[piece[s]]
+        for c in range(3):
+            normals[s, c] *= sign[s]
+
+
+@kernel
+def smooth_normals(
+    normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray, begin: int, end: int
+) -> None:
+    """Mean normal of each site from `begin` to `end` - 1 and of those neighbours whose normals have a cosine over `facing` with its own."""
+    for s in range(begin, end):
+        a = row(normals, s)
+        x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n >= 0:
+                b = row(normals, n)
+                if dot(a, b) > facing:
+                    x, y, z = x + b[0], y + b[1], z + b[2]
+        smoothed[s, 0], smoothed[s, 1], smoothed[s, 2] = unit((x, y, z))
+
+
+@kernel
+def head_on_links(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, smooth: float
+) -> int:
+    """Number of links between sites thinner than `smooth` that lie side by side and yet face opposite sides."""
+    count = 0
+    for s in range(len(mean)):
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0 or dot(row(normals, s), row(normals, n)) >= -0.9 or max(thickness[s], thickness[n]) >= smooth:
+                continue
+            d = subtract(row(mean, n), row(mean, s))
+            rise = max(abs(dot(d, row(normals, s))), abs(dot(d, row(normals, n))))
+            if rise < 0.3 * math.sqrt(max(dot(d, d), 1e-300)):
+                count += 1
+    return count

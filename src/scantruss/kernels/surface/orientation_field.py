@@ -1,0 +1,373 @@
+"""Rows of the front: a smooth 6-fold direction field of the surface, and the triangular lattice that follows it.
+
+Both live on posts, places of the scan a part of a member apart, and are smoothed from coarse posts to fine ones: every post turns its
+direction to the mean of its neighbours' (each up to sixths of a turn), then moves its lattice to the mean of theirs (each up to steps
+of the lattice). After Jakob, Tarini, Panozzo, Sorkine-Hornung: Instant Field-Aligned Meshes (2015), 6-fold, extrinsic.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
+
+HALF_ROOT = 0.5 * math.sqrt(3.0)
+
+
+class Posts(NamedTuple):
+    """Posts of one level and the lattice at each."""
+
+    mean: np.ndarray  #: (P, 3)
+    normals: np.ndarray  #: (P, 3)
+    neighbors: np.ndarray  #: (P, K) int64 posts beside, -1 at the end
+    direction: np.ndarray  #: (P, 3) unit, of one of the six rows
+    node: np.ndarray  #: (P, 3) the node of the lattice that is nearest to the post
+    mark: np.ndarray  #: (P,) int64 scratch
+
+
+@kernel
+def choose_posts(
+    mean: np.ndarray, neighbors: np.ndarray, radius: float, owner: np.ndarray, chosen: np.ndarray, queue: np.ndarray
+) -> int:
+    """Choose posts so that every place has one within `radius` over the links; returns their number.
+
+    owner : (S,) int64, -1 at the start, filled with the post of each place
+    chosen : (S,) int64, filled with the place of each post
+    queue : (2, S) int64 scratch, -1 at the start
+    """
+    count = 0
+    for s in range(len(mean)):
+        if owner[s] >= 0:
+            continue
+        chosen[count] = s
+        owner[s] = count
+        queue[0, 0] = s
+        queue[1, s] = s
+        last, at = 1, 0
+        while at < last:
+            here = queue[0, at]
+            at += 1
+            for k in range(neighbors.shape[1]):
+                n = neighbors[here, k]
+                if n < 0:
+                    break
+                if queue[1, n] != s:
+                    queue[1, n] = s
+                    d = subtract(row(mean, n), row(mean, s))
+                    if dot(d, d) < radius * radius:
+                        queue[0, last] = n
+                        last += 1
+                        if owner[n] < 0:
+                            owner[n] = count
+        count += 1
+    return count
+
+
+@kernel
+def link_posts(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, posts: Posts) -> None:
+    """Fill in means, normals and links of posts, all zero at the start: posts are linked whose places are."""
+    for s in range(len(mean)):
+        p = owner[s]
+        posts.mark[p] += 1
+        for c in range(3):
+            posts.mean[p, c] += mean[s, c]
+            posts.normals[p, c] += normals[s, c]
+        for k in range(neighbors.shape[1]):
+            n = neighbors[s, k]
+            if n < 0:
+                break
+            q = owner[n]
+            if q == p:
+                continue
+            i = 0
+            while i < posts.neighbors.shape[1] and posts.neighbors[p, i] >= 0 and posts.neighbors[p, i] != q:
+                i += 1
+            if i < posts.neighbors.shape[1]:
+                posts.neighbors[p, i] = q
+    for p in range(len(posts.mean)):
+        normal = unit(row(posts.normals, p))
+        for c in range(3):
+            posts.mean[p, c] /= max(posts.mark[p], 1)
+            posts.normals[p, c] = normal[c]
+
+
+@kernel
+def links_away(neighbors: np.ndarray, start: int, away: np.ndarray, queue: np.ndarray) -> int:
+    """Fill in how many links each place is away from one (P,), -1 where none lead there; returns the last one reached.
+
+    queue : (P,) int64 scratch
+    """
+    away[:] = -1
+    queue[0], away[start] = start, 0
+    last, at = 1, 0
+    while at < last:
+        here = queue[at]
+        at += 1
+        for k in range(neighbors.shape[1]):
+            n = neighbors[here, k]
+            if n < 0:
+                break
+            if away[n] < 0:
+                away[n] = away[here] + 1
+                queue[last] = n
+                last += 1
+    return queue[last - 1]
+
+
+@kernel
+def sixth(direction: Vector, normal: Vector) -> Vector:
+    """A direction turned by 60 degrees about a normal."""
+    a = cross(normal, direction)
+    return (
+        0.5 * direction[0] + HALF_ROOT * a[0],
+        0.5 * direction[1] + HALF_ROOT * a[1],
+        0.5 * direction[2] + HALF_ROOT * a[2],
+    )
+
+
+@kernel
+def flat(direction: Vector, normal: Vector) -> Vector:
+    """The unit part of a direction at right angles to a normal."""
+    d = along(direction, -dot(direction, normal), normal)
+    size = norm(d)
+    if size < 1e-9:
+        return across(normal)
+    return d[0] / size, d[1] / size, d[2] / size
+
+
+@kernel
+def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
+    """Of the six directions of a post that which is nearest to another direction."""
+    turned = sixth(direction, normal)
+    third = subtract(turned, direction)
+    best = direction
+    most = dot(direction, other)
+    size = abs(most)
+    if abs(dot(turned, other)) > size:
+        best, most = turned, dot(turned, other)
+        size = abs(most)
+    if abs(dot(third, other)) > size:
+        best, most = third, dot(third, other)
+    if most < 0.0:
+        return -best[0], -best[1], -best[2]
+    return best
+
+
+@kernel
+def smooth_directions(posts: Posts, some: np.ndarray) -> None:
+    """Turn the direction of some posts (K,) to the mean of those beside."""
+    for i in range(len(some)):
+        p = some[i]
+        normal = row(posts.normals, p)
+        total = row(posts.direction, p)
+        weight = 0.0
+        for k in range(posts.neighbors.shape[1]):
+            q = posts.neighbors[p, k]
+            if q < 0:
+                break
+            other = row(posts.normals, q)
+            # the pair of turns that agree best
+            b = row(posts.direction, q)
+            a = nearest_turn(total, b, normal)
+            most, left, right = dot(a, b), a, b
+            for _turn in range(2):
+                b = sixth(b, other)
+                a = nearest_turn(total, b, normal)
+                if dot(a, b) > most:
+                    most, left, right = dot(a, b), a, b
+            total = flat(
+                (weight * left[0] + right[0], weight * left[1] + right[1], weight * left[2] + right[2]), normal
+            )
+            weight += 1.0
+        for c in range(3):
+            posts.direction[p, c] = total[c]
+
+
+@kernel
+def lower_corner(node: Vector, u: Vector, v: Vector, place: Vector, length: float) -> Vector:
+    """The node of a lattice of steps u, v at the lower corner of the cell below a place."""
+    d = subtract(place, node)
+    du, dv = dot(d, u), dot(d, v)
+    i = math.floor((4.0 * du - 2.0 * dv) / (3.0 * length))
+    j = math.floor((4.0 * dv - 2.0 * du) / (3.0 * length))
+    return along(along(node, i * length, u), j * length, v)
+
+
+@kernel
+def nearest_node(node: Vector, direction: Vector, normal: Vector, place: Vector, length: float) -> Vector:
+    """The node nearest to a place of the lattice that has a given node and direction."""
+    u = direction
+    v = sixth(u, normal)
+    low = lower_corner(node, u, v, place, length)
+    best, least = low, 1e300
+    for i in range(4):
+        at = along(along(low, length * (i & 1), u), length * (i >> 1), v)
+        d = subtract(at, place)
+        if dot(d, d) < least:
+            best, least = at, dot(d, d)
+    return best
+
+
+@kernel
+def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
+    """A place between two posts, on the line where their planes meet (half way where they are parallel)."""
+    np_, nq, mp, mq, nm = dot(n, p), dot(n, q), dot(m, p), dot(m, q), dot(n, m)
+    share = 1.0 / (1.0 - nm * nm + 1e-4)
+    s = 2.0 * (nq - np_ - nm * (mp - mq)) * share
+    t = 2.0 * (mp - mq - nm * (nq - np_)) * share
+    return (
+        0.5 * (p[0] + q[0]) - 0.25 * (n[0] * s + m[0] * t),
+        0.5 * (p[1] + q[1]) - 0.25 * (n[1] * s + m[1] * t),
+        0.5 * (p[2] + q[2]) - 0.25 * (n[2] * s + m[2] * t),
+    )
+
+
+@kernel
+def agree(posts: Posts, p: int, q: int, node: Vector, length: float) -> tuple[Vector, Vector]:
+    """The nodes of the lattices of two posts that lie nearest to each other between them; node is of the lattice of p."""
+    n, m = row(posts.normals, p), row(posts.normals, q)
+    middle = between(row(posts.mean, p), n, row(posts.mean, q), m)
+    u, x = row(posts.direction, p), row(posts.direction, q)
+    v, y = sixth(u, n), sixth(x, m)
+    here = lower_corner(node, u, v, middle, length)
+    there = lower_corner(row(posts.node, q), x, y, middle, length)
+    left, right, least = here, there, 1e300
+    for i in range(4):
+        a = along(along(here, length * (i & 1), u), length * (i >> 1), v)
+        for j in range(4):
+            b = along(along(there, length * (j & 1), x), length * (j >> 1), y)
+            d = subtract(a, b)
+            if dot(d, d) < least:
+                left, right, least = a, b, dot(d, d)
+    return left, right
+
+
+@kernel
+def smooth_lattice(posts: Posts, length: float, some: np.ndarray) -> None:
+    """Move the lattice of some posts (K,) to the mean of those beside."""
+    for i in range(len(some)):
+        p = some[i]
+        mean, normal = row(posts.mean, p), row(posts.normals, p)
+        total = row(posts.node, p)
+        weight = 0.0
+        for k in range(posts.neighbors.shape[1]):
+            q = posts.neighbors[p, k]
+            if q < 0:
+                break
+            a, b = agree(posts, p, q, total, length)
+            share = 1.0 / (weight + 1.0)
+            total = (
+                (weight * a[0] + b[0]) * share,
+                (weight * a[1] + b[1]) * share,
+                (weight * a[2] + b[2]) * share,
+            )
+            total = along(total, -dot(subtract(total, mean), normal), normal)
+            weight += 1.0
+        total = nearest_node(total, row(posts.direction, p), normal, mean, length)
+        for c in range(3):
+            posts.node[p, c] = total[c]
+
+
+@kernel
+def lay_first(posts: Posts, first: int, direction: Vector, node: Vector, length: float, queue: np.ndarray) -> None:
+    """Lay a direction and a lattice at one post and carry them on from post to post, over all that are linked to it.
+
+    queue : (P,) int64 scratch
+    """
+    for p in range(len(posts.mean)):
+        posts.mark[p] = 0
+    begin = first
+    for _ in range(len(posts.mean)):
+        way = flat(direction, row(posts.normals, begin))
+        put_lattice(posts, begin, way, node, length)
+        posts.mark[begin] = 1
+        queue[0] = begin
+        last, at = 1, 0
+        while at < last:
+            p = queue[at]
+            at += 1
+            for k in range(posts.neighbors.shape[1]):
+                q = posts.neighbors[p, k]
+                if q < 0:
+                    break
+                if posts.mark[q] == 0:
+                    posts.mark[q] = 1
+                    put_lattice(posts, q, row(posts.direction, p), row(posts.node, p), length)
+                    queue[last] = q
+                    last += 1
+        begin = -1
+        for p in range(len(posts.mean)):
+            if posts.mark[p] == 0:
+                begin = p
+                break
+        if begin < 0:
+            return
+        other = posts.neighbors[begin, 0]
+        node = row(posts.mean, begin)
+        direction = subtract(row(posts.mean, max(other, 0)), node)
+
+
+@kernel
+def put_lattice(posts: Posts, p: int, direction: Vector, node: Vector, length: float) -> None:
+    """Give a post a direction and a lattice that has a node at (or straight above) a place."""
+    mean, normal = row(posts.mean, p), row(posts.normals, p)
+    direction = flat(direction, normal)
+    node = along(node, -dot(subtract(node, mean), normal), normal)
+    node = nearest_node(node, direction, normal, mean, length)
+    for c in range(3):
+        posts.direction[p, c] = direction[c]
+        posts.node[p, c] = node[c]
+
+
+@kernel
+def hand_down(coarse: Posts, owner: np.ndarray, fine: Posts, length: float) -> None:
+    """Give the posts of a finer level the directions and the lattice of their posts of the coarser level."""
+    for p in range(len(fine.mean)):
+        q = owner[p]
+        put_lattice(fine, p, row(coarse.direction, q), row(coarse.node, q), length)
+
+
+@kernel
+def list_nodes(
+    posts: Posts, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
+) -> int:
+    """Choose posts whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
+
+    order : (P,) int64 the order in which posts are asked
+    chosen : (P,) int64, filled
+    scratch : (3, P) int64: whether chosen (0 at the start); mark (-1 at the start); queue
+    """
+    count = 0
+    reach = 1.2 * length + apart
+    for o in range(len(order)):
+        p = order[o]
+        place = row(posts.node, p)
+        scratch[2, 0] = p
+        scratch[1, p] = p
+        last, at = 1, 0
+        free = True
+        while at < last and free:
+            here = scratch[2, at]
+            at += 1
+            if scratch[0, here] == 1:
+                d = subtract(row(posts.node, here), place)
+                free = dot(d, d) >= apart * apart
+            for k in range(posts.neighbors.shape[1]):
+                q = posts.neighbors[here, k]
+                if q < 0:
+                    break
+                if scratch[1, q] != p:
+                    scratch[1, q] = p
+                    d = subtract(row(posts.mean, q), place)
+                    if dot(d, d) < reach * reach:
+                        scratch[2, last] = q
+                        last += 1
+        if free:
+            scratch[0, p] = 1
+            chosen[count] = p
+            count += 1
+    return count

@@ -1,0 +1,222 @@
+"""Sharp ridges of the scan: where its two sides meet, found by fitting a folded surface to the points around a place.
+
+Heights over the plane of the mean normal are a quadric and a fold along a line in that plane. With u across the line and t along it
+
+    h = k0 + k1 t + k2 t^2 + k3 u + k4 u^2 + k5 u t + k6 |u| + k7 u |u|
+
+so both sides are quadrics that meet at u = 0, and the slope jumps there by 2 k6. A smooth surface has u^3 in place of the last two.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.quadric import WEIGHT, solve
+from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
+from .local_surface import Surface, flood, gather_points, walk
+
+EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
+TERMS = 8
+FOUND = (
+    9  # numbers that `fit_fold` writes: place, direction, angle of the jump, gain over a smooth surface, rms distance
+)
+SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
+ROUNDS = 3
+FEW = 2  # points of a site that tell at first sight
+
+
+@kernel
+def bends_of_sites(surface: Surface, bends: np.ndarray) -> None:
+    """Least cosine between the normal of each site and those of its neighbours, (S,)."""
+    for s in range(len(surface.mean)):
+        least = 1.0
+        n = row(surface.normals, s)
+        for k in range(surface.neighbors.shape[1]):
+            m = surface.neighbors[s, k]
+            if m < 0:
+                break
+            least = min(least, dot(n, row(surface.normals, m)))
+        bends[s] = least
+
+
+@kernel
+def mean_normal(surface: Surface, site: int, place: Vector, radius: float) -> tuple[Vector, Vector]:
+    """Mean of the normals of the sites around a place, and the direction at right angles to it in which they differ most."""
+    count = flood(surface, site, place, radius)
+    n = (0.0, 0.0, 0.0)
+    for i in range(count):
+        n = along(n, 1.0, row(surface.normals, surface.queue[i]))
+    n = unit(n)
+    # the direction of the largest spread by some steps of the power method
+    c = (0.0, 0.0, 0.0)
+    best = 0.0
+    for i in range(count):
+        m = row(surface.normals, surface.queue[i])
+        m = along(m, -dot(m, n), n)
+        if norm(m) > best:
+            best, c = norm(m), m
+    for _ in range(8):
+        total = (0.0, 0.0, 0.0)
+        for i in range(count):
+            m = row(surface.normals, surface.queue[i])
+            m = along(m, -dot(m, n), n)
+            total = along(total, dot(m, c), m)
+        if norm(total) == 0.0:
+            break
+        c = unit(total)
+    return n, c
+
+
+@kernel
+def fold_error(
+    buffer: np.ndarray,
+    taken: int,
+    frame: tuple[Vector, Vector, Vector],
+    shift: float,
+    radius: float,
+    folded: bool,
+    matrix: np.ndarray,
+) -> float:
+    """Weighted sum of squared distances of the points from the best folded (or smooth) surface; its terms into the last column.
+
+    frame : across, along, normal; shift : place of the line across [radius]. Lengths count in radii. Infinite where none fits.
+    """
+    c, e, n = frame
+    term = np.empty(TERMS + 1)
+    matrix[:, :] = 0.0
+    squares = 0.0
+    for i in range(taken):
+        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        u, t, h = dot(d, c) / radius - shift, dot(d, e) / radius, dot(d, n) / radius
+        size = abs(u)
+        term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, t, t * t, u, u * u, u * t
+        term[6], term[7] = (size, u * size) if folded else (u * u * u, 0.0)
+        term[TERMS] = h
+        w = buffer[i, WEIGHT]
+        squares += w * h * h
+        for r in range(TERMS):
+            wr = w * term[r]
+            for k in range(r, TERMS + 1):
+                matrix[r, k] += wr * term[k]
+    right = np.empty(TERMS)
+    for r in range(TERMS):
+        for k in range(r):
+            matrix[r, k] = matrix[k, r]
+        matrix[r, r] += 1e-9 * matrix[0, 0]
+        right[r] = matrix[r, TERMS]
+    if not solve(matrix, TERMS):
+        return np.inf
+    for r in range(TERMS):
+        squares -= right[r] * matrix[r, TERMS]
+    return max(squares, 0.0)
+
+
+@kernel
+def jump_of(matrix: np.ndarray) -> float:
+    """Angle between the two sides of a folded surface where they meet [radian]."""
+    slope, jump = matrix[3, TERMS], matrix[6, TERMS]
+    return abs(math.atan(slope + jump) - math.atan(slope - jump))
+
+
+@kernel
+def is_folded(surface: Surface, site: int, radius: float, least: float, buffer: np.ndarray) -> bool:
+    """Whether a few points around a site look as if they were folded by an angle of at least `least` [radian]."""
+    place = row(surface.mean, site)
+    n, c = mean_normal(surface, site, place, radius)
+    count = flood(surface, site, place, radius + 0.5 * surface.step)
+    taken = gather_points(surface, count, place, radius, FEW, n, EITHER_SIDE, buffer)
+    if taken < 20 or norm(c) < 0.5:
+        return False
+    matrix = np.empty((TERMS, TERMS + 1))
+    frame = turned_frame(c, n, 0.0)
+    error, jump = np.inf, 0.0
+    for j in range(3):
+        found = fold_error(buffer, taken, frame, 0.25 * (j - 1), radius, True, matrix)
+        if found < error:
+            error, jump = found, jump_of(matrix)
+    return jump >= least
+
+
+@kernel
+def keep_folded(
+    surface: Surface, seeds: np.ndarray, radius: float, least: float, apart: float, buffer: np.ndarray, note: np.ndarray
+) -> int:
+    """Keep, in front, the seeds (sites) that look folded, of those nearer than `apart` to each other the first; returns their number.
+
+    note : (K,) int64 scratch, zero at the start
+    """
+    kept = 0
+    for i in range(len(seeds)):
+        if note[i] != 0:
+            continue
+        place = row(surface.mean, seeds[i])
+        for j in range(i + 1, len(seeds)):
+            d = subtract(row(surface.mean, seeds[j]), place)
+            if dot(d, d) < apart * apart:
+                note[j] = 1
+        if is_folded(surface, seeds[i], radius, least, buffer):
+            seeds[kept] = seeds[i]
+            kept += 1
+    return kept
+
+
+@kernel
+def fit_fold(
+    surface: Surface, site: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, found: np.ndarray
+) -> bool:
+    """Fit a folded surface around a place; False where there are too few points.
+
+    towards : direction of the ridge near by, (0, 0, 0) where it is not known
+    found : (FOUND,), filled: place on the ridge, its direction, angle of the jump [radian], by how much the fold fits better than a
+        smooth surface (as an F statistic), rms distance of the points [scan unit]
+    """
+    site = walk(surface, site, place)
+    n, c = mean_normal(surface, site, place, radius)
+    if norm(towards) > 0.0:
+        c = unit(cross(towards, n))
+    count = flood(surface, site, place, radius + 0.5 * surface.step)
+    taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
+    if taken < 30 or norm(c) < 0.5:
+        return False
+    matrix = np.empty((TERMS, TERMS + 1))
+    angle = shift = 0.0
+    reach, swing = 0.4, 0.35
+    least = np.inf
+    for _ in range(ROUNDS):
+        at_angle, at_shift = angle, shift
+        for i in range(TURNS):
+            for j in range(SHIFTS):
+                a = at_angle + swing * (2.0 * i / (TURNS - 1) - 1.0)
+                b = at_shift + reach * (2.0 * j / (SHIFTS - 1) - 1.0)
+                frame = turned_frame(c, n, a)
+                error = fold_error(buffer, taken, frame, b, radius, True, matrix)
+                if error < least:
+                    least, angle, shift = error, a, b
+        reach, swing = 0.4 * reach, 0.4 * swing
+    if least == np.inf:
+        return False
+    frame = turned_frame(c, n, angle)
+    smooth = fold_error(buffer, taken, frame, shift, radius, False, matrix)
+    least = fold_error(buffer, taken, frame, shift, radius, True, matrix)
+    total = 0.0
+    for i in range(taken):
+        total += buffer[i, WEIGHT]
+    across, ahead, _ = frame
+    at = along(along(place, shift * radius, across), matrix[0, TERMS] * radius, n)
+    found[0], found[1], found[2] = at
+    found[3], found[4], found[5] = unit(along(ahead, matrix[1, TERMS], n))
+    found[6] = jump_of(matrix)
+    found[7] = min((smooth - least) * taken / max(least, 1e-12), 1e9)
+    found[8] = radius * math.sqrt(least / max(total, 1e-300))
+    return True
+
+
+@kernel
+def turned_frame(c: Vector, n: Vector, angle: float) -> tuple[Vector, Vector, Vector]:
+    """The directions across, along and normal to a line whose across has been turned by an angle about the normal."""
+    side = cross(n, c)
+    across = along((math.cos(angle) * c[0], math.cos(angle) * c[1], math.cos(angle) * c[2]), math.sin(angle), side)
+    return across, cross(n, across), n

@@ -1,0 +1,272 @@
+"""Sites: the scan at the scale of a member.
+
+A site stands for the points around it: greedy disc thinning in the order of the points, so that the result does not depend on how
+the boxes lie; then each point belongs to the site nearest to it. Sites know their neighbours on the same sheet of the surface, which
+makes every later look-up safe against a second sheet nearby.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
+from ..geometry.vectors import dot, row, smallest_eigenvector, subtract
+
+ALIKE = 1e-6  # squared distances that differ by less are the same, as a share
+
+
+@kernel
+def _site_within(
+    boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
+) -> int:
+    """A site of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
+    item = boxes.first[slot_of(boxes, i, j, k)]
+    while item >= 0:
+        dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
+        if dx * dx + dy * dy + dz * dz < square:
+            return item
+        item = boxes.next[item]
+    return -1
+
+
+@kernel
+def choose_sites(
+    points: np.ndarray,
+    radius: float,
+    boxes: SearchBoxes,
+    owner: np.ndarray,
+    chosen: np.ndarray,
+    places: np.ndarray,
+    begin: int,
+    count: int,
+) -> tuple[int, int]:
+    """Choose sites from points[begin:] so that every point has one within `radius`; sites keep that distance.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+    boxes : SearchBoxes of the sites, about as large as `radius`
+    owner : (N,) int64, filled with a site within the radius of each point
+    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each site and where it is
+    begin, count : where to go on, and the sites so far
+
+    Returns
+    -------
+    begin, count : begin < N where the table of boxes is half full or `chosen` is full
+    """
+    square = radius * radius
+    for p in range(begin, len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        a, b, c = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
+        home = _site_within(boxes, places, a, b, c, x, y, z, square)  # most have one in their own box
+        if home < 0:
+            i0, i1 = box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius)
+            j0, j1 = box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius)
+            k0, k1 = box_index(boxes, 2, z - radius), box_index(boxes, 2, z + radius)
+            for i in range(i0, i1 + 1):
+                for j in range(j0, j1 + 1):
+                    for k in range(k0, k1 + 1):
+                        if home < 0 and (i != a or j != b or k != c):
+                            home = _site_within(boxes, places, i, j, k, x, y, z, square)
+        if home < 0:
+            if count == len(chosen) or 2 * (count + 1) > len(boxes.keys):
+                return p, count
+            home = count
+            chosen[count] = p
+            places[count, 0], places[count, 1], places[count, 2] = x, y, z
+            put(boxes, count, x, y, z)
+            count += 1
+        owner[p] = home
+    return len(points), count
+
+
+@kernel
+def settle_points(
+    points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, begin: int, end: int
+) -> None:
+    """Give each point from `begin` to `end` - 1 to the nearest site: from its own (N,) on over the links, as long as one is nearer.
+
+    Of sites as near but for rounding, as regular points have many, the first. Then neither the site that a point had at first makes a
+    difference, nor where the scan lies.
+    """
+    for p in range(begin, end):
+        place, site = row(points, p), owner[p]
+        d = subtract(row(places, site), place)
+        least = dot(d, d)
+        while True:
+            to, first, nearly = site, site, least * (1.0 + ALIKE)
+            for k in range(neighbors.shape[1]):
+                n = neighbors[site, k]
+                if n < 0:
+                    break
+                d = subtract(row(places, n), place)
+                dd = dot(d, d)
+                if dd <= nearly:
+                    first = min(first, n)
+                if dd < least:
+                    least, to = dd, n
+            if to == site:
+                owner[p] = first
+                break
+            site = to
+
+
+@kernel
+def group_points(
+    points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, mean: np.ndarray
+) -> None:
+    """Sort the points by site (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each site's points."""
+    sites = len(start) - 1
+    for p in range(len(points)):
+        start[owner[p] + 1] += 1
+    for s in range(sites):
+        start[s + 1] += start[s]
+    at = start.copy()
+    for p in range(len(points)):
+        to = at[owner[p]]
+        at[owner[p]] += 1
+        grouped[to, 0], grouped[to, 1], grouped[to, 2] = row(points, p)
+    for s in range(sites):
+        first = row(grouped, start[s])
+        x = y = z = 0.0
+        for i in range(start[s] + 1, start[s + 1]):
+            d = subtract(row(grouped, i), first)
+            x, y, z = x + d[0], y + d[1], z + d[2]
+        n = max(start[s + 1] - start[s], 1)
+        mean[s, 0], mean[s, 1], mean[s, 2] = first[0] + x / n, first[1] + y / n, first[2] + z / n
+
+
+@kernel
+def nearest_sites(
+    positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
+) -> None:
+    """The K nearest sites of each site from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
+
+    The search starts with `near`. Where there are not even six, the scan is sparse: the search goes on to twice as far.
+    """
+    k = neighbors.shape[1]
+    found = np.empty(4096, np.int64)
+    distance = np.empty(k)
+    for s in range(begin, end):
+        x, y, z = row(positions, s)
+        reach = near
+        count = search(boxes, positions, x, y, z, reach, found)
+        while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):
+            reach = min(1.5 * reach, far if reach < far else 2.0 * far)
+            count = search(boxes, positions, x, y, z, reach, found)
+        held = 0
+        for c in range(count):
+            other = found[c]
+            if other == s:
+                continue
+            d = subtract(row(positions, other), (x, y, z))
+            dd = dot(d, d)
+            if held == k and (dd > distance[k - 1] or (dd == distance[k - 1] and other > neighbors[s, k - 1])):
+                continue
+            at = held if held < k else k - 1
+            while at > 0 and (distance[at - 1] > dd or (distance[at - 1] == dd and neighbors[s, at - 1] > other)):
+                distance[at] = distance[at - 1]
+                neighbors[s, at] = neighbors[s, at - 1]
+                at -= 1
+            distance[at] = dd
+            neighbors[s, at] = other
+            held = min(held + 1, k)
+
+
+@kernel
+def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
+    """Let dense sites see the sparse ones that have them among their six nearest: the farthest neighbours make room.
+
+    Otherwise a sparse part of the scan, linked one way only, would look like a gap from the dense part beside it.
+    """
+    k_most = neighbors.shape[1]
+    taken = np.zeros(len(positions), np.int64)
+    for t in range(len(positions)):
+        for k in range(6):
+            s = neighbors[t, k]
+            if s < 0 or neighbors[s, k_most - 1] < 0 or taken[s] >= 3:
+                continue
+            d = subtract(row(positions, t), row(positions, s))
+            e = subtract(row(positions, neighbors[s, 5]), row(positions, s))
+            if dot(d, d) < 2.25 * dot(e, e):
+                continue
+            known = False
+            for i in range(k_most):
+                known = known or neighbors[s, i] == t
+            if not known:
+                neighbors[s, k_most - 1 - taken[s]] = t
+                taken[s] += 1
+
+
+@kernel
+def settle_sites(
+    mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
+) -> None:
+    """Move each rough site (thickness over `rough`) to the plane of the sites linked to it within a wider radius.
+
+    Noise, plants and doubled layers thicker than a site leave a cloud of sites instead of a sheet; this gives the sheet back.
+    Sites far off the plane weigh less.
+    """
+    count = len(mean)
+    stamp = np.full(count, -1, np.int64)
+    queue = np.empty(count, np.int64)
+    weight = np.empty(count)
+    for s in range(count):
+        place = row(mean, s)
+        settled[s, 0], settled[s, 1], settled[s, 2] = place
+        if thickness[s] <= rough:
+            continue
+        queue[0] = s
+        stamp[s] = s
+        found, at = 1, 0
+        while at < found:
+            q = queue[at]
+            at += 1
+            for k in range(neighbors.shape[1]):
+                n = neighbors[q, k]
+                if n >= 0 and stamp[n] != s:
+                    stamp[n] = s
+                    d = subtract(row(mean, n), place)
+                    if dot(d, d) < radius * radius:
+                        queue[found] = n
+                        found += 1
+        for i in range(found):
+            d = subtract(row(mean, queue[i]), place)
+            w = 1.0 - dot(d, d) / (radius * radius)
+            weight[i] = w * w
+        for turn in range(3):
+            total = cx = cy = cz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                total, cx, cy, cz = total + w, cx + w * d[0], cy + w * d[1], cz + w * d[2]
+            cx, cy, cz = cx / total, cy / total, cz / total
+            xx = xy = xz = yy = yz = zz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                x, y, z = d[0] - cx, d[1] - cy, d[2] - cz
+                xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+                yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+            off = cx * v[0] + cy * v[1] + cz * v[2]
+            if turn < 2:
+                spread = 0.0
+                for i in range(found):
+                    spread += weight[i] * abs(dot(subtract(row(mean, queue[i]), place), v) - off)
+                spread = max(spread / total, 1e-300)
+                for i in range(found):
+                    d = subtract(row(mean, queue[i]), place)
+                    w = 1.0 - dot(d, d) / (radius * radius)
+                    r = (dot(d, v) - off) / (1.5 * spread)
+                    weight[i] = w * w / (1.0 + r * r)
+        for c in range(3):
+            settled[s, c] = place[c] + off * v[c]
+
+
+@kernel
+def put_all(boxes: SearchBoxes, points: np.ndarray, chosen: np.ndarray) -> None:
+    """Put the chosen points into boxes, in their order."""
+    for s in range(len(chosen)):
+        put(boxes, s, points[chosen[s], 0], points[chosen[s], 1], points[chosen[s], 2])

@@ -1,0 +1,1 @@
+"""How the program runs: compiling, storing machine code, threads, memory and clusters."""

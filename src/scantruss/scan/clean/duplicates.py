@@ -1,0 +1,69 @@
+"""Repeated points: the same point stored twice, or measured again from the same place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...kernels.scan import duplicates as kernels
+from ...kernels.scan import outliers as trees
+from ...runtime.parallel import in_parts
+from .nearby import grow_tree
+
+SAMPLE = 500  # points of which repeats are looked for before it is worth looking for all
+SHARE = 0.01  # part of these that must be repeated
+PART = 50_000  # fewest points for a thread of their own
+COPIES = 16  # a point may be repeated almost so often and its spacing be told
+SAID = 300  # points at which the spacing is measured
+DENSEST = 0.05  # part of the points that lie closer than what counts as spacing here
+
+
+def find_repeated(points: np.ndarray) -> np.ndarray:
+    """Return which points are repeats of an earlier one, to the last bit (N,) bool."""
+    repeated = np.zeros(len(points), np.bool_)
+    slots = np.full(1 << max(int(2 * len(points) - 1).bit_length(), 4), -1, np.int64)
+    points = np.ascontiguousarray(points, np.float64)
+    kernels.mark_repeats(points, points.view(np.int64), slots, repeated)
+    return repeated
+
+
+def has_repeats(points: np.ndarray) -> bool:
+    """Whether so many points are repeated that it is worth looking for all; takes a hundredth of the time of a look at all."""
+    points = np.ascontiguousarray(points, np.float64)
+    chosen = np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)
+    slots = np.full(1 << 12, -1, np.int64)
+    bits = points.view(np.int64)
+    repeats = [kernels.enter_points(points, bits, np.unique(chosen), slots)]
+    in_parts(
+        len(points), PART, lambda _, begin, end: repeats.append(kernels.count_repeats(points, bits, slots, begin, end))
+    )
+    return sum(repeats) > SHARE * len(chosen)
+
+
+def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
+    """Return which points lie within a share of the spacing from an earlier one that stays (N,) bool.
+
+    The spacing is that where the points lie densest, so that no dense part of an uneven scan is thinned.
+    """
+    radius = share * _densest_spacing(points)
+    left_out = np.zeros(len(points), np.bool_)
+    if radius <= 0.0 or len(points) < 3:
+        return left_out
+    lower = points.min(axis=0)
+    size = np.ptp(points, axis=0).max() / radius
+    if size > 1e15:  # boxes could not be numbered: nothing that is a number lies that close
+        return left_out
+    slots = np.full(1 << max(int(2 * len(points) - 1).bit_length(), 4), -1, np.int64)
+    following = np.full(len(points), -1, np.int64)
+    kernels.mark_near(np.ascontiguousarray(points), lower, radius, slots, following, left_out)
+    return left_out
+
+
+def _densest_spacing(points: np.ndarray) -> float:
+    """Mean spacing in the densest twentieth of a scan, told by the sixteenth nearest so that a few copies do not matter."""
+    rank = min(COPIES, len(points) - 1)
+    if rank < 1:
+        return 0.0
+    places = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), SAID)).astype(np.int64)])
+    squares = np.empty(len(places))
+    trees.ranked_of_places(grow_tree(points), places, rank + 1, squares)
+    return float(np.sqrt(np.quantile(squares, DENSEST) * np.pi / rank))

@@ -1,0 +1,125 @@
+"""Noise and doubled layers: points go to the surface that those around them form, along its normal, so that rims stay."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels.scan import noise as kernels
+from ...kernels.surface.patches import PATCH
+from ...kernels.surface.size_field import choose_apart
+from ...runtime.parallel import in_parts
+from .nearby import NEAREST, Nearby
+
+NARROW = 28.0  # points of the narrowest patch
+WIDEST = 2.0  # radius of the widest in that of the narrowest
+WORSE = 1.1  # how much worse than the narrowest a wider patch may fit
+SPARSE = 8  # of so many nearest one has a patch
+SOME = 0.02  # part of the points that must lie in layers, as a few seem to by chance
+FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
+BROAD = 3.0  # radius of a patch that holds as much of two layers, in the distance up to which they are looked for
+FOLLOWED = 0.5  # a narrower patch that fits so much better shows that the surface is one
+PART = 200  # least patches of a part that a thread fits
+
+
+class Surfaces(NamedTuple):
+    """Patches at some of the points."""
+
+    number: np.ndarray  #: (N,) int64 patch of each point, -1 for most
+    centres: np.ndarray  #: (C,) int64 point of each patch
+    patches: np.ndarray  #: (C, PATCH) as `kernels.surface.patches`
+
+
+def fit_surfaces(near: Nearby) -> Surfaces:
+    """Fit patches all over a scan, as wide as the surface lets them be."""
+    chosen = np.zeros(len(near.neighbors), np.bool_)
+    choose_apart(np.ascontiguousarray(near.neighbors[:, :SPARSE]), chosen)
+    centres = np.flatnonzero(chosen)
+    number = np.full(len(chosen), -1, np.int64)
+    number[centres] = np.arange(len(centres))
+    reach = np.sqrt(near.squares[:, -1])
+    known = np.where(near.neighbors >= 0, reach[near.neighbors], np.inf)
+    radii = (np.median(known, axis=1) * np.sqrt(NARROW / NEAREST))[centres]
+    radii[~np.isfinite(radii)] = np.linalg.norm(np.ptp(near.tree.points, axis=0))
+    patches = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
+    usual = _around(near, number, patches[:, 12])[centres]
+    return Surfaces(number, centres, _fit(near, centres, radii, WIDEST, WORSE * usual))
+
+
+def _fit(near: Nearby, centres: np.ndarray, radii: np.ndarray, widest: float, usual: np.ndarray) -> np.ndarray:
+    """Return patches (C, PATCH) of radii up to `widest` that fit as well as usual."""
+    patches = np.empty((len(centres), PATCH))
+    in_parts(
+        len(centres),
+        PART,
+        lambda _, begin, end: kernels.fit_patches(near.tree, centres, radii, widest, usual, patches, begin, end),
+    )
+    return patches
+
+
+def _around(near: Nearby, number: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return for each point (N,) the middle one of the values (C,) of the patches around it."""
+    own = np.column_stack([np.arange(len(number)), near.neighbors])
+    patch = np.where(own >= 0, number[own], -1)
+    found = np.sort(np.where(patch >= 0, values[patch], np.inf), axis=1)
+    count = (patch >= 0).sum(axis=1)
+    middle = found[np.arange(len(found)), np.maximum(count - 1, 0) // 2]
+    return np.where(count > 0, middle, np.median(values))
+
+
+def onto_surfaces(near: Nearby, surfaces: Surfaces) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the points lie on the patches around them, and the normals there, of either sign; (N, 3) each, rows of the tree."""
+    points = near.tree.points
+    moved, normals = np.empty_like(points), np.empty_like(points)
+    in_parts(
+        len(points),
+        PART,
+        lambda _, begin, end: kernels.onto_patches(
+            near.tree, surfaces.number, surfaces.patches, near.neighbors, moved, normals, begin, end
+        ),
+    )
+    return moved, normals
+
+
+def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points lie in two layers no farther apart than `distance` [scan unit], and where these would be one.
+
+    Those that are `known` (N,) to have done so, which are on their way, are among them.
+
+    Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly at none. A patch
+    that holds as much of both is several times wider than they are apart. A corrugated surface lies at two distances from it
+    too, but a narrower patch follows that.
+
+    Returns
+    -------
+    layers : ndarray
+        (N,) bool, rows of the tree.
+    between : ndarray
+        (N, 3) rows of the tree; other points where they are [scan unit].
+    """
+    broad = _broad(near, surfaces, distance)
+    apart = known | _two(near, surfaces, broad, distance)
+    layers = apart | _two(near, surfaces, surfaces, distance)
+    between = near.tree.points.copy()
+    for rows, patches in ((apart, broad), (layers & ~apart, surfaces)):
+        if rows.any():
+            between[rows] = onto_surfaces(near, patches)[0][rows]
+    return layers, between
+
+
+def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:
+    """Return patches at the same points, wide enough for two layers."""
+    centres = surfaces.centres
+    radii = np.maximum(BROAD * distance, surfaces.patches[:, 15])
+    return surfaces._replace(patches=_fit(near, centres, radii, 1.0, np.full(len(centres), np.inf)))
+
+
+def _two(near: Nearby, narrow: Surfaces, surfaces: Surfaces, distance: float) -> np.ndarray:
+    """Return which points lie at two distances from the patches around them (N,), rows of the tree; none where only a few do."""
+    thick, flatness = surfaces.patches[:, 12], surfaces.patches[:, 13]
+    apart = (2.0 * thick <= distance) & (narrow.patches[:, 12] >= FOLLOWED * thick)
+    calm = _around(near, surfaces.number, np.where(apart, flatness, 3.0))
+    own = np.where(near.neighbors >= 0, calm[near.neighbors], 3.0)
+    layers = np.median(own, axis=1) < FLATNESS
+    return layers if layers.mean() > SOME else np.zeros(len(layers), np.bool_)

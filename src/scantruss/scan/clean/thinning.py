@@ -1,0 +1,32 @@
+"""Streamlining (Sec. 2.2): one point stays in each search box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+
+LARGEST = 2.0**20  # most boxes along an axis
+
+
+def thin_to(points: np.ndarray, spacing: float) -> np.ndarray:
+    """Return which points stay (N,) bool: of each search box as wide as the spacing the one nearest to the mean of its points."""
+    if not spacing > 0:
+        raise InputError(f"spacing must be a positive length in the scan's unit, got {spacing:g}")
+    extent = float(np.ptp(points, axis=0).max())
+    if extent > LARGEST * spacing:
+        raise InputError(
+            f"spacing {spacing:g} is too small for a scan of {extent:.4g}; use at least {extent / LARGEST:.2g}"
+        )
+    box = np.floor((points - points.min(axis=0)) / spacing).astype(np.int64)
+    key = (box[:, 0] << 42) | (box[:, 1] << 21) | box[:, 2]
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.r_[True, np.diff(key[order]) != 0])
+    count = np.diff(np.r_[first, len(points)])
+    mean = np.add.reduceat(points[order], first, axis=0) / count[:, None]
+    group = np.repeat(np.arange(len(first)), count)
+    away = ((points[order] - mean[group]) ** 2).sum(axis=1)
+    best = np.lexsort((away, group))[first]
+    stays = np.zeros(len(points), np.bool_)
+    stays[order[best]] = True
+    return stays

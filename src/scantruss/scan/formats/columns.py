@@ -1,0 +1,71 @@
+"""Which columns of a text file hold x, y and z: by the names in its header."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...errors import InputError
+
+_BESIDE = "coordinates?|coord|position|pos|points?|pt|vertex|world|global|local|scan|axis|value|p|v"
+_DIRECT = tuple(re.compile(f"(?:{_BESIDE})?{axis}(?:{_BESIDE})?") for axis in "xyz")
+_COUNTED = tuple(re.compile(f"(?:{_BESIDE}|xyz)(?:{number})") for number in "012")
+_MAP = (
+    re.compile("e|east|eastings?|rechtswert|ost|ostwert"),
+    re.compile("n|north|northings?|hochwert|nord|nordwert"),
+    re.compile("z|h|heights?|elev|elevations?|alt|altitude|level|hoehe|hhe"),
+)
+_FAMILIES = (_DIRECT, _COUNTED, _MAP, (*_DIRECT[:2], _MAP[2]))
+_NUMBER_OF_POINT = re.compile("id|ids|nr|no|num|number|index|idx|point|pointid|pt|name|label|fid|punkt|punktnummer|")
+
+
+def clean_name(name: str) -> str:
+    """Return a column name without quotes, brackets, unit and all that is not a letter or digit of ASCII, in lower case."""
+    name = re.sub(r"\(.*?\)|\[.*?\]|<.*?>", "", name.strip().strip("\"'").lower())
+    name = re.sub(r"[\s_.:/-]+(mm|cm|m|ft|feet|foot|in|inch|inches|met(er|re)s?)\s*$", "", name)
+    return re.sub(r"[^0-9a-z]", "", name)
+
+
+def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:
+    """Return the columns named x, y, z (or easting, northing, height); None where a name is missing."""
+    clean = [clean_name(name) for name in names]
+    for family in _FAMILIES:
+        found = [next((i for i, name in enumerate(clean) if axis.fullmatch(name)), -1) for axis in family]
+        if min(found) >= 0 and len(set(found)) == 3:
+            return found[0], found[1], found[2]
+    return None
+
+
+def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[int, int, int] | None:
+    """Return the columns of x, y, z for rows of a given width; None where the names do not fit the rows.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Words of a header line.
+    width : int
+        Fields of a row.
+    has_row_names : bool
+        Whether the first field of the rows is a label or a running number, which a header may leave out.
+    """
+    if len(names) > width:
+        return find_columns(names[-width:])  # "columns: x y z"
+    found = find_columns(names)
+    if not found or len(names) == width:
+        return found
+    if has_row_names and len(names) == width - 1 and not _NUMBER_OF_POINT.fullmatch(clean_name(names[0])):
+        return found[0] + 1, found[1] + 1, found[2] + 1
+    if sorted(found) == [0, 1, 2] or _NUMBER_OF_POINT.fullmatch(clean_name(names[0])):
+        return found
+    return None
+
+
+def check_not_degrees(path: Path, names: Sequence[str]) -> None:
+    """Refuse names of longitude and latitude where there are no lengths."""
+    clean = {clean_name(name) for name in names}
+    if clean & {"lon", "long", "lng", "longitude"} and clean & {"lat", "latitude"}:
+        raise InputError(
+            f"{path} has longitude and latitude in degrees, and a grid needs lengths; project it to a plane system such"
+            " as UTM first (QGIS, pyproj), with columns x, y, z"
+        )

@@ -1,0 +1,307 @@
+"""How a text file of points is laid out: separator, decimal sign, header, columns. Found from a part of the file."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import FormatError
+from ..units import metres_of_columns, metres_of_comments
+from .columns import check_not_degrees, fit_columns
+from .content import find_attributes
+from .kinds import is_text, kind_of, read_head, wrong_kind
+
+PART = 1 << 16  # bytes looked at, at the start and in the middle
+LINES = 1000  # lines looked at in each part
+ANY = "any"  # blanks, commas and semicolons in one line
+COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
+GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)")
+MISSING = frozenset(
+    [
+        *(sign + word for sign in ("", "+", "-") for word in ("nan", "nan(ind)", "inf", "infinity")),
+        *(sign + word for sign in ("", "-") for word in ("1.#qnan", "1.#ind", "1.#inf")),
+        *("na", "n/a", "null", "none", "-", "--"),
+    ]
+)
+#: separator (None: blanks) and whether a comma may be the decimal sign; the first that fits best is taken
+GRAMMARS: tuple[tuple[str | None, bool], ...] = (
+    *((sign, comma) for sign in (";", "|", "\t") for comma in (False, True)),
+    (",", False),
+    (None, False),
+    (None, True),
+    (",", True),  # "1,5","2,5","3,5"
+    (ANY, False),
+)
+_REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the coordinates of a text file are."""
+
+    encoding: str
+    separator: str | None  #: one sign, None for blanks, or ANY
+    comma: bool  #: a comma may be the decimal sign
+    skip: int  #: lines before the first point
+    columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number
+    promised: int | None  #: points that a count line promises
+    width: int = 0  #: fields of most lines
+    named: bool = False  #: the header names the columns
+    attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
+    metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
+    z_metres: float | None = None  #: ... of z
+    header: tuple[str, ...] = ()  #: the lines before the first point
+
+    @property
+    def plain(self) -> bool:
+        """Whether one sign, which is no decimal sign too, stands between two numbers."""
+        return self.separator != ANY and not (self.separator == "," and self.comma)
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Return the fields of a line without its comment; [] where nothing is left."""
+    if "#" in line or "//" in line:
+        line = COMMENT.split(line, maxsplit=1)[0]
+    return split_fields(line.strip(" \r\n") if separator == "\t" else line.strip(), separator)
+
+
+def split_fields(text: str, separator: str | None) -> list[str]:
+    """Return the fields of a text, without blanks and quotes around them; [] for an empty text."""
+    if not text:
+        return []
+    if separator == ANY:
+        fields = re.split(r"[,;\s]+", text.strip(" ,;\t"))
+    elif separator is None:
+        fields = text.split()
+    elif '"' in text:
+        fields = _split_quoted(text, separator)
+    else:
+        fields = text.split(separator)
+    return [field.strip().strip("\"'").strip() for field in fields]
+
+
+def _split_quoted(text: str, separator: str) -> list[str]:
+    try:
+        return next(csv.reader([text], delimiter=separator, skipinitialspace=True))
+    except csv.Error:
+        return text.split(separator)
+
+
+def is_number(field: str, comma: bool) -> bool:
+    """Return whether a field is a number, or a word for a missing one."""
+    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or _is_missing(field)
+
+
+def number_of(field: str, comma: bool) -> float:
+    """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
+    if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
+        return float(re.sub("[dD]", "e", field.replace(",", ".")))
+    if not field or _is_missing(field):
+        return math.nan
+    raise ValueError(field)
+
+
+def _is_missing(field: str) -> bool:
+    """Whether a field is a word for a missing number, or the stars for one that a program had no room for."""
+    return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
+
+
+def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
+    """Return the layout of a text file of points and wanted attributes; FormatError where it is no such file."""
+    head = read_head(path)
+    kind = kind_of(head)
+    if not is_text(head) or kind in _REFUSED or kind.startswith("a raster"):
+        raise wrong_kind(path, head, "a text file of points")
+    encoding = _encoding(head)
+    start, middle = _parts(path, encoding)
+    start, middle = start[:LINES], middle[:LINES]
+    rows = [row for row in start + middle if split_line(row, ANY)]
+    separator, comma = _find_grammar(rows)
+    if separator == ANY:
+        _check_not_grouped(path, rows)
+    if (separator, comma) == (",", True):
+        _check_not_thousands(path, rows)
+    split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
+    data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
+    behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
+    columns = _numeric_columns([row for _, row in data], comma)
+    if not data and not kind:
+        raise FormatError(f"{path} has no line with three numbers, so no points")
+    if len(data) * 2 < behind or len(columns) < 3:
+        raise wrong_kind(path, head, "a text file of points")
+    layout = _finish(start, data, columns, encoding, separator, comma)
+    _check_no_points(path, start[: layout.skip], separator, comma)
+    lines = list(header_names(start[: layout.skip], separator))
+    if not layout.named:
+        for names in lines:
+            check_not_degrees(path, names)
+    fitting = [names for names in lines if len(names) == layout.width]
+    found = [find_attributes(names, wanted) for names in fitting]
+    metres, z_metres = metres_of_comments(start[: layout.skip]), None
+    for names in fitting if layout.named else ():
+        by_name = metres_of_columns(path, [names[column] for column in layout.columns])
+        metres, z_metres = by_name if by_name[0] else (metres, z_metres)
+    attributes = tuple(max(found, key=len, default={}).items())
+    header = tuple(line.strip() for line in start[: layout.skip])
+    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=header)
+
+
+def _encoding(head: bytes) -> str:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    return "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "latin-1"
+
+
+def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
+    """Return the whole lines of the first part of a file and of a part in its middle."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        raw = file.read(PART)
+        file.seek(size // 2)
+        later = file.read(PART // 4) if size > 2 * PART and encoding != "utf-16" else b""
+    start = re.split(r"\r\n|\n|\r", raw.decode(encoding, errors="replace"))
+    middle = re.split(r"\r\n|\n|\r", later.decode("latin-1"))[1:-1]
+    return (start[:-1] if size > PART and len(start) > 1 else start), middle
+
+
+def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
+    """Return separator and decimal sign by which most lines hold three numbers."""
+    scores = []
+    for separator, comma in GRAMMARS:
+        scores.append(sum(_count_numbers(split_line(line, separator), comma) >= 3 for line in lines))
+    best = max(scores[:-1])
+    if 2 * best < scores[-1]:
+        return GRAMMARS[-1]
+    separator, comma = GRAMMARS[next(i for i, score in enumerate(scores) if score >= best)]
+    return separator, comma or _has_decimal_commas(lines, separator)
+
+
+def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
+    """Whether one line of ten holds more numbers with decimal commas: 1,5;2,5;3,5;200;100;50 has three without."""
+    split = [split_line(line, separator) for line in lines]
+    return 10 * sum(_count_numbers(row, True) > _count_numbers(row, False) for row in split) > len(split)
+
+
+def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
+    """Refuse numbers such as 5.118,216 and "5,118.216", which would fall into two."""
+    for separator in (";", "|", "\t", ",", None):
+        for row in rows[:: len(rows) // 20 + 1]:
+            fields = split_line(row, separator)
+            grouped = [field for field in fields if GROUPED.fullmatch(field)]
+            if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
+                raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
+
+
+def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
+    """Refuse "1,234","2,345" where nothing tells that the commas within the quotes are decimal signs."""
+    fields = [field for row in rows for field in split_line(row, ",") if NUMBER_COMMA.fullmatch(field)]
+    if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
+        said = next(field for field in fields if "," in field)
+        raise FormatError(
+            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with points'
+        )
+
+
+def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:
+    """Refuse points above the first line that is split as most are: with another separator they would pass for a header."""
+    for number, line in enumerate(header, start=1):
+        fields = split_line(line, ANY)
+        if len(fields) >= 3 > _count_numbers(split_line(line, separator), comma) and all(
+            is_number(field, False) for field in fields
+        ):
+            raise FormatError(
+                f"{path}: line {number} ({line.strip()[:60]!r}) holds numbers with another separator than most lines;"
+                " mend or delete it"
+            )
+
+
+def _count_numbers(row: Sequence[str], comma: bool) -> int:
+    return sum(is_number(field, comma) for field in row)
+
+
+def _numeric_columns(rows: Sequence[Sequence[str]], comma: bool) -> list[int]:
+    """Return the columns that nearly all rows have and that hold numbers or nothing."""
+    columns = []
+    for column in range(max(map(len, rows), default=0)):
+        fields = [row[column] for row in rows if column < len(row)]
+        filled = [field for field in fields if field]
+        numbers = sum(is_number(field, comma) for field in filled)
+        if len(fields) >= 0.9 * len(rows) and numbers and numbers >= 0.9 * len(filled):
+            columns.append(column)
+    return columns
+
+
+def _finish(
+    start: Sequence[str],
+    data: list[tuple[int, list[str]]],
+    numeric: list[int],
+    encoding: str,
+    separator: str | None,
+    comma: bool,
+) -> Layout:
+    """Return the layout, with the columns by name where the header names them."""
+    while len(data) > 1 and not all(c < len(data[0][1]) and is_number(data[0][1][c], comma) for c in numeric[:3]):
+        data = data[1:]  # a line of the header that holds three numbers
+    width = Counter(len(row) for _, row in data).most_common(1)[0][0]
+    if _is_counted_header(data):  # pandas names the columns of an array 0, 1, 2
+        first = int(not data[0][1][0])
+        skip, columns = data[1][0], (first, first + 1, first + 2)
+        return Layout(encoding, separator, comma, skip, columns, None, width)
+    skip = data[0][0]
+    running, rising = _is_running([row[0] for _, row in data])
+    named = _named_columns(start[:skip], separator, width, running or 0 not in numeric)
+    counts = [line.strip() for line in start[:skip] if re.fullmatch(r"\s*\d+\s*", line)]
+    four = rising and len(numeric) > 3 and numeric[0] == 0 and all(len(row) > numeric[3] for _, row in data)
+    chosen = named or tuple(numeric[: 4 if four else 3])
+    promised = int(counts[-1]) if counts else None
+    return Layout(encoding, separator, comma, skip, chosen, promised, width, named is not None)
+
+
+def _is_counted_header(data: Sequence[tuple[int, list[str]]]) -> bool:
+    """Return whether the first row of numbers just counts the columns, unlike the rows that follow."""
+    if len(data) < 3:
+        return False
+    names = data[0][1]
+    counted = [str(i) for i in range(len(names))]
+    if names[0] == "" and names[1:] == counted[:-1]:
+        return len(data[1][1]) == len(names)
+    return names == counted and any("." in field or "," in field for field in data[1][1][:3])
+
+
+def _is_running(fields: Sequence[str]) -> tuple[bool, bool]:
+    """Return whether the fields are whole numbers, each one more than the one before, and whether each is larger."""
+    if len(fields) < 3 or not all(re.fullmatch(r"\d{1,15}", field) for field in fields):
+        return False, False
+    steps = np.diff([int(field) for field in fields])
+    return bool((steps == 1).all()), bool((steps > 0).all())
+
+
+def _named_columns(
+    header: Sequence[str], separator: str | None, width: int, has_row_names: bool
+) -> tuple[int, int, int] | None:
+    """Return the columns of x, y, z from the header line that names them, the one nearest to the points first."""
+    for exact in (True, False):
+        for names in header_names(header, separator):
+            if len(names) >= 3 and (len(names) == width or not exact):
+                columns = fit_columns(names, width, has_row_names)
+                if columns:
+                    return columns
+    return None
+
+
+def header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
+    """Yield the header lines split by every separator in turn, the line nearest to the points first."""
+    for line in reversed(header):
+        text = line.strip().lstrip("#/%!;* \t").strip()
+        for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
+            yield split_fields(text, sign)

@@ -1,0 +1,57 @@
+"""Files packed by gzip (scan.xyz.gz): unpacked beside the temporary files of the system, within bounds."""
+
+from __future__ import annotations
+
+import gzip
+import tempfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ...errors import FormatError
+from .kinds import read_head, wrong_kind
+
+MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros would to a thousandth
+ALWAYS = 1 << 26  # bytes that any file may unpack to
+BLOCK = 1 << 20  # bytes
+
+
+@contextmanager
+def unpacked(path: Path) -> Iterator[Path]:
+    """Give the path of the unpacked file, for as long as it is needed; messages name the packed one.
+
+    Raises
+    ------
+    FormatError
+        The file is no gzip archive, damaged, cut off, or unpacks to more than any scan would.
+    """
+    head = read_head(path)
+    if not head.startswith(b"\x1f\x8b"):
+        raise wrong_kind(path, head, "a gzip archive")
+    with tempfile.TemporaryDirectory(prefix="scantruss-") as folder:
+        inner = Path(folder) / path.name[:-3]
+        _unpack(path, inner)
+        try:
+            yield inner
+        except FormatError as error:
+            raise FormatError(str(error).replace(str(inner), str(path))) from None
+
+
+def _unpack(path: Path, inner: Path) -> None:
+    try:
+        with gzip.open(path) as source, inner.open("wb") as target:
+            size = 0
+            while block := source.read(BLOCK):
+                size += len(block)
+                check_size(path, size)
+                target.write(block)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise FormatError(f"{path} cannot be unpacked ({' '.join(str(error).split())}); copy it again") from None
+
+
+def check_size(path: Path, size: int) -> None:
+    """Refuse a packed file that unpacks to so many bytes as no scan would."""
+    most = max(ALWAYS, MOST_SHRUNK * path.stat().st_size)
+    if size > most:
+        raise FormatError(f"{path} unpacks to over {most:,} bytes, which no scan of its size does; unpack it yourself")

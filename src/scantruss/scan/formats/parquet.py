@@ -1,0 +1,80 @@
+"""Points of a Parquet file by pyarrow, the extra `parquet`: the columns are those a text file would be read by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import FormatError, ScanTrussError
+from ..units import metres_of_columns
+from .columns import check_not_degrees, find_columns
+from .content import Content, find_attributes
+from .kinds import read_head, unreadable, wrong_kind
+
+BATCH = 1 << 18  # rows
+
+
+def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of a Parquet file and the wanted attributes."""
+    head = read_head(path)
+    if not head.startswith(b"PAR1"):
+        raise wrong_kind(path, head, "a Parquet file")
+    try:
+        import pyarrow.parquet as parquet
+    except ImportError:
+        raise FormatError(
+            f'{path}: reading .parquet needs the package pyarrow; python -m pip install "scantruss[parquet]"'
+        ) from None
+    try:
+        with parquet.ParquetFile(path, memory_map=True) as file:
+            return _read(path, file, wanted)
+    except ScanTrussError:
+        raise
+    except BaseException as error:
+        raise unreadable(path, "Parquet", error) from None
+
+
+def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:
+    """Return the metres a unit of x and y, and of z, that the columns name, without reading them; None where they do not."""
+    with suppress(Exception):  # pyarrow is not there, or the file is damaged: reading its points says so
+        import pyarrow.parquet as parquet
+
+        names = parquet.read_schema(path).names
+        if columns := find_columns(names):
+            return metres_of_columns(path, [names[c] for c in columns])
+    return None, None
+
+
+def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:
+    names = file.schema_arrow.names
+    columns = find_columns(names)
+    if columns is None:
+        check_not_degrees(path, names)
+        raise FormatError(f"{path} has no columns named x, y and z; it has {', '.join(names)[:120] or 'none'}")
+    found = find_attributes(names, wanted)
+    places = [*columns, *found.values()]
+    chosen = list(dict.fromkeys(names[place] for place in places))
+    parts = []
+    for batch in file.iter_batches(BATCH, columns=chosen):
+        parts.append(np.column_stack([_numbers(path, batch, names[place]) for place in places]))
+    table = np.concatenate(parts) if parts else np.empty((0, len(places)))
+    attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
+    return Content(
+        np.ascontiguousarray(table[:, :3]), attributes, *metres_of_columns(path, [names[c] for c in columns])
+    )
+
+
+def _numbers(path: Path, batch: Any, name: str) -> np.ndarray:
+    """Return a column as float64, missing values as NaN."""
+    import pyarrow
+
+    column = batch.column(batch.schema.get_field_index(name))
+    try:
+        values = column.cast(pyarrow.float64()).to_numpy(zero_copy_only=False)
+    except pyarrow.ArrowException:
+        raise FormatError(f"{path}: column {name} must hold numbers, it holds {column.type}") from None
+    return np.asarray(values, dtype=np.float64)

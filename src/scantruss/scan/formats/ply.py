@@ -1,0 +1,141 @@
+"""Points of a PLY file: ascii or binary of either byte order; of the element `vertex` x, y, z and wanted attributes count.
+
+An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that this package cannot take on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import FormatError
+from ..units import metres_of
+from .content import Content, find_attributes
+from .kinds import read_head, wrong_kind
+from .ply_header import PLY, Element, Header, ends_early, read_header
+from .ply_text import read_ascii
+
+LONGEST_LIST = 1 << 26  # entries
+MOST_RUNS = 20_000  # changes of list length walked through behind the points
+
+
+def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the points of a PLY file and the wanted attributes."""
+    head = read_head(path)
+    if not PLY.match(head):
+        raise wrong_kind(path, head, "a PLY file")
+    header = read_header(path)
+    names = [element.name for element in header.elements]
+    if "vertex" not in names:
+        raise FormatError(f"{path} has no element vertex, so no points")
+    vertex = header.elements[names.index("vertex")]
+    own = [p.name for p in vertex.properties if not p.count_type]
+    lower = [name.lower() for name in own]
+    if missing := [axis for axis in "xyz" if axis not in lower]:
+        raise FormatError(f"{path}: the element vertex has no property {missing[0]}")
+    found = find_attributes(own, wanted)
+    columns = [own[place] for place in (*map(lower.index, "xyz"), *found.values())]
+    if vertex.count == 0:
+        table = np.empty((0, len(columns)))
+    elif not header.order:
+        table = read_ascii(path, header, vertex, columns)
+    else:
+        table = _read_binary(path, header, vertex, columns)
+    attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
+    return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=metres_of(header.unit))
+
+
+def _read_binary(path: Path, header: Header, vertex: Element, columns: Sequence[str]) -> np.ndarray:
+    data = np.memmap(path, dtype=np.uint8, mode="r")
+    offset = header.start
+    table = np.empty((0, len(columns)))
+    behind = False
+    for element in header.elements:
+        if element is vertex:
+            table, offset = _read_rows(path, data, offset, header.order, element, columns)
+            behind = True
+        else:
+            offset = _skip(path, data, offset, header.order, element, MOST_RUNS if behind else None)
+    return table
+
+
+def _read_rows(
+    path: Path, data: np.ndarray, offset: int, order: str, vertex: Element, columns: Sequence[str]
+) -> tuple[np.ndarray, int]:
+    """Return the wanted columns of all rows and the byte behind them."""
+    if len(data) - offset < vertex.count * row_type(vertex, order, [0] * len(vertex.properties)).itemsize:
+        raise ends_early(path, vertex)
+    table = np.empty((vertex.count, len(columns)))
+    begin = 0
+    for rows, behind in _runs(path, data, offset, order, vertex):
+        for column, name in enumerate(columns):
+            table[begin : begin + len(rows), column] = rows[name]
+        begin, offset = begin + len(rows), behind
+    return table, offset
+
+
+def _skip(path: Path, data: np.ndarray, offset: int, order: str, element: Element, most: int | None) -> int:
+    """Return the byte behind an element; gives up (end of file) after `most` changes of list length."""
+    if not element.properties:
+        return offset
+    for runs, (_, behind) in enumerate(_runs(path, data, offset, order, element)):
+        offset = behind
+        if most is not None and runs >= most:
+            return len(data)
+    return offset
+
+
+def _runs(path: Path, data: np.ndarray, offset: int, order: str, element: Element) -> Iterator[tuple[np.ndarray, int]]:
+    """Yield rows as a structured array and the byte behind them; the lists of one yield all have one length."""
+    begin, window = 0, element.count if not element.has_lists else 64
+    while begin < element.count:
+        lengths = _list_lengths(path, data, offset, order, element)
+        row = row_type(element, order, lengths)
+        room = min(window, element.count - begin, (len(data) - offset) // row.itemsize)
+        if room < 1 or (not element.has_lists and room < element.count):
+            raise ends_early(path, element)
+        rows = np.ndarray((room,), row, buffer=data, offset=offset)
+        same = np.ones(room, dtype=bool)
+        for number, length in enumerate(lengths):
+            if element.properties[number].count_type:
+                same &= rows[f"count {number}"] == length
+        stop = room if same.all() else int(np.argmin(same))
+        window = window * 4 if stop == room else 64
+        offset += stop * row.itemsize
+        yield rows[:stop], offset
+        begin += stop
+
+
+def _list_lengths(path: Path, data: np.ndarray, offset: int, order: str, element: Element) -> list[int]:
+    """Return the length of each list in the row at a byte, 0 for the other properties."""
+    lengths = []
+    for p in element.properties:
+        length = 0
+        if p.count_type:
+            count = np.dtype(order + p.count_type)
+            if offset + count.itemsize > len(data):
+                raise ends_early(path, element)
+            length = int(np.frombuffer(data, count, 1, offset)[0])
+            if not 0 <= length <= min(len(data), LONGEST_LIST):
+                raise FormatError(f"{path}: a list of {element.name} has {length} entries; the file is damaged")
+            offset += count.itemsize + length * np.dtype(p.type).itemsize
+        else:
+            offset += np.dtype(p.type).itemsize
+        lengths.append(length)
+    return lengths
+
+
+def row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.void]:
+    """Return the layout of a row whose lists have the given lengths."""
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    taken = set()
+    for number, (p, length) in enumerate(zip(element.properties, lengths, strict=True)):
+        if p.count_type:
+            fields.append((f"count {number}", order + p.count_type))
+            fields.append((f"list {number}", order + p.type, (length,)))
+        else:
+            fields.append((f"other {number}" if p.name in taken else p.name, order + p.type))
+            taken.add(p.name)
+    return np.dtype(fields)

@@ -1,0 +1,227 @@
+"""From files to a PointCloud: the table of formats and `read_points`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import FormatError, InputError
+from ...selection import Selection
+from ..cloud import PointCloud
+from ..degrees import said_of_degrees
+from ..extent import extent_of, said_of_apart
+from ..units import check_unit
+from .choose import check_attributes, choose, describe, places_in
+from .common_unit import to_common_unit
+from .content import Content
+from .copc import Place
+from .e57 import read_e57
+from .kinds import read_head
+from .las import Places, read_las
+from .numpy_files import read_npy, read_npz
+from .packed import unpacked
+from .parquet import read_parquet
+from .paths import Source, files_of, name_of_files
+from .pcd import read_pcd
+from .ply import read_ply
+from .solids import read_obj, read_off, read_stl
+from .text import read_text
+
+Reader = Callable[[Path, Sequence[str]], Content]
+
+
+def _plain(read: Callable[[Path], np.ndarray]) -> Reader:
+    """Return a reader of a format that holds points alone."""
+    return lambda path, wanted: Content(read(path))
+
+
+#: suffix -> function that returns what a file holds: its points and the wanted attributes
+READERS: dict[str, Reader] = {
+    ".ply": read_ply,
+    ".xyz": read_text, ".txt": read_text, ".csv": read_text, ".pts": read_text, ".asc": read_text,
+    ".las": read_las, ".laz": read_las,
+    ".obj": _plain(read_obj), ".stl": _plain(read_stl), ".off": _plain(read_off),
+    ".npy": read_npy, ".npz": read_npz,
+    ".e57": read_e57, ".pcd": read_pcd, ".parquet": read_parquet,
+}  # fmt: skip
+PACKED = ".gz"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The points of one file after selection, in one unit."""
+
+    points: np.ndarray  #: (N, 3) [unit]
+    unit: str
+    system: str  #: reference system, "" where the file does not say it
+    count: int  #: points in the file
+    left_out: dict[str, int]  #: what the file calls none and what each part of the selection left out
+    held: str  #: what could have been selected, where nothing was
+    notes: tuple[str, ...]
+
+
+def read_points(path: Source, unit: str = "", selection: Selection | None = None) -> PointCloud:
+    """Return the points of a scan; the format is that of the suffix.
+
+    Parameters
+    ----------
+    path : str, Path or several of them
+        A file with one of the suffixes in `READERS` (also packed: .xyz.gz), a pattern such as ``tiles/*.laz``, or several
+        of these that together are one scan.
+    unit : str
+        Unit of the coordinates: mm, cm, m, inch, foot, or "" for what the file says.
+    selection : Selection, optional
+        Which points are taken; all by default.
+
+    Returns
+    -------
+    PointCloud
+        All points that are taken, in the order of the files; faces, normals, colours and other properties are left aside.
+        `notes` says what was left out or converted.
+
+    Raises
+    ------
+    FormatError
+        A file is missing, empty, damaged, or of another kind than its suffix says.
+    InputError
+        The points cannot be used: too few, mostly NaN, all on a line; degrees; the unit is not known; nothing is selected.
+    """
+    check_unit(unit)
+    selection = selection or Selection()
+    files = files_of(path)
+    parts: list[Part] = []
+    for file in files:
+        common = next((part.unit for part in parts if part.unit), "")
+        parts.append(read_part(file, unit, selection, common))
+    points, unit, notes = _join(files, parts)
+    if not len(points):
+        raise _nothing_left(files, parts)
+    cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
+    return replace(cloud, notes=(*notes, *cloud.notes, *said_of_degrees(cloud)))
+
+
+def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
+    """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
+
+    def places_of(said: Content) -> list[Place]:
+        return places_in_file(path, said, unit, selection, common)
+
+    content = read_content(path, selection.needs, places_of if selection.crop else None)
+    return select(path, content, unit, selection, common)
+
+
+def places_in_file(path: Path, said: Content, unit: str, selection: Selection, common: str) -> list[Place]:
+    """Return the boxes around what is cropped in the unit of a file, by what it says."""
+    scale, _, _ = to_common_unit(path, replace(said, points=np.ones((1, 3))), unit, selection.z_unit, common)
+    return places_in(selection.crop, scale[0])
+
+
+def select(
+    path: Path, content: Content, unit: str, selection: Selection, common: str = "", described: int | None = None
+) -> Part:
+    """Return what is selected of some points of a file; where nothing is, about so many of them are described, or all."""
+    check_attributes(path, content.attributes, selection)
+    points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
+    kept, chosen = choose(points, content.attributes, selection)
+    held = "" if kept.any() else _describe(points, content, described)
+    if not kept.all():
+        points = points[kept]
+    left_out = add_counts([content.left_out, chosen, content.unread])
+    count = len(points) + sum(left_out.values())
+    return Part(points, unit, content.system, count, left_out, held, notes)
+
+
+def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
+    """Return what could be selected, by about so many points from everywhere, as the first may all be NaN."""
+    some = slice(None, None, max(len(points) // most, 1) if most else 1)
+    return describe(points[some], {name: values[some] for name, values in content.attributes.items()})
+
+
+def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
+    """Return what a file holds, as it stands in it: all points and the wanted attributes.
+
+    Where the file has a table of places only the points near `places_of` what it says of its units are read.
+    """
+    read_head(path)
+    with ExitStack() as stack:
+        inner = path
+        if path.suffix.lower() == PACKED and Path(path.stem).suffix.lower() in READERS:
+            inner = stack.enter_context(unpacked(path))
+        try:
+            reader = READERS[inner.suffix.lower()]
+        except KeyError:
+            known = " ".join(sorted(READERS))
+            raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
+        try:
+            with np.errstate(all="ignore"):  # what is not finite is counted and left out later
+                return read_las(inner, wanted, places_of) if reader is read_las else reader(inner, wanted)
+        except OSError as error:
+            raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
+        except MemoryError:
+            raise FormatError(f"{path} does not fit into the memory of this computer; thin the scan first") from None
+
+
+def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
+    """Return the points of all files in one unit, the unit, and what should be said."""
+    check_systems(files, [part.system for part in parts])
+    unit, notes = said_together(files, [part.unit for part in parts], [part.notes for part in parts])
+    points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
+    notes = (*notes, *said_of_left_out([part.left_out for part in parts]))
+    return points, unit, (*notes, *said_of_apart(files, [extent_of(part.points) for part in parts]))
+
+
+def said_together(
+    files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
+) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of all files of a scan, "" where none says one, and what should be said of them, each thing once."""
+    unit = next((unit for unit in units if unit), "")
+    said: dict[str, None] = {}
+    for file, own, words in zip(files, units, notes, strict=True):
+        said.update(dict.fromkeys(words))
+        if unit and not own:
+            said[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
+    return unit, tuple(said)
+
+
+def said_of_left_out(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
+    """Return what should be said of the points that are left out of the parts of a scan."""
+    return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
+
+
+def add_counts(parts: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Return the sums of counts by their words."""
+    sums: dict[str, int] = {}
+    for part in parts:
+        for words, count in part.items():
+            sums[words] = sums.get(words, 0) + count
+    return sums
+
+
+def check_systems(files: Sequence[Path], systems: Sequence[str]) -> None:
+    """Refuse files whose reference systems are known to differ."""
+    for by_code in (True, False):
+        named = [(f, system) for f, system in zip(files, systems, strict=True) if system]
+        named = [(f, system) for f, system in named if system.startswith("EPSG:") == by_code]
+        for file, system in named[1:]:
+            if system != named[0][1]:
+                raise InputError(
+                    f"{file} is in {system} and {named[0][0]} in {named[0][1]}; files of one scan must share a reference"
+                    " system, so bring them to one first (PDAL filters.reprojection)"
+                )
+
+
+def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
+    count = sum(part.count for part in parts)
+    if not count:
+        return FormatError(
+            f"{files[0]} holds no points" if len(files) == 1 else f"none of {len(files)} files holds points"
+        )
+    left_out = add_counts([part.left_out for part in parts])
+    said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
+    held = next((part.held for part in parts if part.held), "")
+    has = f"; {'the scan has' if len(parts) == 1 else 'some of them have'}{held}" if held else ""
+    return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {said}{has}")

@@ -1,0 +1,73 @@
+"""Normals turned to one side of a sheet, and to the outside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.surface import normals as kernels
+from ..kernels.surface.local_surface import Surface
+from ..runtime.parallel import in_parts
+from .vectors import dots
+
+HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
+SITES = 1500  # samples that a thread takes at least
+STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
+
+
+def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
+    """Drop links (S, K) to sites that stand over a site rather than beside it."""
+    in_parts(len(mean), SITES, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j))
+
+
+def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> np.ndarray:
+    """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,)."""
+    weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
+    in_parts(len(mean), SITES, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j))
+    order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
+    piece = np.empty(len(mean), np.int64)
+    kernels.orient_normals(mean, normals, neighbors, order, piece)
+    return _counted_off(piece)
+
+
+def _counted_off(piece: np.ndarray) -> np.ndarray:
+    """Return the numbers of pieces (S,) without gaps, where each is the first site of its piece."""
+    first = piece == np.arange(len(piece))
+    number: np.ndarray = (np.cumsum(first) - 1)[piece]
+    return number
+
+
+def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:
+    """Return mean normals (S, 3) of sites and those linked to them whose normals have a cosine over `facing` with their own."""
+    means = np.empty_like(normals)
+    in_parts(len(normals), SITES, lambda _, i, j: kernels.smooth_normals(normals, neighbors, facing, means, i, j))
+    return means
+
+
+def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
+    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards where that does not tell (a plate)."""
+    count = np.bincount(piece)
+    centre = np.stack([np.bincount(piece, mean[:, c]) / count for c in range(3)], axis=1)
+    arm = mean - centre[piece]
+    size = np.sqrt(np.bincount(piece, dots(arm, arm)) / count)
+    bulge = np.bincount(piece, dots(arm, normals)) / count
+    up = np.stack([np.bincount(piece, normals[:, c]) / count for c in range(3)], axis=1)
+    for i in range(len(count)):
+        side = bulge[i]
+        if abs(side) < 0.01 * max(size[i], 1e-300):
+            side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
+        if side < 0:
+            normals[piece == i] *= -1.0
+
+
+def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
+    """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
+
+    Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
+    or overgrown that happens by chance.
+    """
+    smooth = 0.15 * surface.step
+    if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
+        raise InputError(
+            "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
+        )

@@ -1,0 +1,126 @@
+"""Scans that would fit as well elsewhere: each is held against all the others together, in all ways that offer themselves.
+
+On a body that looks the same when turned, or slides on itself, scans agree in a wrong place as well as in the right one; then nothing
+in them tells which it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from ...runtime.parallel import processors
+from .features import find_features
+from .graph import Group, apart, links_of
+from .pairs import Pair, find_pair, judge_views, settled_from
+from .poses import move, small_motion, turn_by
+from .scans import Scan
+from .views import boxes_of, make_view
+
+AS_GOOD = 0.03  # agreement that another place may lack
+AS_CLOSE = 1.25  # residual that it may have, in that of the present one
+AS_MUCH = 0.2  # places that must agree there, in those that agree now
+LEAST = 0.08  # and in those of the scan
+ELSEWHERE = 1.5  # distance from which on a place is another one, in coarse spacings
+FEWEST = 3  # scans that tell which of several ways holds where one of them does not
+PUSH = 4.0  # how far a scan is pushed to see whether it comes back, in coarse spacings
+
+
+def leave_out_doubtful(
+    scans: list[Scan], group: Group, sure: set[int], progress: Callable[[str, float], None]
+) -> tuple[Group, set[int]]:
+    """Return what is left of a group without the scans that fit elsewhere as well, and these.
+
+    What only they held is left out with them. With fewer scans others may fit in more ways, so that is repeated; two that are left
+    of more do not tell which way holds.
+
+    Parameters
+    ----------
+    sure : scans that are not doubted, since their places were given
+    """
+    left_out: set[int] = set()
+    while len(group.members) > 1:
+        asked = [i for i in group.members if i not in sure]
+        pool = ThreadPoolExecutor(processors())
+        try:
+            tasks = [pool.submit(_fits_elsewhere, scans, group, i) for i in asked]
+            found = set()
+            for place, (i, task) in enumerate(zip(asked, tasks, strict=True)):
+                progress("doubt", place / len(asked))
+                if task.result():
+                    found.add(i)
+        finally:
+            pool.shutdown(cancel_futures=True)
+        if not found:
+            break
+        kept = _largest_linked(scans, group, found)
+        if len(kept) < FEWEST and not sure.issuperset(kept):
+            kept = []
+        left_out |= set(group.members) - set(kept)
+        group = Group(kept, {i: group.poses[i] for i in kept}, {i: group.turns[i] for i in kept})
+    return group, left_out
+
+
+def _largest_linked(scans: list[Scan], group: Group, without: set[int]) -> list[int]:
+    """Return the most scans of a group that overlap one after the other, some left out."""
+    part = {i: {i} for i in group.members if i not in without}
+    for i, j in links_of(scans, group):
+        if i in part and j in part and part[i] is not part[j]:
+            joined = part[i] | part[j]
+            part |= dict.fromkeys(joined, joined)
+    largest: set[int] = max(part.values(), key=lambda members: (len(members), -min(members)), default=set())
+    return sorted(largest)
+
+
+def _fits_elsewhere(scans: list[Scan], group: Group, i: int) -> bool:
+    """Whether a scan lies on the others, taken together, in another place about as well."""
+    scan, others = scans[i], _all_but(scans, group, i)
+    pose, turn = group.poses[i], group.turns[i]
+    now = judge_views(scan.middle, others.middle, pose, turn)
+
+    def is_rival(pair: Pair) -> bool:
+        fit = pair.fit
+        return (
+            apart(pair.pose, pose, scan.coarse) > ELSEWHERE * scan.coarse.spacing
+            and fit.agreement > now.agreement - AS_GOOD
+            and fit.residual < AS_CLOSE * now.residual
+            and fit.agreeing > max(AS_MUCH * now.agreeing, 2.0 * LEAST * len(scan.middle.points))
+        )
+
+    for pushed in _pushed(scan, pose):
+        if any(map(is_rival, settled_from(scan, others, pushed, turn))):
+            return True
+    both, features = [scan, others], find_features([scan.coarse, others.coarse])
+    return any(map(is_rival, find_pair(both, features, 0, 1, thorough=True)))
+
+
+def _all_but(scans: list[Scan], group: Group, i: int) -> Scan:
+    """Return all scans of a group but one as a single scan in its frame."""
+    members = [j for j in group.members if j != i]
+    coarse = np.concatenate([move(group.poses[j], scans[j].coarse.points) for j in members])
+    normals = np.concatenate([group.turns[j] * turn_by(group.poses[j], scans[j].coarse.normals) for j in members])
+    spacing = scans[i].coarse.spacing
+    facing = replace(scans[i].coarse, points=coarse, normals=normals, boxes=boxes_of(coarse, 1.5 * spacing))
+    points = np.concatenate([move(group.poses[j], scans[j].fine.points) for j in members])
+    wide = make_view(points, spacing, facing)
+    middle = replace(make_view(points, scans[i].middle.spacing, facing), strict=scans[i].middle.strict)
+    return Scan("", scans[i].cloud, wide, middle, middle)
+
+
+def _pushed(scan: Scan, pose: np.ndarray) -> list[np.ndarray]:
+    """Return poses that put a scan aside, and turned about its middle, both ways along and around three axes."""
+    points = move(pose, scan.coarse.points)
+    centre = points.mean(axis=0)
+    axes = np.linalg.eigh(np.cov((points - centre).T))[1].T
+    far = PUSH * scan.coarse.spacing
+    arm = float(np.sqrt(((points - centre) ** 2).sum(axis=1).mean()))
+    none = np.zeros(3)
+    found = []
+    for axis in axes:
+        for way in (far, -far):
+            found.append(small_motion(none, way * axis, centre) @ pose)
+            found.append(small_motion(way / arm * axis, none, centre) @ pose)
+    return found

@@ -1,0 +1,138 @@
+"""Fine alignment: generalized ICP of one scan onto another, and what tells a right pose from a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...kernels.scan import overlap as kernels
+from .poses import invert, small_motion
+from .views import View
+
+SHARP = 1000.0  # how much stiffer places hold across the surface than along it
+ROUNDS = 10  # most steps with one reach
+STILL = 5e-3  # a step that moves no place farther than this share of the spacing is the last
+NEAR = 0.5  # distance across the surface within which two scans agree, in spacings
+REACH = 3.0  # distance up to which they disagree, in spacings; beyond they may be two sides of a body
+DAMPING = 1e-6  # share of the stiffness that is added, so that what slides stays where it is
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """How two scans agree under a pose."""
+
+    agreeing: int  #: places of both scans that lie on the other's surface
+    against: int  #: places that lie over the other's surface, but off it
+    share: float  #: overlap: the agreeing share of the places of the scan that has the larger one
+    residual: float  #: root of the mean squared distance of agreeing places across the surface [scan unit]
+    near: float  #: distance across the surface within which places agree [scan unit]
+    over: float  #: share of the places, agreeing or against, of the scan that has the larger one
+
+    @property
+    def agreement(self) -> float:
+        """Share of the places over the other's surface that lie on it."""
+        return self.agreeing / max(self.agreeing + self.against, 1)
+
+    @property
+    def score(self) -> float:
+        """What counts when poses are compared: agreeing places, less where others are against or it is by chance.
+
+        Surfaces that only cross are anywhere within `near`: the mean squared distance is then a third of its square.
+        """
+        return self.agreeing * self.agreement**2 * max(1.0 - 3.0 * (self.residual / self.near) ** 2, 0.0)
+
+
+def align(
+    first: View, second: View, pose: np.ndarray, turn: float, reaches: Sequence[float], few: int, rounds: int = ROUNDS
+) -> np.ndarray:
+    """Return the pose (4, 4) that brings the first scan onto the second, from a pose nearby.
+
+    Parameters
+    ----------
+    pose : (4, 4) from the frame of the first scan to that of the second
+    turn : 1, or -1 where the normals of the two views face opposite sides
+    reaches : distances within which places pair, one after the other [scan unit]
+    few : places of a scan that are enough
+    rounds : most steps with one reach
+    """
+    every = max(min(len(first.points), len(second.points)) // few, 1)
+    centre = second.points.mean(axis=0)[None]
+    size = float(np.linalg.norm(np.ptp(second.points, axis=0)))
+    for reach in reaches:
+        for _ in range(rounds):
+            sums = np.zeros((7, 7))
+            count = add_pairs(sums, first, second, pose, np.eye(4), turn, reach, centre, every)
+            if count < 6:
+                return pose
+            step = solve(sums[:6, :6], sums[:6, 6], 0.5 * size)
+            pose = small_motion(step[:3], step[3:], centre[0]) @ pose
+            if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < STILL * first.spacing:
+                break
+    return pose
+
+
+def add_pairs(
+    sums: np.ndarray,
+    first: View,
+    second: View,
+    first_pose: np.ndarray,
+    second_pose: np.ndarray,
+    turn: float,
+    reach: float,
+    centre: np.ndarray,
+    every: int,
+) -> int:
+    """Add the pairs of places of two scans, found both ways, to the (7, 7) sums for moving the first; return their number."""
+    soft = 0.5 * first.spacing
+    count = 0
+    for a, b, one, other, sign in (
+        (first, second, first_pose, second_pose, 1.0),
+        (second, first, second_pose, first_pose, -1.0),
+    ):
+        part = np.zeros((7, 7))
+        count += kernels.step_sums(
+            a.points, a.normals, a.rim, b.points, b.normals, b.rim, b.boxes,
+            np.ascontiguousarray(one), np.ascontiguousarray(invert(other) @ one),
+            turn, every, reach, soft, SHARP, centre, part,
+        )  # fmt: skip
+        part[6, :6] *= sign
+        part[:6, 6] *= sign
+        sums += part
+    return count
+
+
+def solve(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
+    """Return the step (6 K,) that takes away what is left, turns [radian] before moves; what slides freely stays.
+
+    arm : length that makes turns and moves alike [scan unit]
+    """
+    scale = np.tile([1.0 / arm] * 3 + [1.0] * 3, len(load) // 6)
+    matrix = stiffness * scale[:, None] * scale
+    matrix[np.diag_indices(len(load))] += DAMPING * np.trace(matrix) / len(load) + 1e-300
+    rest = -load * scale
+    for k in range(len(load)):  # by hand: a library may round otherwise with other threads
+        factor = matrix[k + 1 :, k] / matrix[k, k]
+        matrix[k + 1 :, k:] -= np.multiply.outer(factor, matrix[k, k:])
+        rest[k + 1 :] -= factor * rest[k]
+    step = np.zeros(len(load))
+    for k in range(len(load) - 1, -1, -1):
+        step[k] = (rest[k] - (matrix[k, k + 1 :] * step[k + 1 :]).sum()) / matrix[k, k]
+    return scale * step
+
+
+def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
+    """Return how two scans agree under a pose (4, 4) of the first in the frame of the second; near and reach [scan unit]."""
+    shares, over, sums = [], [], np.zeros(5)
+    for a, b, back in ((first, second, pose), (second, first, invert(pose))):
+        part = np.zeros(5)
+        kernels.judge(
+            a.points, a.normals, b.points, b.normals, b.rim, b.boxes,
+            np.ascontiguousarray(back), turn, b.spacing, near, reach, part,
+        )  # fmt: skip
+        shares.append(part[0] / max(len(a.points), 1))
+        over.append((part[0] + part[1]) / max(len(a.points), 1))
+        sums += part
+    residual = float(np.sqrt(sums[2] / max(sums[0], 1.0)))
+    return Fit(int(sums[0]), int(sums[1]), float(max(shares)), residual, near, float(max(over)))

@@ -1,0 +1,167 @@
+"""Pairs of scans: the few poses in which two of them agree well enough to be considered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...runtime.parallel import processors
+from .fine import Fit, align, judge
+from .matching import find_candidates
+from .scans import Scan
+from .views import View
+
+CANDIDATES = 40  # poses from the features that are judged as they are
+ALIGNED = 10  # the best of them, which are aligned
+TRIED = 4  # the best of these, which are aligned closely
+WORSE = 0.2  # of them those whose score is not below this share of the best
+FEW = 800  # places of a scan that are enough to align it
+KEPT = 3  # poses of a pair that are handed on
+GOOD = 0.9  # agreement at which the other side of the normals need not be looked at
+BULGE = 0.6  # how surely normals must face the outside for the other side not to be looked at
+SHARE = 0.03  # overlap below which a pair is not considered
+AGREEMENT = 0.6  # agreement below which it is not
+NOISE = 3.0  # distance within which two scans agree, in the noise of both together
+LEAST = 0.15  # least such distance, in spacings of the view; scanners bend what they see a little
+MOST = 0.5  # the largest
+WITHIN = 3.0  # distance within which two scans agree, in the residual of pairs that are taken for right
+STRICTEST = 0.35  # least share of that distance that may be left of it so
+REACH = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two scans in a pose in which they agree."""
+
+    first: int
+    second: int
+    pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
+    turn: float  #: 1, or -1 where the normals of the two face opposite sides
+    fit: Fit
+
+
+def nearness(first: View, second: View) -> float:
+    """Return the distance across the surface within which two scans agree [scan unit]."""
+    noise = NOISE * math.hypot(first.noise, second.noise)
+    return min(max(noise, LEAST * first.spacing), MOST * first.spacing) * min(first.strict, second.strict)
+
+
+def judge_views(first: View, second: View, pose: np.ndarray, turn: float) -> Fit:
+    """Return how two views agree under a pose (4, 4)."""
+    return judge(first, second, pose, turn, nearness(first, second), REACH * first.spacing)
+
+
+def find_pairs(
+    scans: list[Scan],
+    features: list[np.ndarray],
+    wanted: Iterable[tuple[int, int]],
+    progress: Callable[[str, float], None],
+) -> list[Pair]:
+    """Return the pairs that may hold, up to `KEPT` for two scans; `wanted` says which two to look at."""
+    todo = list(wanted)
+    found: list[Pair] = []
+    pool = ThreadPoolExecutor(processors())
+    try:
+        tasks = [pool.submit(find_pair, scans, features, first, second) for first, second in todo]
+        for place, task in enumerate(tasks):
+            progress("match", place / len(tasks))
+            found += task.result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return found
+
+
+def find_pair(
+    scans: list[Scan], features: list[np.ndarray], first: int, second: int, *, thorough: bool = False
+) -> list[Pair]:
+    """Return the poses in which two scans may belong together, the best first.
+
+    thorough : try more poses, and both sides of the normals even where one is told or does well
+    """
+    one, other = scans[first], scans[second]
+    found: list[Pair] = []
+    sure = not thorough and min(one.coarse.bulge, other.coarse.bulge) > BULGE  # then the normals of both face outside
+    for turn in (1.0,) if sure else (1.0, -1.0):
+        candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, CANDIDATES)
+        poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:ALIGNED]
+        poses = [_roughly(one, other, pose, turn) for pose in poses]
+        for pose in _best(one, other, poses, turn, 0.35)[: None if thorough else TRIED]:
+            found += closer(one, other, first, second, pose, turn)
+        if not thorough and any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * SHARE for pair in found):
+            break
+    found.sort(key=lambda pair: -pair.fit.score)
+    return _different(found, one.coarse)[: None if thorough else KEPT]
+
+
+def _roughly(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> np.ndarray:
+    """Return the pose after alignment of the coarse views."""
+    reach = one.coarse.spacing
+    return align(one.coarse, other.coarse, pose, turn, (2.0 * reach, reach), FEW, 6)
+
+
+def settled_from(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> list[Pair]:
+    """Return the pair of two scans that alignment makes of a pose; nothing where they do not agree then."""
+    return closer(one, other, 0, 1, _roughly(one, other, pose, turn), turn)
+
+
+def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: float) -> list[np.ndarray]:
+    """Return the better ones of some poses, best first, by how the coarse views agree within `near` spacings."""
+    spacing = one.coarse.spacing
+    scores = [judge(one.coarse, other.coarse, pose, turn, near * spacing, REACH * spacing).score for pose in poses]
+    order = sorted(range(len(poses)), key=lambda k: -scores[k])
+    return [poses[k] for k in order if scores[k] > WORSE * scores[order[0]]]
+
+
+def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
+    """Return the scans, to be judged as strictly as the best of the pairs allow: those that lie right may agree far better.
+
+    Of the best pairs of each scan those with the smaller residuals are taken for right.
+    """
+    best: dict[int, tuple[float, float]] = {}
+    for pair in pairs:
+        if pair.fit.share > 3.0 * SHARE:
+            for k in (pair.first, pair.second):
+                best[k] = max(best.get(k, (0.0, 0.0)), (pair.fit.score, pair.fit.residual / pair.fit.near))
+    ratios = sorted(ratio for _, ratio in best.values())
+    strict = min(max(WITHIN * ratios[(len(ratios) - 1) // 3], STRICTEST), 1.0) if ratios else 1.0
+    return [replace(scan, middle=replace(scan.middle, strict=strict)) for scan in scans]
+
+
+def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
+    """Return those of the pairs that still hold with the views as they are now."""
+    found = []
+    for pair in pairs:
+        fit = judge_views(scans[pair.first].middle, scans[pair.second].middle, pair.pose, pair.turn)
+        if fit.share >= SHARE and fit.agreement >= AGREEMENT:
+            found.append(replace(pair, fit=fit))
+    return found
+
+
+def closer(one: Scan, other: Scan, first: int, second: int, pose: np.ndarray, turn: float) -> list[Pair]:
+    """Return the pair after close alignment from a pose nearby; nothing where they do not agree."""
+    reach = one.middle.spacing
+    pose = align(one.middle, other.middle, pose, turn, (2.0 * reach, reach), 2 * FEW)
+    fit = judge_views(one.middle, other.middle, pose, turn)
+    if fit.share < SHARE or fit.agreement < AGREEMENT:
+        return []
+    return [Pair(first, second, pose, turn, fit)]
+
+
+def _different(found: list[Pair], view: View) -> list[Pair]:
+    """Return those of the pairs that put the first scan to places of their own."""
+    kept: list[Pair] = []
+    arm = float(np.linalg.norm(np.ptp(view.points, axis=0)))
+    centre = np.append(view.points.mean(axis=0), 1.0)
+    for pair in found:
+        for other in kept:
+            moved = np.linalg.norm((pair.pose - other.pose) @ centre)
+            turned = np.linalg.norm(pair.pose[:3, :3] - other.pose[:3, :3]) * arm
+            if moved + turned < 2.0 * view.spacing:
+                break
+        else:
+            kept.append(pair)
+    return kept

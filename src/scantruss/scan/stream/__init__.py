@@ -1,0 +1,1 @@
+"""Scans larger than memory."""

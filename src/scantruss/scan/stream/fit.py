@@ -1,0 +1,124 @@
+"""Scans that are larger than memory: thinned while they are read, as finely as a grid of the desired length needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...runtime.memory import available_memory
+from ..cloud import LARGEST, PointCloud
+from ..degrees import said_of_degrees
+from ..extent import BULK, usual_extent
+from ..formats.kinds import read_head
+from ..formats.paths import Source as Names
+from ..formats.paths import files_of, name_of_files
+from ..formats.reading import PACKED, read_points
+from .chunks import Reading, count_unread, read_chunks
+from .opened import open_scan
+from .thin_scan import Progress, Share, thin_scan
+from .tiles import Source, find_source, tiles_of
+
+if TYPE_CHECKING:
+    from ...settings import Settings
+
+FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into memory
+BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
+PACKED_POINT = 8  # bytes; a point of a packed text has about as many
+FEWEST = 100_000  # points that are never too many
+LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
+SHARE = 0.5  # of the memory at hand that a scan may take
+
+
+def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None) -> float:
+    """Return the spacing to which a scan must be thinned while it is read, 0 where it need not be [scan unit].
+
+    All points that are read count, as all of them are in memory when some are selected.
+
+    Parameters
+    ----------
+    names : str, Path or several of them
+        Files or patterns.
+    settings : Settings
+        Tell the desired length, and a spacing that somebody has chosen.
+    memory : float, optional
+        Bytes that the scan may take; half of what is available by default.
+    """
+    if settings.thin_spacing is not None:
+        return float(settings.thin_spacing)
+    points = sum(map(_guess, files_of(names)))
+    if points <= FEWEST:
+        return 0.0
+    memory = SHARE * available_memory() if memory is None else memory
+    if points * BYTES > memory and settings.selection.crop:
+        sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+        points -= sum(count_unread(source, reading) for source in sources)
+    return settings.length / FINENESS if points * BYTES > memory else 0.0
+
+
+def spacing_to_look(names: Names, settings: Settings, progress: Progress | None = None) -> float:
+    """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit].
+
+    Points far from most others have no say.
+    """
+    sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+    some = _sample(sources, reading, Share(progress, "look", sources))
+    if not len(some):
+        return 1.0  # who thins it says why
+    return float(np.linalg.norm(np.ptp(usual_extent(some), axis=0))) / LOOK or 1.0
+
+
+def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.ndarray:
+    """Return points from everywhere in a scan, (K, 3): all of a small one, up to twice `BULK` of a large one.
+
+    By chance, as every n-th may be of one column of the scanner; the same each time.
+    """
+    some, share, chance = np.empty((0, 3)), 1.0, np.random.default_rng(0)
+    for tile in tiles_of(sources):
+        for chunk in read_chunks(tile, reading):
+            report(chunk.read)
+            new = chunk.points if share == 1.0 else chunk.points[chance.random(len(chunk.points)) < share]
+            some = np.concatenate([some, new[(np.abs(new) <= LARGEST).all(axis=1)]])
+            while len(some) > 2 * BULK:
+                some, share = some[chance.random(len(some)) < 0.5], 0.5 * share
+    return some
+
+
+def _guess(path: Path) -> int:
+    """Return about how many points a file holds; it is not unpacked for that."""
+    if path.suffix.lower() != PACKED:
+        return find_source(path).points
+    read_head(path)
+    return path.stat().st_size // PACKED_POINT
+
+
+def read_thinned(names: Names, settings: Settings, progress: Progress | None = None) -> tuple[PointCloud, int]:
+    """Return a scan thinned to `settings.thin_spacing` with its rim kept, and how many points were read.
+
+    The mean of a box has less noise than its points, but lies up to half a box inside at the rim; so the outermost points there stay.
+    """
+    thinned = thin_scan(
+        names,
+        float(settings.thin_spacing or 0.0),
+        rim=True,
+        unit=settings.unit,
+        selection=settings.selection,
+        progress=progress,
+    )
+    cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
+    notes = (*thinned.notes, *cloud.notes, *said_of_degrees(cloud))
+    return replace(cloud, dropped=thinned.dropped, notes=notes), thinned.read
+
+
+def read_to_fit(
+    names: Names, settings: Settings, *, memory: float | None = None, progress: Progress | None = None
+) -> tuple[PointCloud, Settings]:
+    """Return a scan as it is, or thinned where it is larger than memory, and the settings with which it comes out so again."""
+    spacing = spacing_to_fit(names, settings, memory)
+    if not spacing:
+        return read_points(names, unit=settings.unit, selection=settings.selection), settings
+    settings = settings.replace(thin_spacing=spacing)
+    return read_thinned(names, settings, progress)[0], settings

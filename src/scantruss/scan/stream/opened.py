@@ -1,0 +1,58 @@
+"""The files of a scan by their headers: where their points are, their units, and how they are taken."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...selection import Selection
+from ..formats.common_unit import to_common_unit
+from ..formats.content import Content
+from ..formats.las import note_on_heights
+from ..formats.paths import Source as Names
+from ..formats.paths import files_of
+from ..formats.reading import check_systems, said_together
+from ..units import check_unit
+from .chunks import Reading
+from .tiles import Source, find_source
+
+
+class OpenScan(NamedTuple):
+    """The files of a scan by their headers."""
+
+    sources: list[Source]
+    reading: Reading
+    notes: tuple[str, ...]  #: what should be said of their units
+
+
+def open_scan(names: Names, unit: str = "", selection: Selection | None = None) -> OpenScan:
+    """Return what the headers of the files of a scan say, how their points are taken, and what should be said of both.
+
+    Parameters
+    ----------
+    names : str, Path or several of them
+        Files or patterns.
+    unit : str
+        What the user says of the unit.
+    selection : Selection, optional
+        Which points are taken; all by default.
+    """
+    check_unit(unit)
+    selection = selection or Selection()
+    files = files_of(names)
+    sources = [find_source(path, selection.needs) for path in files]
+    check_systems(files, [source.system for source in sources])
+    units: list[str] = []
+    said = []
+    none = Content(np.empty((0, 3)))
+    for source in sources:
+        common = next((own for own in units if own), "")
+        _, own, notes = to_common_unit(source.path, source.said_of(none), unit, selection.z_unit, common)
+        units.append(own)
+        said.append(notes)
+    common, notes = said_together(files, units, said)
+    airborne = next((source for source in sources if source.kind == "las"), None)
+    if airborne and airborne.z_metres is None and common != "foot" and not selection.z_unit:
+        notes = (*notes, *filter(None, [note_on_heights(airborne.path)]))
+    return OpenScan(sources, Reading(unit, selection, common), notes)

@@ -1,0 +1,267 @@
+"""Scans of any size: thinned while they are read, tile by tile, here or by several workers."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import FormatError, InputError
+from ...runtime.cluster import Workers
+from ...selection import Selection
+from ..extent import extent_of, joined, said_of_apart
+from ..formats.content import said_of_more
+from ..formats.paths import Source as Names
+from ..formats.paths import name_of_files
+from ..formats.reading import add_counts, said_of_left_out
+from .chunks import Chunk, Reading, read_ahead, read_chunks
+from .opened import OpenScan, open_scan
+from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_rim
+from .tiles import TILE, Source, Tile, tiles_of
+
+Progress = Callable[[str, float], None]
+
+KEEP = ("mean", "nearest")
+SMALLEST = 500_000  # points of a tile that is worth a worker
+TILES = 4  # for each worker at least, so that all end at about the same time
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """A scan with one point a box."""
+
+    #: (C, 3) float64 in the scan's own frame [unit], by the number of their boxes; then those at the rim
+    points: np.ndarray
+    read: int  #: points that were taken
+    dropped: int  #: of these, points left out because a coordinate was NaN or infinite
+    rim: int  #: points that stand for the rim, the last of `points`
+    unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
+    notes: tuple[str, ...] = ()  #: what was left out or converted
+
+
+def thin_scan(
+    names: Names,
+    spacing: float,
+    *,
+    keep: str = "mean",
+    rim: bool = False,
+    unit: str = "",
+    selection: Selection | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Thinned:
+    """Return one point for each box of a scan in one or more files, with memory for the result only.
+
+    The same to the byte for any order of the files (of one unit), and for any number of workers.
+
+    Parameters
+    ----------
+    names : str, Path or several of them
+        Files, or patterns as ``tiles/*.laz``; all in one frame.
+    spacing : float
+        Side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame.
+    keep : str
+        "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
+    rim : bool
+        Also keep the outermost points of boxes at the rim.
+    unit, selection
+        As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
+    workers : Workers, optional
+        Who does it; this process by default.
+    progress : callable, optional
+        ``progress(stage, share)``.
+
+    Raises
+    ------
+    FormatError
+        A file is missing, damaged or no scan.
+    InputError
+        The spacing does not do; the units do not; nothing is selected.
+    """
+    scan = open_scan(names, unit, selection)
+    return thin_open_scan(scan, spacing, keep=keep, rim=rim, workers=workers, progress=progress)
+
+
+def thin_open_scan(
+    scan: OpenScan,
+    spacing: float,
+    *,
+    keep: str = "mean",
+    rim: bool = False,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> Thinned:
+    """Return one point for each box of a scan whose headers are read; see `thin_scan`."""
+    check_spacing(spacing)
+    if keep not in KEEP:
+        raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
+    workers = workers or Workers()
+    sources, reading, notes = scan
+    rows, told = _all_rows(sources, reading, spacing, rim, workers, Share(progress, "read", sources))
+    if rows.points == rows.dropped:
+        raise _nothing(sources, rows, told)
+    if keep == "nearest":
+        chosen = _all_nearest(sources, reading, rows, spacing, workers, Share(progress, "read again", sources))
+    else:
+        chosen = means_of(rows.rows, spacing)
+    added = points_at_rim(rows, spacing) if rim else chosen[:0]
+    notes = (*dict.fromkeys([*told.notes, *notes]), *said_of_left_out([told.left_out]))
+    both = np.concatenate([chosen, added]) if rim else chosen
+    return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
+
+
+class Share:
+    """Report the share of points that are done."""
+
+    def __init__(self, progress: Progress | None, stage: str, sources: Sequence[Source]) -> None:
+        self._progress, self._stage = progress, stage
+        self._total = max(sum(source.points for source in sources), 1)
+        self._done = 0
+
+    def __call__(self, points: int) -> None:
+        """So many more points are done."""
+        self._done += points
+        if self._progress:
+            self._progress(self._stage, min(self._done / self._total, 1.0))
+
+
+class Told:
+    """What the chunks of a scan, or of a part of it, tell beside their points."""
+
+    def __init__(self) -> None:
+        self.read = 0  #: points that were read
+        #: of these, what files call none and what each part of the selection left out
+        self.left_out: dict[str, int] = {}
+        self.notes: tuple[str, ...] = ()
+        self.held = ""  #: what could have been selected, of a part of which nothing was
+        self.promised = 0  #: points that count lines promise
+        self.extent = extent_of(np.empty((0, 3)))  #: (2, 3) about where the points are
+
+    def add(self, other: Told | Chunk) -> None:
+        """Add what another chunk or part tells."""
+        self.read += other.read
+        self.left_out = add_counts([self.left_out, other.left_out])
+        self.notes = (*self.notes, *other.notes)
+        self.promised += other.promised
+        self.extent = joined(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
+        self.held = self.held or other.held
+
+
+def _all_rows(
+    sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: Share
+) -> tuple[Rows, Told]:
+    """Return the boxes of all points that are taken."""
+    thinning = Thinning(spacing, rim=rim)
+    told = {source.path.absolute(): Told() for source in sources}
+    if workers.alone:
+        for tile in tiles_of(sources):
+            for chunk in read_ahead(read_chunks(tile, reading)):
+                thinning.add(chunk.points)
+                told[tile.source.path.absolute()].add(chunk)
+                report(chunk.read)
+    else:
+        tiles = _tiles_for(sources, workers)
+        for number, (rows, part) in workers.run(_rows_of, tiles, (reading, spacing, rim)):
+            thinning.add_rows(rows)
+            told[tiles.taken[number].source.path].add(part)
+            report(tiles.taken[number].points)
+    whole = Told()
+    for source in sources:
+        part = told[source.path.absolute()]
+        _check_counts(source, part)
+        whole.add(part)
+    extents = [told[source.path.absolute()].extent for source in sources]
+    whole.notes = (*whole.notes, *said_of_apart([source.path for source in sources], extents))
+    return thinning.take_rows(), whole
+
+
+def _check_counts(source: Source, told: Told) -> None:
+    """Refuse a text with fewer points than its count lines promise; say of one with more that they are read."""
+    if source.kind == "text" and source.layout and source.layout.promised is not None:
+        promised = source.layout.promised + told.promised
+        if told.read < promised:
+            raise FormatError(
+                f"{source.path} ends early: its count lines promise {promised:,} points, got {told.read:,}; copy it again"
+            )
+        if told.read > promised:
+            told.notes = (*told.notes, said_of_more(source.path.name, told.read, promised))
+
+
+class _Tiles:
+    """Tiles as they are asked for; remembers those that were taken by their number."""
+
+    def __init__(self, sources: Sequence[Source], points: int) -> None:
+        self._tiles = tiles_of(sources, points)
+        self.taken: list[Tile] = []
+
+    def __iter__(self) -> Iterator[Tile]:
+        for tile in self._tiles:
+            self.taken.append(tile)
+            yield tile
+
+
+def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
+    """Return tiles for several workers, who may not be where we are."""
+    there = [replace(source, path=source.path.absolute()) for source in sources]
+    total = sum(source.points for source in sources)
+    return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
+
+
+def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Told]:
+    """Return the boxes of a tile and what its chunks tell: the work of a worker."""
+    reading, spacing, rim = shared
+    thinning, told = Thinning(spacing, rim=rim), Told()
+    for chunk in _chunks_there(tile, reading):
+        thinning.add(chunk.points)
+        told.add(chunk)
+    return thinning.take_rows(), told
+
+
+def _all_nearest(
+    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: Share
+) -> np.ndarray:
+    """Return the points nearest to the means of all boxes."""
+    if workers.alone:
+
+        def chunks() -> Iterator[np.ndarray]:
+            for tile in tiles_of(sources):
+                for chunk in read_ahead(read_chunks(tile, reading)):
+                    report(chunk.read)
+                    yield chunk.points
+
+        return nearest_points(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
+    tiles = _tiles_for(sources, workers)
+
+    def parts() -> Iterator[Nearest]:
+        for number, part in workers.run(_nearest_of, tiles, (reading, rows.rows, spacing)):
+            report(tiles.taken[number].points)
+            yield part
+
+    return nearest_points(len(rows.rows), parts())
+
+
+def _nearest_of(tile: Tile, shared: tuple[Reading, np.ndarray, float]) -> Nearest:
+    """Return the points of a tile nearest to the means of boxes: the work of a worker."""
+    reading, rows, spacing = shared
+    return nearest_in((chunk.points for chunk in _chunks_there(tile, reading)), rows, spacing)
+
+
+def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
+    """Yield the chunks of a tile; say which machine does not have it."""
+    path = tile.source.path
+    if not path.exists():
+        raise FormatError(f"{path} is not there on {socket.gethostname()}; all workers need the files under one name")
+    return read_chunks(tile, reading, alone=False)
+
+
+def _nothing(sources: Sequence[Source], rows: Rows, told: Told) -> Exception:
+    """Return why there is no point to keep."""
+    where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
+    if rows.points or not told.read:
+        return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
+    said = ", ".join(f"{number:,} {words}" for words, number in told.left_out.items() if number)
+    name = name_of_files([source.path for source in sources])
+    have = f"; some of them have{told.held}" if told.held else ""
+    return InputError(f"no point of {name} is left: of {told.read:,} points {said}{have}")

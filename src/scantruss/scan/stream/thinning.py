@@ -1,0 +1,245 @@
+"""Thinning to one point a search box, with memory for the boxes only: in one go, in parts, or by several workers.
+
+Sums are whole numbers and ties are settled by the coordinates, so the result is the same to the byte for any order and size of the
+parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import InputError
+from ...kernels.scan.thinning import (
+    NOT_FINITE,
+    ROWS,
+    TOO_FAR,
+    BoxTable,
+    add_points,
+    add_rows,
+    fill_slots,
+    middles,
+    rim_points,
+    take_nearest,
+)
+from ...runtime.parallel import in_parts
+from ..invalid import CAUSE
+
+FIRST_ROWS = 4096  # room of a new table
+GROWTH = 1.5  # of a table that is full
+PART = 20_000  # boxes that are worth a thread
+
+
+class Rows(NamedTuple):
+    """The boxes of a part of a scan, in the order of their numbers: what workers hand on."""
+
+    rows: np.ndarray  #: (C, 7) int64, see `BoxTable`
+    extremes: np.ndarray  #: (C, 18) float64, or (0, 18)
+    points: int  #: points that were looked at
+    dropped: int  #: of these, points with NaN or infinite coordinates
+
+
+class Nearest(NamedTuple):
+    """The nearest points that a part of a scan has for some boxes."""
+
+    row: np.ndarray  #: (K,) int64 numbers of the boxes
+    best: np.ndarray  #: (K, 4) float64 squared distance, x, y, z
+
+
+class Thinning:
+    """Boxes to which points are added, part by part.
+
+    Parameters
+    ----------
+    spacing : float
+        Side of a box [scan unit].
+    rim : bool
+        Keep the extremes of each box too, so that `points_at_rim` can tell the rim.
+    """
+
+    def __init__(self, spacing: float, *, rim: bool = False) -> None:
+        self.spacing = check_spacing(spacing)
+        self.rim = rim
+        self.points = 0
+        self._table = _new_table(FIRST_ROWS, rim)
+
+    @property
+    def dropped(self) -> int:
+        """Points left out because a coordinate was NaN or infinite."""
+        return int(self._table.counters[NOT_FINITE])
+
+    def add(self, points: np.ndarray) -> None:
+        """Add points (N, 3) float64 in the scan's own frame [scan unit].
+
+        Raises
+        ------
+        InputError
+            The spacing is too small for coordinates so far from zero.
+        """
+        points = np.ascontiguousarray(points, np.float64)
+        begin = 0
+        while (begin := add_points(self._table, points, begin, self.spacing)) < len(points):
+            self._grow()
+        if self._table.counters[TOO_FAR]:
+            most = np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0)
+            raise InputError(
+                f"spacing {self.spacing:g} is too small for points so far from zero, up to {most:.3g}; use a larger one, or where"
+                f" no part of the scan lies there {CAUSE} (--crop leaves these out)"
+            )
+        self.points += len(points)
+
+    def add_rows(self, part: Rows) -> None:
+        """Add what another worker has found."""
+        begin = 0
+        while (begin := add_rows(self._table, part.rows, part.extremes, begin)) < len(part.rows):
+            self._grow()
+        self._table.counters[NOT_FINITE] += part.dropped
+        self.points += part.points
+
+    def _grow(self) -> None:
+        """Make room for more boxes; what is old is let go of as soon as can be."""
+        slots, rows, extremes, counters = self._table
+        del self._table
+        count, capacity = int(counters[ROWS]), int(GROWTH * len(rows))
+        few = _slots_for(capacity) > len(slots)
+        if few:
+            del slots
+        rows = _longer(rows, count, capacity)
+        extremes = _longer(extremes, count, capacity if self.rim else 0)
+        if few:
+            slots = np.full(_slots_for(capacity), -1, np.int64)
+            fill_slots(slots, rows, count)
+        self._table = BoxTable(slots, rows, extremes, counters)
+
+    def take_rows(self) -> Rows:
+        """Return all boxes by their numbers i, j, k, the same for any order in which points came; none are left here."""
+        table, count = self._table, int(self._table.counters[ROWS])
+        rows, extremes = table.rows[:count], table.extremes[:count]
+        order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
+        for column in (*rows.T, *extremes.T):  # in their place: they may fill the memory
+            column[:] = column[order] if len(column) else 0
+        found = Rows(rows, extremes, self.points, self.dropped)
+        self._table, self.points = _new_table(FIRST_ROWS, self.rim), 0
+        return found
+
+
+def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", rim: bool = False) -> np.ndarray:
+    """Return one point for each box of points in memory, (C, 3) [scan unit].
+
+    Parameters
+    ----------
+    points : (N, 3) array [scan unit]
+        In the frame whose zero is a corner of the boxes.
+    spacing : float
+        Side of a box [scan unit].
+    keep : str
+        "mean" of the points in a box, or the one "nearest" to it.
+    rim : bool
+        Also keep the outermost points of boxes at the rim.
+    """
+    thinning = Thinning(spacing, rim=rim)
+    thinning.add(points)
+    rows = thinning.take_rows()
+    chosen = means_of(rows.rows, spacing)
+    if keep == "nearest":
+        found = nearest_in([np.ascontiguousarray(points, np.float64)], rows.rows, spacing)
+        chosen = nearest_points(len(rows.rows), [found])
+    return np.concatenate([chosen, points_at_rim(rows, spacing)]) if rim else chosen
+
+
+def check_spacing(spacing: float) -> float:
+    """Return a spacing that can be thinned to."""
+    if not (isinstance(spacing, int | float) and math.isfinite(spacing) and spacing > 0):
+        raise InputError(f"spacing must be a positive number in the scan's unit, got {spacing}")
+    return float(spacing)
+
+
+def means_of(rows: np.ndarray, spacing: float) -> np.ndarray:
+    """Return the mean of the points in each box, (C, 3) [scan unit]."""
+    means = np.empty((len(rows), 3))
+    middles(rows, spacing, means)
+    return means
+
+
+def points_at_rim(rows: Rows, spacing: float) -> np.ndarray:
+    """Return the points that stand for the rim of the scan, each once, (R, 3) [scan unit].
+
+    The mean of a box at the rim lies up to half a box inside; its outermost points do not.
+    """
+    kept = np.zeros((len(rows.rows), 6), np.int64)
+    counters = np.array([len(rows.rows), 0, 0])
+    table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counters)
+    means = means_of(rows.rows, spacing)
+    in_parts(len(kept), PART, lambda _, begin, end: rim_points(table, means, spacing, kept, begin, end))
+    several = rows.rows[:, 3] > 1  # a single point is its own mean
+    return np.unique(rows.extremes.reshape(-1, 6, 3)[kept.astype(bool) & several[:, None]], axis=0)
+
+
+def nearest_in(chunks: Iterable[np.ndarray], rows: np.ndarray, spacing: float) -> Nearest:
+    """Return the points of a part of a scan that are nearest to the means of their boxes.
+
+    Parameters
+    ----------
+    chunks : iterable of (N, 3) float64 arrays [scan unit]
+        The part.
+    rows : (C, 7) int64 array
+        All boxes of the whole scan.
+    spacing : float
+        Side of a box [scan unit].
+    """
+    best = np.full((len(rows), 4), np.inf)
+    slots, means = _filled_slots(rows), means_of(rows, spacing)
+    for points in chunks:
+        take_nearest(slots, rows, means, points, spacing, best)
+    found = np.flatnonzero(np.isfinite(best[:, 0]))
+    return Nearest(found, best[found])
+
+
+def nearest_points(count: int, parts: Iterable[Nearest]) -> np.ndarray:
+    """Return the nearest point of each of `count` boxes, (count, 3), from those of the parts of a scan.
+
+    Raises
+    ------
+    InputError
+        A box has none: the file has changed since its boxes were found.
+    """
+    best = np.full((count, 4), np.inf)
+    for part in parts:
+        held, new = best[part.row], part.best
+        better = np.zeros(len(new), bool)
+        same = np.ones(len(new), bool)
+        for c in range(4):
+            better |= same & (new[:, c] < held[:, c])
+            same &= new[:, c] == held[:, c]
+        best[part.row[better]] = new[better]
+    if not np.isfinite(best[:, 0]).all():
+        raise InputError("the scan has changed while it was read; thin it again when nobody writes to it")
+    return np.ascontiguousarray(best[:, 1:])
+
+
+def _new_table(capacity: int, rim: bool) -> BoxTable:
+    return BoxTable(
+        np.full(_slots_for(capacity), -1, np.int64),
+        np.empty((capacity, 7), np.int64),
+        np.empty((capacity if rim else 0, 18)),
+        np.zeros(3, np.int64),
+    )
+
+
+def _slots_for(capacity: int) -> int:
+    return 1 << max(int(1.5 * capacity - 1).bit_length(), 4)
+
+
+def _longer(array: np.ndarray, count: int, capacity: int) -> np.ndarray:
+    longer = np.empty((capacity, array.shape[1]), array.dtype)
+    longer[: min(count, capacity)] = array[: min(count, capacity)]
+    return longer
+
+
+def _filled_slots(rows: np.ndarray) -> np.ndarray:
+    slots = np.full(_slots_for(len(rows)), -1, np.int64)
+    fill_slots(slots, rows, len(rows))
+    return slots

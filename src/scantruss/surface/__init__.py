@@ -1,0 +1,1 @@
+"""The scanned surface at the scale of a member: samples, normals and the size field."""

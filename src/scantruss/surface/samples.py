@@ -1,0 +1,347 @@
+"""The scan prepared for one member length: sites with oriented normals, linked on each sheet."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..kernels.geometry.boxes import SearchBoxes
+from ..kernels.scan.nearby import nearest_places
+from ..kernels.surface import normals as normal_kernels
+from ..kernels.surface.local_surface import Surface
+from ..runtime.parallel import in_parts
+from ..scan.clean.duplicates import find_repeated, has_repeats
+from ..scan.clean.outliers import find_strays, has_strays
+from ..scan.cloud import Bounds, PointCloud, bounds_of
+from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
+from ..scan.vectors import dots
+from ..settings import SITE, SMOOTH_SITE, Settings
+from .linked_samples import (
+    FINE,
+    MANY_ROUGH,
+    PART,
+    ROUGH,
+    SHEETS,
+    Linked,
+    group,
+    is_rough,
+    is_smooth,
+    link_finer,
+    link_sites,
+    settle_to_sheet,
+    thin_dense,
+)
+from .size_field import Wish, length_field, wish_of
+from .streamline import points_near
+
+BESIDE = 1.5  # how far all points are beside those that serve as well, in distances of these
+SPARSE = 0.08  # spacing of the points, in member lengths, from which on no larger sites are tried
+UNEVEN = 20.0  # as `_Asked.uneven`: a ridge that bends by twice as much would be seen
+SOME, ALL = 8.0, 24.0  # most points of a usual site that a patch is fitted to, on the way and in the end
+
+
+@dataclass(frozen=True, eq=False)
+class Sites:
+    """What all later steps look up in the scan."""
+
+    surface: Surface
+    boxes: SearchBoxes  #: the sites by box
+    piece: np.ndarray  #: (S,) int64 number of the connected piece of each site, the largest piece is 0
+    thickness: np.ndarray  #: (S,) rms distance of each site and its neighbours from their plane [scan unit]
+    spacing: float  #: typical distance between neighbouring points [scan unit]
+    area: float  #: rough area of the scanned surface [scan unit^2]
+    graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
+    pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
+    strays: int = 0  #: stray points that were left out
+    repeated: int = 0  #: points that were left out because they repeat another one
+    measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
+    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
+    apart: float = 0.0  #: about so far apart [scan unit]
+    smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
+    unit: str = ""  #: unit of the scan
+
+    @cached_property
+    def kept(self) -> np.ndarray:
+        """Which sites are of pieces that are large enough for a grid (S,) bool."""
+        return np.isin(self.piece, self.pieces)
+
+    @property
+    def left_out(self) -> tuple[int, float]:
+        """How many pieces are too small for a grid, and the share of the sites, which lie evenly, that is theirs."""
+        sites = np.bincount(self.piece)
+        small = np.delete(sites, self.pieces)
+        return len(small), float(small.sum() / sites.sum())
+
+    @property
+    def density(self) -> float:
+        """Points for an area [1 / scan unit^2]."""
+        return len(self.surface.points if self.whole is None else self.whole) / self.area
+
+    @property
+    def graded(self) -> bool:
+        """Whether the desired member length differs from place to place."""
+        return is_graded(self.surface)
+
+
+class _Asked(NamedTuple):
+    """What of the settings decides over the sites."""
+
+    length: float
+    box_size: float | None
+    stray_distance: float
+    drop_repeated: bool
+    uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
+    wish: Wish | None
+
+    @classmethod
+    def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
+        """Return it for a cloud with this origin."""
+        strays = settings.stray_distance if settings.clean else 0.0
+        repeated = settings.clean and settings.drop_repeated
+        uneven = min(UNEVEN, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN
+        return cls(settings.length, settings.box_size, strays, repeated, uneven, wish_of(settings, origin))
+
+
+class _Chosen(NamedTuple):
+    """The sites of a scan, and of what they were chosen."""
+
+    found: Linked
+    radius: float  #: of a site
+    points: np.ndarray  #: (N, 3) the points given to the sites
+    whole: np.ndarray  #: (M, 3) all points of the scan
+    strays: int  #: points that were left out of it
+    smooth: bool
+
+
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, Sites]] = weakref.WeakKeyDictionary()
+
+
+def sample_surface(cloud: PointCloud, settings: Settings) -> Sites:
+    """Return the sites of a cloud for a member length; kept as long as the cloud lives.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+        `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
+        out, `length_field` where members are to be longer.
+    """
+    asked = _Asked.of(settings, cloud.origin)
+    kept = _KEPT.setdefault(cloud, {})
+    if asked not in kept:
+        kept.clear()
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit)
+    return kept[asked]
+
+
+def is_graded(surface: Surface) -> bool:
+    """Whether the desired member length differs from place to place."""
+    return bool(np.any(surface.field != 1.0))
+
+
+def local_field(surface: Surface, place: np.ndarray) -> float:
+    """Desired length at a place, in lengths: that of the nearest site."""
+    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
+
+
+def sites_with(sites: Sites, added: np.ndarray, settings: Settings) -> Sites:
+    """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
+    points = sites.surface.points
+    both = np.concatenate([points, added])
+    asked = _Asked.of(settings, sites.origin)._replace(stray_distance=0.0, drop_repeated=False)
+    if not sites.smooth:  # then it is not with more points either
+        asked = asked._replace(box_size=asked.box_size or SITE)
+    prepared = _prepare(both, bounds_of(both), sites.spacing, asked, len(points))
+    return replace(
+        prepared,
+        strays=sites.strays,
+        repeated=sites.repeated,
+        whole=sites.whole,
+        apart=sites.apart,
+        origin=sites.origin,
+        unit=sites.unit,
+    )
+
+
+def narrow_surface(sites: Sites, points: float) -> Surface:
+    """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
+
+    More points of each site count than while nodes are still on their way.
+    """
+    surface = sites.surface
+    radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
+    surface = surface._replace(
+        patch_radius=float(np.clip(radius, 0.1 * surface.length, surface.patch_radius)),
+        patch_points=ALL * (SMOOTH_SITE / SITE) ** 2 if sites.smooth else ALL,  # as many for an area
+    )
+    if np.isfinite(points):  # so many points, whatever the length of the members
+        surface = surface._replace(field=np.ones_like(surface.field))
+    return surface
+
+
+def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
+    """Return the surface with all points near some of its points (R, 3), where it has only some: those of the rim tell where it is."""
+    if sites.whole is None:
+        return surface
+    near = sites.whole.take(points_near(sites.whole, rim, BESIDE * sites.apart), axis=0)
+    owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
+    in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, far, owner, begin, end))
+    owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
+    points = np.concatenate([surface.points, near[owner >= 0]])
+    grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
+    return surface._replace(points=grouped, start=start)
+
+
+def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
+    """Distance of a place from the nearest point of the scan."""
+    squares = ((surface.mean - place) ** 2).sum(axis=1)
+    reach = np.sqrt(squares.min()) + 2.0 * surface.radius
+    best = np.inf
+    for site in np.flatnonzero(squares <= reach * reach):
+        points = surface.points[surface.start[site] : surface.start[site + 1]]
+        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
+    return float(np.sqrt(best))
+
+
+def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
+    """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
+    normals = surface.normals
+    for _ in range(passes):
+        normals = mean_normals(normals, surface.neighbors, 0.0)
+    return normals
+
+
+def _prepare(
+    points: np.ndarray,
+    bounds: Bounds,
+    spacing: float,
+    asked: _Asked,
+    measured: int | None = None,
+) -> Sites:
+    """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
+    length, repeated = asked.length, 0
+    if asked.drop_repeated and has_repeats(points):
+        kept = ~find_repeated(points)
+        repeated = int(len(points) - kept.sum())
+        points = np.ascontiguousarray(points[kept])
+        bounds = bounds_of(points)
+    thinned = measured is None
+    chosen = _smooth_sites(points, bounds, spacing, asked, thinned) or _usual_sites(
+        points, bounds, spacing, asked, thinned
+    )
+    found = chosen.found
+    surface, piece = _faced_surface(found, chosen.radius, length, spacing)
+    surface = surface._replace(field=length_field(surface, asked.wish))
+    piece = _number(piece)
+    area = _site_areas(surface)
+    graded = area / surface.field**2
+    return Sites(
+        surface,
+        found.boxes,
+        piece,
+        found.thickness,
+        spacing,
+        float(area.sum()),
+        float(graded.sum()),
+        _large_pieces(piece, area, graded, length),
+        chosen.strays,
+        repeated,
+        len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
+        chosen.whole if len(chosen.points) < len(chosen.whole) else None,
+        FINE * chosen.radius,
+        chosen.smooth,
+    )
+
+
+def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
+    """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
+    length, radius = asked.length, SMOOTH_SITE * asked.length
+    if asked.box_size is not None or spacing > SPARSE * length:
+        return None
+    some = thin_dense(points, bounds, radius, spacing) if thinned else points
+    found = link_sites(some, radius, length, spacing)
+    if has_strays(found.neighbors) or not is_smooth(found, length, asked.uneven):
+        return None
+    return _Chosen(found, radius, some, points, 0, True)
+
+
+def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
+    """Return the sites of any scan, without its strays; of a rough one moved to the middle of its sheets."""
+    length, strays = asked.length, 0
+    radius = max((asked.box_size or SITE) * length, 0.25 * spacing)
+    some = thin_dense(points, bounds, radius, spacing) if thinned else points
+    found = link_sites(some, radius, length, spacing)
+    if asked.stray_distance and has_strays(found.neighbors):
+        stray = find_strays(points, asked.stray_distance, length)
+        strays = int(stray.sum())
+        if strays:
+            points = np.ascontiguousarray(points[~stray])
+            some = thin_dense(points, bounds_of(points), radius, spacing)
+            found = link_sites(some, radius, length, spacing)
+    if is_rough(found, SHEETS * length):
+        fine = link_finer(points, radius, length, spacing)
+        if fine is not None:
+            some, (found, radius) = points, fine
+    if is_rough(found, ROUGH * length, MANY_ROUGH):
+        found = settle_to_sheet(found, some, radius, length, spacing)
+    return _Chosen(found, radius, some, points, strays, False)
+
+
+def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
+    """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
+    mean, normals, neighbors = found.mean, found.normals, found.neighbors
+    normal_kernels.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    cut_steep_links(mean, normals, neighbors)
+    piece = face_one_side(mean, normals, neighbors)
+    normals = mean_normals(normals, neighbors, 0.7)
+    face_outside(mean, normals, piece)
+    surface = Surface(
+        points=found.grouped,
+        start=found.start,
+        mean=mean,
+        normals=normals,
+        neighbors=neighbors,
+        length=float(length),
+        radius=float(radius),
+        patch_radius=float(max(0.65 * length, 2.6 * spacing)),
+        patch_points=SOME,
+        step=float(max(radius, 1.3 * spacing)),
+        stamp=np.zeros(len(mean), np.int64),
+        queue=np.zeros(len(mean), np.int64),
+        counter=np.zeros(1, np.int64),
+        field=np.ones(len(mean)),
+    )
+    return surface, piece
+
+
+def _number(piece: np.ndarray) -> np.ndarray:
+    """Number the pieces by size, largest first."""
+    counts = np.bincount(piece)
+    rank = np.empty(len(counts), np.int64)
+    rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
+    return rank[piece]
+
+
+def _site_areas(surface: Surface) -> np.ndarray:
+    """Rough area around each site (S,): that of a disc through its neighbours over their number [scan unit^2]."""
+    linked = surface.neighbors >= 0
+    count = linked.sum(axis=1)
+    last = surface.neighbors[np.arange(len(count)), np.maximum(count - 1, 0)]
+    arm = surface.mean[last] - surface.mean
+    reach = dots(arm, arm)
+    return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
+
+
+def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, length: float) -> tuple[int, ...]:
+    """Pieces that are not debris: room for some twenty triangles, and a hundredth of the largest."""
+    count = np.bincount(piece)
+    total = np.bincount(piece, area)
+    large = (np.bincount(piece, graded) >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
+    large[0] = True
+    return tuple(int(i) for i in np.flatnonzero(large))

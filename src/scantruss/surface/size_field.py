@@ -1,0 +1,150 @@
+"""The length field: which member length is desired where on the scan, as a multiple of the shortest one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.geometry.boxes import new_boxes
+from ..kernels.mesh.coverage import nearest_distances, put_places
+from ..kernels.surface import size_field as kernels
+from ..kernels.surface.local_surface import Surface
+from ..runtime.parallel import in_parts
+from ..settings import Settings, shortest_and_longest
+
+RATIO = 1.2  # of the lengths desired for two members that follow each other, at most
+SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per way; ways over the links, and members, may be longer
+FLAT = 0.002  # a member of the longest length that bulges by less than this, in its length, is flat
+BENT = 0.95  # share of the scan that bends less than where the shortest length is desired
+DOUBT = 3.3  # standard deviations of a curvature that may be noise
+FAR = 1.0  # a given length may be so far from the scan, in that length
+PART = 200  # fewest sites for a thread of their own
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What the settings say of the lengths, in the frame of the cloud."""
+
+    field: str | tuple[tuple[float, float, float, float], ...]
+    length: float  #: the shortest [scan unit]
+    origin: tuple[float, float, float]  #: of the cloud, which the given places have not [scan unit]
+
+
+def wish_of(settings: Settings, origin: np.ndarray) -> Wish | None:
+    """Return what decides the length field; None where one length is desired everywhere."""
+    if not settings.length_field:
+        return None
+    x, y, z = origin.tolist()
+    return Wish(settings.length_field, settings.length, (x, y, z))
+
+
+def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
+    """Return the desired length at each site (S,), in shortest lengths; graded, so that members that follow each other differ little.
+
+    Raises
+    ------
+    InputError
+        A given length stands farther from the scan than it is long.
+    """
+    if wish is None:
+        return np.ones(len(surface.mean))
+    shortest, longest = shortest_and_longest(wish.field)
+    most = longest / shortest
+    field = _by_curvature(surface, most) if isinstance(wish.field, str) else _by_given(surface, wish, shortest)
+    kernels.grade(surface.mean, surface.neighbors, field, SLOPE / wish.length)
+    return np.clip(field, 1.0, most)
+
+
+def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
+    """Blend of the given lengths at each site (S,), in shortest lengths."""
+    rows = np.array(wish.field, float)
+    scale = wish.length / shortest
+    places, values = np.ascontiguousarray(rows[:, :3] - wish.origin), rows[:, 3] / shortest
+    _check_near(surface, rows, places, scale)
+    field = np.empty(len(surface.mean))
+    spread = float(np.ptp(places, axis=0).max()) or wish.length
+    box = max(spread / np.sqrt(len(places)), 1e-6 * spread)
+    boxes = new_boxes(places.min(axis=0), places.max(axis=0), box, len(places), len(places))
+    kernels.blend_lengths(surface.mean, places, np.ascontiguousarray(values), boxes, box, field)
+    return field
+
+
+def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: float) -> None:
+    """Refuse given lengths (K, 4) that stand away from the scan: they are of another part, frame or unit."""
+    mean = surface.mean
+    allowed = FAR * scale * rows[:, 3] + 1.5 * surface.step
+    low, high = mean.min(axis=0), mean.max(axis=0)
+    far = np.maximum(low - places, places - high).max(axis=1) > allowed
+    inside = np.flatnonzero(~far)
+    step = max(4.0 * surface.step, 0.01 * float((high - low).max()))
+    boxes = new_boxes(low, high, step, len(mean), len(mean))
+    put_places(boxes, mean)
+    away = np.empty(len(inside))
+    nearest_distances(np.ascontiguousarray(places[inside]), mean, boxes, step, away)
+    far[inside] = away > allowed[inside]
+    if count := int(far.sum()):
+        k = int(np.argmax(far))
+        place = ", ".join(f"{c:.10g}" for c in rows[k, :3])
+        raise InputError(
+            f"{count} of {len(rows)} given lengths lie off the scan, as that at ({place}); each must lie on the scan,"
+            f" within its own length ({scale * rows[k, 3]:.4g} there)"
+        )
+
+
+def _by_curvature(surface: Surface, most: float) -> np.ndarray:
+    """Length at each site (S,) of which members bulge alike over the scan, between 1 and `most` shortest lengths.
+
+    A member over a curvature k bulges by k l^2 / 8. The most bent twentieth of the scan gets the shortest length, unless even the
+    longest member would be flat there.
+    """
+    bends = measured_bends(surface, most)
+    shortest = surface.length
+    bulge = max(float(np.quantile(bends, BENT)) * shortest**2 / 8.0, FLAT * most * shortest)
+    lengths = np.sqrt(8.0 * bulge / np.maximum(bends, 1e-300)) / shortest
+    return np.clip(lengths, 1.0, most)
+
+
+def measured_bends(surface: Surface, most: float) -> np.ndarray:
+    """Return the largest curvature of the scan at each site (S,), less what may be noise [1 / scan unit].
+
+    Measured by patches as wide as the members may become, where those bend as narrow ones do, but for what may be noise (Lepski).
+    """
+    chosen = np.zeros(len(surface.mean), np.bool_)
+    kernels.choose_apart(surface.neighbors, chosen)
+    sites = np.flatnonzero(chosen)
+    low, high, best = np.zeros(len(sites)), np.full(len(sites), np.inf), np.zeros(len(sites))
+    for share in (0.0, 0.5, 1.0):
+        bend, doubt = _bends(surface, sites, most**share).T
+        low, high = np.maximum(low, bend - DOUBT * doubt), np.minimum(high, bend + DOUBT * doubt)
+        best = np.where(low <= high, np.maximum(bend - DOUBT * doubt, 0.0), best)
+    bends = np.zeros(len(chosen))
+    bends[sites] = best
+    bends = _spread(surface.neighbors, bends, chosen)
+    everywhere = np.ones_like(chosen)
+    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one site alone is noise
+
+
+def _bends(surface: Surface, sites: np.ndarray, wider: float) -> np.ndarray:
+    """Curvature and its doubt at some sites, (P, 2) [1 / scan unit], by patches so many times wider."""
+    from .scratch import with_own_scratch
+
+    scaled = surface._replace(
+        patch_radius=surface.patch_radius * wider, patch_points=max(surface.patch_points / wider**2, 1.0)
+    )
+    found = np.empty((len(sites), 2))
+
+    def measure_part(part: int, begin: int, end: int) -> None:
+        kernels.measure_bends(with_own_scratch(scaled), sites, found, begin, end)
+
+    in_parts(len(sites), PART, measure_part)
+    return found
+
+
+def _spread(neighbors: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Values (S,) at all sites: the mean of those known at a site and its neighbours."""
+    weight = np.where(neighbors >= 0, known[neighbors], False)
+    total = weight.sum(axis=1) + known
+    summed = (weight * values[neighbors]).sum(axis=1) + known * values
+    return np.where(total > 0, summed / np.maximum(total, 1), values)

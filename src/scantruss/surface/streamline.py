@@ -1,0 +1,110 @@
+"""Streamlining: of a scan much denser than the grid needs, one point in each small search box (Sec. 2 leaves that to the scanner).
+
+Nodes come down on patches of some hundred points. What lies denser than that is not looked at; where the scan is sparse every
+point stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels.geometry.boxes import new_boxes
+from ..kernels.scan import nearby
+from ..kernels.scan import streamline as kernels
+from ..runtime.parallel import in_parts, processors
+from ..scan.cloud import Bounds
+
+DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
+PART = 200_000  # fewest points for a thread of their own
+ALL = np.zeros(0, np.int64)  # stands for all points
+MARKS = 1 << 20  # of boxes near a place: some thousands, which hardly ever share one with a box elsewhere
+ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
+FILLED = 64  # of these, in a block of boxes
+
+
+def is_dense(spacing: float, size: float) -> bool:
+    """Whether so many points lie in a box of this size that one of them serves as well."""
+    return 0.0 < spacing < DENSE * size
+
+
+def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
+    """Return the first point in each occupied search box, in their order.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 [scan unit]
+    bounds : the lowest and the highest coordinates, (3,) each [scan unit]
+    size : about the distance of the points that stay [scan unit]
+
+    Returns
+    -------
+    (K,) int64
+        Which points stay; the same for any number of processors.
+    """
+    lower, upper = bounds
+    room = min(max(len(points) // 2, ROOM), MOST_ROOM)
+    parts: dict[int, _First] = {}
+
+    def choose(part: int, begin: int, end: int) -> None:
+        parts[part] = _First(points, lower, upper, size, room)
+        parts[part].choose(ALL, begin, end)
+
+    in_parts(len(points), PART, choose)
+    first, *others = (parts[part] for part in sorted(parts))
+    for other in others:
+        first.choose(other.chosen, 0, len(other.chosen))
+    return first.chosen
+
+
+class _First:
+    """The first points of boxes, as far as they have been looked at."""
+
+    def __init__(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, room: int) -> None:
+        self.points, self.boxes = points, new_boxes(lower, upper, size, 0, 0)
+        self.found, self.count = np.empty(0, np.int64), np.zeros(2, np.int64)
+        self._make_room(room)
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """(K,) int64 the points so far."""
+        return self.found[: self.count[kernels.CHOSEN]]
+
+    def choose(self, among: np.ndarray, begin: int, end: int) -> None:
+        """Look at the points `among` (M,) from `begin` to `end` - 1, at all points for an empty one."""
+        while begin < end:
+            begin = self._choose(among, begin, end)
+            if begin < end:
+                self._make_room(4 * len(self.found))
+
+    def _choose(self, among: np.ndarray, begin: int, end: int) -> int:
+        return kernels.choose_first(
+            self.points, self.boxes, self.blocks, self.taken, among, self.found, begin, end, self.count
+        )
+
+    def _make_room(self, room: int) -> None:
+        """Make room for so many points, and for the blocks that these fill, or four times as many as there are."""
+        old, rows = self.chosen, max(room // FILLED, 4 * int(self.count[kernels.BLOCKS]), 1)
+        self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
+        self.taken = np.zeros((rows, kernels.BYTES), np.uint8)
+        table = new_boxes(np.zeros(3), np.ones(3), 1.0, rows, rows)
+        self.blocks = table._replace(counts=self.boxes.counts // kernels.SIDE + 1)
+        self._choose(old, 0, len(old))
+
+
+def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
+    """Return which points (N, 3) lie within `reach` of any of the places (K, 3), and some more, (M,) int64 in order."""
+    boxes = new_boxes(places.min(axis=0), places.max(axis=0), reach, 0, 0)
+    marked = np.zeros(MARKS, np.bool_)
+    nearby.mark_around(boxes, places, reach, marked)
+    parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
+
+    def look(part: int, begin: int, end: int) -> None:
+        found = np.empty((end - begin) // 4 + 1024, np.int64)
+        count = nearby.list_marked(points, boxes, marked, begin, end, found)
+        if count > len(found):
+            found = np.empty(count, np.int64)
+            nearby.list_marked(points, boxes, marked, begin, end, found)
+        parts[part] = found[:count]
+
+    in_parts(len(points), PART, look)
+    return np.concatenate(parts)

@@ -1,0 +1,350 @@
+"""The same work here, in processes and on a cluster; a worker that dies is made good."""
+
+import builtins
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from jobs import Deadly, add, die_always, die_once, leave_once, refuse
+
+from scantruss.cli import main
+from scantruss.errors import FormatError, InputError, ScanTrussError
+from scantruss.runtime import cluster as module
+from scantruss.runtime.cluster import Cluster, Processes, Workers, open_workers
+from scantruss.runtime.parallel import processors
+from scantruss.scan.stream import thin_scan
+
+
+@contextmanager
+def small_cluster():
+    """Give the address of a cluster within this process."""
+    distributed = pytest.importorskip("distributed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cluster = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
+        )
+    try:
+        yield cluster.scheduler_address
+    finally:
+        cluster.close()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """A cluster for all tests that leave it whole."""
+    with small_cluster() as found:
+        yield found
+
+
+def test_work_is_done_here_in_turn():
+    assert list(Workers().run(add, iter([5, 6]), 10)) == [(0, 15), (1, 16)]
+
+
+def test_processes_do_all_jobs_and_make_good_one_that_died(tmp_path):
+    found = dict(Processes(2).run(die_once, range(6), str(tmp_path)))
+    assert (tmp_path / "died").exists()
+    assert [found[number][0] for number in range(6)] == list(range(6))
+    assert os.getpid() not in {process for _, process in found.values()}
+
+
+def test_processes_that_die_again_and_again_are_given_up(monkeypatch):
+    monkeypatch.setattr(module, "DEATHS", 0)
+    with pytest.raises(ScanTrussError, match="die again and again"):
+        list(Processes(1).run(die_always, range(2)))
+
+
+def test_processes_that_die_while_they_are_told_what_all_need_are_given_up(monkeypatch):
+    monkeypatch.setattr(module, "DEATHS", 0)
+    with pytest.raises(ScanTrussError, match="die again and again"):
+        list(Processes(1).run(add, range(2), [Deadly(), bytes(1 << 20)]))  # more than a pipe holds
+
+
+def test_what_a_job_refuses_comes_out():
+    with pytest.raises(FormatError, match="job 1 is refused"):
+        list(Processes(1).run(refuse, [1]))
+
+
+def test_a_cluster_does_all_jobs_and_says_what_is_refused(address):
+    with open_workers(scheduler=address) as crew:
+        assert crew.count == 2 and address in crew.words
+        assert dict(crew.run(add, range(9), 10)) == {number: number + 10 for number in range(9)}
+        assert dict(crew.run(add, range(2))) == {0: 0, 1: 1}
+        with pytest.raises(FormatError, match="job 3 is refused"):
+            list(crew.run(refuse, [3]))
+
+
+def test_a_cluster_of_another_version_is_refused(address, monkeypatch):
+    monkeypatch.setattr(module, "_version", lambda: "0.0.7")
+    with pytest.raises(InputError, match=r"have scantruss 0\.0\.7, this is"):
+        open_workers(scheduler=address)
+
+
+@pytest.mark.parametrize("scheduler", ["tcp://127.0.0.1:1", "nonsense://"])
+def test_a_scheduler_that_does_not_answer_is_refused(scheduler, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "PATIENCE", 0.3)
+    with pytest.raises(InputError, match="no scheduler answers"):
+        Cluster(0, scheduler)
+
+
+def test_a_port_where_something_else_answers_is_refused(monkeypatch):
+    pytest.importorskip("distributed")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            with suppress(OSError), server.accept()[0] as caller:
+                caller.settimeout(1.0)
+                caller.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+                while caller.recv(1000):  # until the other side leaves, or says no more
+                    pass
+
+        server.settimeout(30.0)
+        answering = threading.Thread(target=answer)
+        answering.start()
+        with pytest.raises(InputError, match=r"no scheduler answers at tcp.*something else answers there"):
+            Cluster(0, f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        answering.join()
+
+
+def test_a_local_cluster_that_does_not_start_names_another_way(monkeypatch):
+    distributed = pytest.importorskip("distributed")
+
+    def refuse_to_start(**options):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(distributed, "LocalCluster", refuse_to_start)
+    with pytest.raises(InputError, match=r"do not start \(Nanny failed to start\.\); use --workers 1"):
+        Cluster(2)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="signals cannot be held here")
+@pytest.mark.parametrize(
+    ("number", "handler", "error"),
+    [(signal.SIGINT, signal.default_int_handler, KeyboardInterrupt), (signal.SIGTERM, main._stop, main._Stopped)],
+    ids=["interrupted", "stopped"],
+)
+def test_a_local_cluster_interrupted_while_it_starts_is_ended(monkeypatch, number, handler, error):
+    distributed = pytest.importorskip("distributed")
+    held, closed = [], []
+
+    class Slow:
+        def __init__(self, **options):
+            held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+            os.kill(os.getpid(), number)
+            time.sleep(0.5)
+
+        def close(self):
+            closed.append(True)
+
+    monkeypatch.setattr(distributed, "LocalCluster", Slow)
+    before = signal.signal(number, handler)
+    try:
+        with pytest.raises(error):
+            Cluster(2)
+    finally:
+        signal.signal(number, before)
+    assert held == [True] and closed == [True]  # held, so that no worker dies of it with a traceback
+
+
+RUN = "import sys; sys.modules['distributed'] = None; from scantruss.cli.main import main; sys.exit(main(sys.argv[1:]))"
+
+
+@pytest.fixture(scope="module")
+def long_runs(tmp_path_factory):
+    """Words of commands that take several processes some seconds."""
+    folder = tmp_path_factory.mktemp("long")
+    x, y = np.meshgrid(np.linspace(0, 10, 200), np.linspace(0, 10, 200))
+    scan, out = str(folder / "scan.npy"), str(folder / "out.ply")
+    np.save(scan, np.column_stack([x.ravel(), y.ravel(), np.sin(x.ravel() / 3)]))
+    for number in range(4):
+        np.save(folder / f"{number}.npy", np.random.default_rng(number).uniform(0, 10, (500_000, 3)))
+    return {
+        "thin": [
+            "thin",
+            str(folder / "?.npy"),
+            "-o",
+            out,
+            "--spacing",
+            "0.01",
+            "--keep",
+            "nearest",
+            "--rim",
+            "--workers",
+            "2",
+        ],
+        "sweep": ["sweep", scan, "--length", "0.1,0.11", "-o", out, "--workers", "2"],
+    }
+
+
+def processes_of(group):
+    """Return the command lines of all living processes of a group."""
+    said = subprocess.run(
+        ["ps", "-A", "-ww", "-o", "pgid=,stat=,args="], capture_output=True, text=True, check=True
+    ).stdout
+    rows = [line.split(None, 2) for line in said.splitlines()]
+    return [row[2] for row in rows if row[0] == str(group) and row[1][0] != "Z" and len(row) > 2]
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg") or not shutil.which("ps"), reason="no groups of processes here")
+@pytest.mark.parametrize("command", ["thin", "sweep"])
+@pytest.mark.parametrize(
+    ("number", "wait", "status", "line"),
+    [
+        *((signal.SIGINT, wait, 130, "interrupted; nothing was written") for wait in (0.0, 0.1, 0.3, 0.8)),
+        (signal.SIGTERM, 0.1, 143, "stopped; nothing was written"),
+    ],
+)
+def test_processes_stopped_while_they_start_leave_one_line_and_nothing_else(
+    long_runs, command, number, wait, status, line
+):
+    words = long_runs[command]
+    with subprocess.Popen(
+        [sys.executable, "-c", RUN, *words], stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        try:
+            while run.poll() is None and not any("spawn_main" in told for told in processes_of(run.pid)):
+                time.sleep(0.01)
+            time.sleep(wait)
+            os.killpg(run.pid, number)  # to all of them, as a terminal does
+            said = run.communicate(timeout=60)[1]
+            assert said == f"scantruss: {line}\n" and run.returncode == status
+            assert not Path(words[words.index("-o") + 1]).exists()
+            patience = time.monotonic() + 10
+            while left := processes_of(run.pid):
+                assert time.monotonic() < patience, left
+                time.sleep(0.05)
+        finally:
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(run.pid, signal.SIGKILL)
+
+
+def test_without_dask_processes_of_our_own_serve(monkeypatch):
+    monkeypatch.setattr(module, "has_dask", lambda: False)
+    found = open_workers(3)
+    assert isinstance(found, Processes) and found.count == 3
+    assert open_workers().count == processors()
+    with pytest.raises(InputError, match=r"needs dask.*scantruss\[cluster\]"):
+        open_workers(scheduler="tcp://127.0.0.1:8786")
+
+
+def test_one_worker_is_this_process_and_none_is_refused():
+    assert open_workers(1).alone
+    with pytest.raises(InputError, match="workers must be 1 or more"):
+        open_workers(0)
+
+
+def test_more_workers_than_a_machine_can_feed_are_refused_before_one_starts():
+    with pytest.raises(InputError, match=r"1,000,000 workers are too many for this machine; use at most \d+"):
+        open_workers(1_000_000)
+
+
+@pytest.mark.parametrize("keep", ["mean", "nearest"])
+def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(keep, address, tmp_path, monkeypatch):
+    monkeypatch.setattr(thin_scan, "SMALLEST", 70)
+    points = np.random.default_rng(4).uniform(0, 9, (1000, 3))
+    np.save(tmp_path / "one.npy", points[:600])
+    np.savetxt(tmp_path / "two.xyz", points[600:])
+    names = [tmp_path / "one.npy", tmp_path / "two.xyz"]
+    wanted = thin_scan.thin_scan(names, 1.0, keep=keep, rim=True)
+    shares = []
+    with open_workers(scheduler=address) as crew:
+        found = thin_scan.thin_scan(
+            names, 1.0, keep=keep, rim=True, workers=crew, progress=lambda stage, share: shares.append(share)
+        )
+        assert found.points.tobytes() == wanted.points.tobytes()
+        assert (found.read, found.dropped, found.rim) == (1000, 0, wanted.rim)
+        with pytest.raises(FormatError, match="does not exist"):
+            thin_scan.thin_scan([tmp_path / "three.xyz"], 1.0, workers=crew)
+    assert len(shares) > 8 and shares[-1] == 1.0
+
+
+def test_a_worker_of_a_cluster_that_dies_is_made_good(tmp_path):
+    with small_cluster() as address, open_workers(scheduler=address) as crew:
+        found = dict(crew.run(leave_once, range(5), str(tmp_path)))
+    assert (tmp_path / "left").exists()
+    assert found == {number: number for number in range(5)}
+
+
+class Stub:
+    """A client whose jobs are lost, each of some as often as is said, and done one after the other."""
+
+    def __init__(self, lost):
+        self.lost, self.key = dict(lost), 0
+
+    def submit(self, work, job, common, pure):
+        from concurrent.futures import CancelledError
+
+        def result():
+            if self.lost.get(job):
+                self.lost[job] -= 1
+                raise CancelledError
+            return work(job, common)
+
+        self.key += 1
+        return SimpleNamespace(key=str(self.key), result=result)
+
+
+class InTurn(list):
+    """What stands for `distributed.as_completed`."""
+
+    add = list.append
+
+    def __next__(self):
+        return self.pop(0)
+
+
+@pytest.mark.parametrize(("lost", "given_up"), [({10: 1, 40: 1, 70: 1, 95: 1, 99: 3}, False), ({50: 4}, True)])
+def test_only_deaths_with_nothing_done_between_end_the_work_of_a_cluster(monkeypatch, lost, given_up):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "as_completed", InTurn)
+    monkeypatch.setattr(module, "AHEAD", 1)
+    crew = Cluster.__new__(Cluster)
+    crew.count, crew._client = 1, Stub(lost)
+    if given_up:
+        with pytest.raises(ScanTrussError, match="die again and again"):
+            list(crew.run(add, range(100)))
+    else:
+        assert dict(crew.run(add, range(100))) == {number: number for number in range(100)}
+
+
+def test_a_cluster_is_not_asked_for_without_its_packages(monkeypatch):
+    real = builtins.__import__
+
+    def no_dask(name, *rest):
+        if name.split(".")[0] in ("dask", "distributed"):
+            raise AssertionError("dask is imported for work in this process")
+        return real(name, *rest)
+
+    monkeypatch.setattr(builtins, "__import__", no_dask)
+    assert list(open_workers(1).run(add, [1], 1)) == [(0, 2)]
+
+
+def test_a_client_that_came_up_by_half_is_gone_before_the_next_one_starts(monkeypatch):
+    """Closed by chance while another one starts, it would wait for a lock that the other one holds."""
+    distributed = pytest.importorskip("distributed")
+    gone = []
+
+    class Half:
+        def __init__(self, *words, **options):
+            self.itself = self
+            raise OSError("refused")
+
+        def __del__(self):
+            gone.append(True)
+
+    monkeypatch.setattr(distributed, "Client", Half)
+    with pytest.raises(InputError, match="no scheduler answers") as caught:
+        Cluster(0, "tcp://127.0.0.1:1")
+    assert gone and caught.value.__context__ is None

@@ -1,0 +1,46 @@
+"""Distances between a scan and a grid: against every triangle and every place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
+from scipy.spatial import cKDTree
+from small_grids import dome
+from surfaces import distance_to_triangles
+
+from scantruss.check.coverage import boxes_of, distances_to_grid, distances_to_scan
+from scantruss.kernels.geometry.triangles import distance_to_triangle
+
+pytestmark = pytest.mark.kernels
+
+
+@settings(max_examples=20)
+@given(some.integers(0, 10_000), some.sampled_from([0.0, 0.05, 1.0, 20.0]))
+def test_the_nearest_of_all_triangles_is_found(seed: int, away: float) -> None:
+    """On the grid, near it and far from it; places beyond its rim too."""
+    rng = np.random.default_rng(seed)
+    grid, length = dome(5), 4.0
+    corners = grid.nodes[grid.triangles]
+    places = rng.permutation(corners.reshape(-1, 3))[:40] + away * length * rng.normal(size=(40, 3))
+    slow = distance_to_triangles(places[:, None], *(corners[None, :, k] for k in range(3))).min(axis=1)
+    found = distances_to_grid(places, boxes_of(places, 0.5 * length), grid, length)
+    assert found == pytest.approx(slow, abs=1e-12 * (1 + away * length))
+
+
+@settings(max_examples=20)
+@given(some.integers(0, 10_000), some.sampled_from([0.1, 1.0, 30.0]))
+def test_the_nearest_of_all_places_is_found(seed: int, spread: float) -> None:
+    rng = np.random.default_rng(seed)
+    places, others = rng.normal(size=(60, 3)), spread * rng.normal(size=(25, 3))
+    found = distances_to_scan(others, places, boxes_of(places, 0.25), 0.5)
+    assert found == pytest.approx(cKDTree(places).query(others)[0], rel=1e-12)
+
+
+@given(some.integers(0, 10_000))
+def test_the_distance_to_a_triangle_is_that_of_the_slow_twin(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    p, a, b, c = rng.integers(-3, 4, size=(4, 3)).astype(float)  # now and then flat, or one place
+    found = distance_to_triangle(*(tuple(map(float, x)) for x in (p, a, b, c)))
+    assert found == pytest.approx(float(distance_to_triangles(p, a, b, c)), abs=1e-12)

@@ -1,0 +1,314 @@
+"""Fixed lines: chains of members on the scan, through corners and meetings, that no move takes apart."""
+
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rough import rough_disc
+
+from scantruss import InputError, Settings, grid_from_points
+from scantruss.cli.options import read_lines
+from scantruss.constraints.fixed_lines import divide, find_corners, simplify
+from scantruss.constraints.network import Network, rim_of
+from scantruss.errors import FormatError
+from scantruss.export.json import encode_json, read_grid
+from scantruss.improve.working_mesh import close_net, open_net
+from scantruss.kernels.boundary.curves import at_arc, is_open, slide
+from scantruss.kernels.mesh import grid as moves
+
+NOISE = 0.003
+
+
+def height(x, y):
+    return 0.02 * x * y + 0.03 * y * y
+
+
+def plate(count=9000, seed=0):
+    """Points of a plate, curved and twisted, 10 members wide."""
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(-5, 5, (count, 2))
+    side = np.linspace(-5, 5, 300)
+    rim = np.concatenate(
+        [np.stack([c, d], axis=1) for s in (-5.0, 5.0) for c, d in ((side, s + 0 * side), (s + 0 * side, side))]
+    )
+    xy = np.concatenate([xy, rim])
+    return np.column_stack([xy, height(*xy.T)]) + NOISE * rng.normal(size=(len(xy), 3))
+
+
+def over(*corners, step=0.2):
+    """A polyline on the plate through places (x, y)."""
+    xy, _ = divide(np.array([(*c, 0.0) for c in corners], float), False, step)
+    return tuple(zip(xy[:, 0].tolist(), xy[:, 1].tolist(), height(xy[:, 0], xy[:, 1]).tolist(), strict=True))
+
+
+def ball(count=6000):
+    """Points of a sphere of radius 2."""
+    places = np.random.default_rng(1).normal(size=(count, 3))
+    return 2.0 * places / np.linalg.norm(places, axis=1)[:, None]
+
+
+def degrees(grid):
+    """How many members of lines each node of a line has."""
+    return Counter(grid.lines.ravel().tolist())
+
+
+def far_from(places, polylines):
+    """Largest distance of places from polylines, by sampling these densely."""
+    dense = np.concatenate([divide(np.array(line), False, 0.01)[0] for line in polylines])
+    return max(float(np.linalg.norm(dense - place, axis=1).min()) for place in places)
+
+
+def check_chains(grid, polylines, noise=0.05, chord=0.12):
+    """All members of lines are members, their nodes lie on the polylines, and they cover these."""
+    edges = set(map(tuple, grid.edges.tolist()))
+    assert all(tuple(member) in edges for member in grid.lines.tolist())
+    nodes = grid.nodes + grid.origin
+    assert far_from(nodes[np.unique(grid.lines)], polylines) < noise
+    members = [tuple(map(tuple, nodes[pair].tolist())) for pair in grid.lines]
+    assert far_from(np.concatenate([divide(np.array(p), False, 0.05)[0] for p in polylines]), members) < chord
+    lengths = np.linalg.norm(nodes[grid.lines[:, 0]] - nodes[grid.lines[:, 1]], axis=1)
+    assert lengths.min() / grid.settings.length > 0.5 and lengths.max() / grid.settings.length < 1.5
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_a_line_from_rim_to_rim_is_a_chain_of_members(method):
+    line = over((-5, -1.3), (5, 1.1))
+    grid = grid_from_points(plate(), Settings(length=1.0, method=method, fixed_lines=(line,)))
+    check_chains(grid, [line])
+    ends = [node for node, count in degrees(grid).items() if count == 1]
+    assert len(ends) == 2 and set(degrees(grid).values()) == {1, 2}
+    assert set(ends) <= set(grid.boundary_loops[0].tolist())
+    assert grid.topology.euler == 1 and grid.topology.boundary_loops == 1
+    assert grid.quality.shape_mean > (0.98 if method == "default" else 0.96)
+
+
+def test_crossing_lines_share_a_node_and_corners_are_nodes():
+    first, second = over((-3, -3), (-3, 2), (2.5, 2)), over((-1, 4), (-1, -4.2))
+    grid = grid_from_points(plate(), Settings(length=1.0, fixed_lines=(first, second)))
+    check_chains(grid, [first, second])
+    counts = degrees(grid)
+    assert sorted(Counter(counts.values()).items())[0] == (1, 4) and list(counts.values()).count(4) == 1
+    nodes = grid.nodes + grid.origin
+    crossing = nodes[next(node for node, count in counts.items() if count == 4)]
+    assert np.linalg.norm(crossing - [-1, 2, height(-1, 2)]) < 0.06
+    corner = np.array([-3, 2, height(-3, 2)])
+    assert np.linalg.norm(nodes[list(counts)] - corner, axis=1).min() < 0.02
+    assert (
+        min(np.linalg.norm(nodes[n][:2] - [-1, -4.2]) for n, c in counts.items() if c == 1) < 0.02
+    )  # far from the rim
+
+
+def test_a_closed_line_is_a_ring_also_on_a_closed_scan():
+    angle = np.linspace(0, 2 * np.pi, 80)
+    ring = np.stack([2 * np.cos(angle), 2 * np.sin(angle), 0 * angle], axis=1)
+    ring[-1] = ring[0]
+    tip = np.stack([0 * angle[:20], 2 * np.sin(angle[:20]), 2 * np.cos(angle[:20])], axis=1)
+    for method in ("default", "paper"):
+        grid = grid_from_points(ball(), Settings(length=0.6, method=method, fixed_lines=(ring.tolist(),)))
+        assert grid.topology.euler == 2 and grid.topology.boundary_loops == 0
+        assert set(degrees(grid).values()) == {2} and len(grid.lines) in (20, 21, 22)
+        assert np.abs(grid.nodes[np.unique(grid.lines), 2] + grid.origin[2]).max() < 0.02
+    grid = grid_from_points(ball(), Settings(length=0.6, fixed_lines=(tip.tolist(),)))
+    assert grid.topology.euler == 2 and sorted(Counter(degrees(grid).values()).items())[0] == (1, 2)
+
+
+def test_an_end_near_the_rim_comes_to_it_and_one_far_from_it_does_not():
+    line = over((-4.6, 0.3), (4.2, 0.3))
+    grid = grid_from_points(plate(), Settings(length=1.0, fixed_lines=(line,)))
+    on_rim = set(grid.boundary_loops[0].tolist())
+    ends = {node: grid.nodes[node, 0] + grid.origin[0] for node, count in degrees(grid).items() if count == 1}
+    assert sorted((node in on_rim, bool(x > 0)) for node, x in ends.items()) == [(False, True), (True, False)]
+    assert min(ends.values()) < -4.95 and abs(max(ends.values()) - 4.2) < 0.02
+
+
+def test_a_line_along_the_rim_is_the_rim():
+    grid = grid_from_points(plate(), Settings(length=1.0, fixed_lines=(over((-5, -4), (-5, 4)),)))
+    assert len(grid.lines) in (8, 9) and grid.topology.euler == 1
+    assert np.abs(grid.nodes[grid.lines, 0] + grid.origin[0] + 5).max() < 0.05
+    assert (grid.edge_uses[grid.edge_on_line] == 1).all()
+
+
+def test_lines_stay_through_all_efforts_and_the_same_input_gives_the_same_bytes():
+    lines = (over((-5, 0), (5, 0)), over((0, -5), (0.5, 5)))
+    for effort in ("quick", "best"):
+        settings = Settings(length=1.25, effort=effort, fixed_lines=lines)
+        first, second = (grid_from_points(plate(5000), settings) for _ in range(2))
+        check_chains(first, lines, chord=0.2, noise=0.07)
+        assert encode_json(first) == encode_json(second)
+
+
+def test_fixed_nodes_beside_a_line_leave_it_a_line_and_those_on_it_are_its_nodes():
+    line = over((-5, 0.2), (5, 0.2))
+    on, beside = (1.3, 0.2, height(1.3, 0.2)), (-2.2, 0.75, height(-2.2, 0.75))
+    for method in ("default", "paper"):
+        settings = Settings(length=1.0, method=method, fixed=(on, beside), fixed_lines=(line,))
+        grid = grid_from_points(plate(), settings)
+        check_chains(grid, [line])
+        fixed = np.flatnonzero(grid.fixed)
+        assert sorted(degrees(grid)[n] for n in fixed) == [0, 2]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ([(0, 0, 0), (1, 0, 3.0)], r"fixed line 1, point 2 \(1, 0, 3\) is 2\.9.* away from the scan; .* 0\.5"),
+        (
+            [(0, 0, 0), (0.2, 0, 0)],
+            r"fixed line 1 is 0\.2 long; a line, that is at least half a member, 0\.5, is needed",
+        ),
+        ([(0, 0, 0), (0.3, 0, 0), (0.3, 0.3, 0), (0, 0, 0)], r"is 1\.0.* long; a ring, that is at least two members"),
+        ([(0, -5, 0.75), (0, 5, 0.75)], r"leaves the scan by 0\.\d+ near \(.*\); .* give it more points"),
+        ([(0, 0, 0)], "at least two different points, got 1"),
+        ([(0, 0, 0), (0, 0, 0)], "at least two different points, got 1"),
+        ([(0, 0), (1, 0)], "three finite coordinates"),
+        ([(0, 0, np.nan), (1, 0, 0)], "three finite coordinates"),
+        (5, "must be polylines"),
+    ],
+)
+def test_lines_that_cannot_be_are_refused(line, words):
+    with pytest.raises(InputError, match=words):
+        grid_from_points(plate(3000), Settings(length=1.0, fixed_lines=(line,)))
+
+
+def test_a_file_may_hold_several_polylines(tmp_path):
+    file = tmp_path / "lines.csv"
+    file.write_text("x,y,z\n0,0,0\n1,0,0\n# a note\n2,0,0\n\n\n0;1;0\n1;1;0\n")
+    assert read_lines(file) == [[(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 0), (1, 1, 0)]]
+    for text, words in (("0 0 0\n\n1 0 0\n", "polyline 1 of .* has 1 point"), ("a b c\n", "holds no fixed lines")):
+        file.write_text(text)
+        with pytest.raises(FormatError, match=words):
+            read_lines(file)
+    with pytest.raises(FormatError, match="cannot read fixed lines"):
+        read_lines(tmp_path / "none.csv")
+
+
+def test_a_saved_grid_knows_its_lines(tmp_path):
+    rough = rough_disc()
+    grid = rough.grid.replace(lines=rough.grid.edges[3:7])
+    (tmp_path / "grid.json").write_bytes(encode_json(grid))
+    assert np.array_equal(read_grid(tmp_path / "grid.json").lines, grid.lines)
+    values = json.loads(encode_json(grid))
+    del values["lines"]  # a grid of an earlier version
+    (tmp_path / "old.json").write_text(json.dumps(values))
+    assert read_grid(tmp_path / "old.json").lines.shape == (0, 2)
+
+
+def chain_through(grid, rng, closed=False):
+    """A path of interior nodes along members, no two of which are neighbours but in order."""
+    inside = np.setdiff1d(np.arange(len(grid.nodes)), np.concatenate(grid.boundary_loops))
+    around = {n: set() for n in range(len(grid.nodes))}
+    for a, b in grid.edges.tolist():
+        around[a].add(b)
+        around[b].add(a)
+    chain = [int(rng.choice(inside))]
+    while True:
+        ahead = [n for n in sorted(around[chain[-1]]) if n in inside and not around[n] & set(chain[:-1])]
+        ahead = [n for n in ahead if n not in chain]
+        if not ahead:
+            return chain
+        chain.append(int(rng.choice(ahead)))
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(6))
+def test_no_row_of_moves_takes_a_chain_apart(seed):
+    """Flips, collapses and splits at random edges: the line stays one path between the same two ends."""
+    rng = np.random.default_rng(seed)
+    rough = rough_disc(length=0.3, points=2000)
+    chain = max((chain_through(rough.grid, rng) for _ in range(20)), key=len)
+    grid = rough.grid.replace(lines=np.sort(np.array([chain[:-1], chain[1:]]).T, axis=1))
+    net, source = open_net(grid)
+    for v in chain[1:-1]:
+        net.kind[v], net.curve[v] = moves.RIM, 0
+    made = Counter()
+    for _ in range(1500):
+        a = int(rng.choice(np.flatnonzero((net.degree > 0) & ((net.line != 0) | (rng.random() < 0.7)))))
+        b = int(net.ring[a, rng.integers(net.degree[a])])
+        name = rng.choice(["flip", "collapse", "split"])
+        if getattr(moves, f"may_{name}")(net, a, b):
+            on_line = moves.is_line(net, a, b)
+            getattr(moves, name)(net, a, b)
+            made[name, bool(on_line)] += 1
+    assert made["collapse", True] > 2 and made["split", True] > 2 and not made["flip", True]
+    assert made["flip", False] > 20 and made["collapse", False] > 20
+    after = close_net(net, source, grid)
+    edges = set(map(tuple, after.edges.tolist()))
+    assert all(tuple(pair) in edges for pair in after.lines.tolist())
+    counts = degrees(after)
+    assert sorted(Counter(counts.values()).items())[0] == (1, 2) and set(counts.values()) <= {1, 2}
+    ends = [after.nodes[n] for n, count in counts.items() if count == 1]
+    wanted = [grid.nodes[chain[0]], grid.nodes[chain[-1]]]
+    assert sorted(map(tuple, ends)) == sorted(map(tuple, wanted))
+    assert len(after.lines) == len(counts) - 1  # one path, no ring beside it
+
+
+@pytest.mark.kernels
+@given(st.integers(0, 10_000))
+def test_places_slide_along_an_open_curve_and_not_over_its_ends(seed):
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.uniform(0.1, 1.0, (6, 3)), axis=0)
+    rim = rim_of([points], [False])
+    assert is_open(rim, 0) and not is_open(rim_of([points], [True]), 0)
+    total = float(rim.total[0])
+    assert np.allclose(at_arc(rim, 0, total + 1.0)[1:], points[-1]) and np.allclose(at_arc(rim, 0, -1.0)[1:], points[0])
+    place = points[rng.integers(6)] + rng.normal(size=3)
+    arc, *foot = slide(rim, 0, rng.uniform(0, total), 10.0 * total, *place)
+    arcs = np.linspace(0, total, 2000)
+    dense = np.stack([np.interp(arcs, rim.arc, points[:, c]) for c in range(3)], axis=1)
+    best = np.linalg.norm(dense - place, axis=1).min()
+    assert np.linalg.norm(np.array(foot) - place) == pytest.approx(best, abs=2 * total / 2000)
+    assert 0.0 <= arc <= total
+
+
+@given(st.integers(0, 10_000), st.booleans())
+def test_a_simplified_polyline_keeps_within_the_tolerance(seed, closed):
+    rng = np.random.default_rng(seed)
+    points = np.cumsum(rng.normal(size=(30, 3)), axis=0)
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    kept = simplify(points, 0.8, closed)
+    assert set(map(tuple, kept)) <= set(map(tuple, points))
+    dense = divide(kept, False, 0.02)[0]
+    assert max(np.linalg.norm(dense - p, axis=1).min() for p in points) < 0.83
+
+
+def test_corners_are_found_however_finely_a_line_is_drawn():
+    settings = Settings(length=1.0)
+    square = np.array([(0, 0, 0), (3, 0, 0), (3, 3, 0), (0, 3, 0), (0, 0, 0)], float)
+    for step in (3.0, 0.21, 0.013):
+        drawn, _ = divide(square, False, step)
+        points, at = divide(simplify(drawn, 0.005, True), True, 0.05)
+        corners = find_corners(points, at, True, settings)
+        assert sorted(map(tuple, points[corners])) == sorted(map(tuple, square[:4]))
+    angle = np.linspace(0, 2 * np.pi, 200)
+    circle = 1.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    circle[-1] = circle[0]
+    points, at = divide(simplify(circle, 0.005, True), True, 0.05)
+    assert find_corners(points, at, True, settings) == []
+
+
+def test_the_network_cuts_lines_where_they_meet():
+    """A cross, a touch, a stub over a meeting, and a second line along the first."""
+    side = np.array([(0, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 0), (0, 0, 0)], float)
+    loop, corners = divide(side, True, 0.05)
+    network = Network([(loop, corners)], 1.0)
+
+    def add(*places):
+        network.add(divide(np.array([(*p, 0.0) for p in places], float), False, 0.05)[0], False, [])
+
+    add((0, 5), (10, 5))
+    add((5, 2), (5, 8))
+    add((3, 5.2), (3, 9.8))  # touches the first, comes near the rim
+    add((7, 8), (7, 4.8))  # goes a little over it
+    add((1, 5.1), (9, 5.1))  # along it
+    lines = network.lines()
+    inner = sorted(tuple(np.round(p, 6)) for p, k in zip(lines.stops.tolist(), lines.on_loop, strict=True) if k < 0)
+    assert inner == [(1, 5, 0), (3, 5, 0), (5, 2, 0), (5, 5, 0), (5, 8, 0), (7, 5, 0), (7, 8, 0), (9, 5, 0)]
+    assert sorted(map(tuple, np.round(lines.stops_on(0), 6).tolist())) == [(0, 5, 0), (3, 10, 0), (10, 5, 0)]
+    sizes = sorted(round(float(np.linalg.norm(np.diff(c, axis=0), axis=1).sum()), 1) for c in lines.curves)
+    assert sizes == [1, 1, 2, 2, 2, 2, 3, 3, 3, 5]
+    for curve, (first, last) in zip(lines.curves, lines.ends, strict=True):
+        assert np.array_equal(curve[0], lines.stops[first]) and np.array_equal(curve[-1], lines.stops[last])

@@ -1,0 +1,143 @@
+"""Holes that are closed: the surface goes on smoothly where it is known what it was, and what is made up is told apart."""
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from small_clouds import ball, sheet, tire
+from steps import boundary_of, steps_of
+
+import scantruss as st
+from scantruss.boundary.holes import _lattice as lattice
+from scantruss.boundary.holes import _thin_plate as thin_plate
+from scantruss.boundary.holes import fill_holes
+
+RADIUS = 15 / (2 * np.pi)  # of a hole with a rim of 15 members of length 1
+
+
+def field(z, spacing=0.16, noise=0.002):
+    """Points of a surface z(x, y) over a square of 16 members."""
+    points = sheet(16, 16, spacing)
+    points[:, 2] = z(points[:, 0], points[:, 1])
+    return points + noise * np.random.default_rng(1).normal(size=points.shape)
+
+
+def wave(x, y):
+    return 3 * np.cos(x / 5) * np.cos(y / 6)
+
+
+SURFACES = {  # points, middle of the hole, distance from the true surface, largest in widths of the hole
+    "sphere": (ball(6.0, 16_000, noise=0.002), (0, 0, 6), lambda p: np.linalg.norm(p, axis=1) - 6, 0.02),
+    "dome": (field(wave), (1, 1, 3), lambda p: p[:, 2] - wave(p[:, 0], p[:, 1]), 0.02),
+    "torus": (tire(8.0, 3.5, 0.18), (0, 8, 3.5), lambda p: np.hypot(np.hypot(p[:, 0], p[:, 1]) - 8, p[:, 2]) - 3.5, 0.04),
+    "saddle": (field(lambda x, y: (x * x - y * y) / 14), (-1, 2, 0), lambda p: p[:, 2] - (p[:, 0] ** 2 - p[:, 1] ** 2) / 14, 0.03),
+    "ridge": (field(lambda x, y: -0.5 * np.abs(x)), (0, 0, 0), lambda p: p[:, 2] + 0.5 * np.abs(p[:, 0]), 0.12),
+}  # fmt: skip
+
+
+def opened(name):
+    """Points of a surface with a hole, and its middle."""
+    points, middle, _, _ = SURFACES[name]
+    return points[np.linalg.norm(points - middle, axis=1) > RADIUS], np.array(middle, float)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_surface_goes_on_over_a_hole_of_fifteen_members(name):
+    """Every made-up point lies near the true surface, there are points all over the hole, and none besides."""
+    points, middle = opened(name)
+    cloud, settings = st.PointCloud.from_array(points), st.Settings(length=1.0)
+    holes = [
+        p.points for p in boundary_of(cloud, settings).loops if np.linalg.norm(p.points[0] + cloud.origin - middle) < 4
+    ]
+    made_up = fill_holes(steps_of(cloud, settings).sites, holes) + cloud.origin
+    _, _, distance, most = SURFACES[name]
+    assert np.abs(distance(made_up)).max() < most * 2 * RADIUS
+    assert np.linalg.norm(made_up - middle, axis=1).max() < 1.4 * RADIUS
+    whole = SURFACES[name][0]
+    lost = whole[np.linalg.norm(whole - middle, axis=1) < RADIUS]
+    apart = np.linalg.norm(lost[:, None] - made_up, axis=2).min(axis=1)
+    assert apart.max() < 0.3 + most * 2 * RADIUS
+
+
+@compiled_only
+@pytest.mark.parametrize(("name", "method"), [("sphere", "default"), ("torus", "paper"), ("saddle", "default")])
+def test_a_closed_hole_is_covered_and_its_nodes_have_no_deviation(name, method):
+    """The loop is gone; exactly the nodes over the hole are told apart, and they lie near the true surface."""
+    points, middle = opened(name)
+    _, _, distance, most = SURFACES[name]
+    before = st.grid_from_points(points, st.Settings(length=1.0, method=method, effort="quick"))
+    grid = st.grid_from_points(points, st.Settings(length=1.0, method=method, effort="quick", fill_holes=20.0))
+    assert grid.topology.boundary_loops == before.topology.boundary_loops - 1
+    assert grid.topology.euler == before.topology.euler + 1
+    nodes = grid.nodes + grid.origin
+    away, told = np.linalg.norm(nodes - middle, axis=1), np.isnan(grid.deviation)
+    assert told[away < 0.8 * RADIUS].all() and not told[away > 1.3 * RADIUS].any()
+    assert told.sum() > 12
+    assert np.abs(distance(nodes[told])).max() < most * 2 * RADIUS
+    assert grid.quality.node_deviation_max == np.nanmax(grid.deviation)
+
+
+def test_a_hole_longer_than_asked_keeps_its_loop_and_what_is_around_stays():
+    points, _ = opened("dome")
+    cloud = st.PointCloud.from_array(points)
+    kept, same = (steps_of(cloud, st.Settings(length=1.0, fill_holes=rim)) for rim in (14.0, None))
+    closed = steps_of(cloud, st.Settings(length=1.0, fill_holes=17.0))
+    assert len(kept.boundary.loops) == 2 and len(closed.boundary.loops) == 1
+    for one, other in zip(kept.boundary.loops, same.boundary.loops, strict=True):
+        assert np.array_equal(one.points, other.points)
+    assert closed.sites.measured < len(closed.sites.surface.mean)
+    assert kept.sites.measured == len(kept.sites.surface.mean)
+
+
+def test_the_outer_rim_of_a_small_piece_is_no_hole():
+    """A patch whose rim is shorter than the holes that are closed stays what it is; a nearly closed ball closes."""
+    patch = st.PointCloud.from_array(sheet(5, 5, 0.12))
+    assert len(boundary_of(patch, st.Settings(length=1.0, fill_holes=30.0)).loops) == 1
+    points, _ = opened("sphere")
+    assert len(boundary_of(st.PointCloud.from_array(points), st.Settings(length=1.0, fill_holes=30.0)).loops) == 0
+
+
+@pytest.mark.parametrize("reach", [40, 100])
+def test_a_hole_around_a_bend_is_filled(reach):
+    """On a tube: as the rim leaves its plane the hole is drawn as a circle."""
+    rng = np.random.default_rng(0)
+    turn, z = rng.uniform(-np.pi, np.pi, 30_000), rng.uniform(-10, 10, 30_000)
+    points = np.column_stack([3 * np.cos(turn), 3 * np.sin(turn), z])
+    points = points[(turn / np.radians(reach)) ** 2 + (z / 3) ** 2 > 1]
+    cloud = st.PointCloud.from_array(points)
+    sites, boundary, _ = steps_of(cloud, st.Settings(length=1.0))
+    hole = [loop.points for loop in boundary.loops if np.abs(loop.points[:, 2] + cloud.origin[2]).max() < 4]
+    made_up = fill_holes(sites, hole) + cloud.origin
+    off = np.abs(np.hypot(made_up[:, 0], made_up[:, 1]) - 3)
+    assert len(hole) == 1
+    assert off.max() < (0.03 if reach == 40 else 0.2) * 6
+    assert np.abs(np.arctan2(made_up[:, 1], made_up[:, 0])).max() < np.radians(reach + 12)
+
+
+def test_a_thin_plate_passes_through_its_places_and_keeps_what_is_straight():
+    rng = np.random.default_rng(2)
+    flat, values = rng.uniform(-3, 3, (30, 2)), rng.normal(size=(30, 3))
+    assert thin_plate(flat, values, flat, 0.0) == pytest.approx(values, abs=1e-8)
+    straight = np.array([[1.0, 2, 3], [0.5, 0, 1], [0, 2, -1]])
+    wanted = rng.uniform(-2, 2, (50, 2))
+    assert thin_plate(flat, np.column_stack([np.ones(30), flat]) @ straight, wanted, 0.1) == pytest.approx(
+        np.column_stack([np.ones(50), wanted]) @ straight
+    )
+
+
+def test_a_lattice_fills_a_polygon_and_keeps_off_its_rim():
+    """Against the area of an L."""
+    corners = np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)], float)
+    after = np.roll(corners, -1, axis=0)
+    rim = (corners[:, None] + np.linspace(0, 1, 40, endpoint=False)[:, None] * (after - corners)[:, None]).reshape(
+        -1, 2
+    )
+    places = lattice(rim, 0.1)
+    assert len(places) * 0.1**2 * 0.75**0.5 == pytest.approx(12 - 16 * 0.05, rel=0.03)
+    assert not ((places > 2).all(axis=1)).any() and places.min() > 0 and places.max() < 4
+    assert np.linalg.norm(places[:, None] - rim, axis=2).min() >= 0.05
+
+
+def test_lengths_of_holes_that_are_none_are_refused():
+    for wrong in (-1.0, float("nan"), "wide"):
+        with pytest.raises(st.InputError, match="fill_holes"):
+            st.Settings(length=1.0, fill_holes=wrong)

@@ -1,0 +1,217 @@
+"""The edge of the surface lies a little beyond the outermost points; how far, tells how unevenly these lie."""
+
+import numpy as np
+import pytest
+from shapes import make
+from small_clouds import sheet
+from steps import steps_of
+
+import scantruss as st
+from scantruss.boundary import find
+from scantruss.boundary import offset as module
+from scantruss.boundary.corners import STEP, find_corners
+from scantruss.boundary.curves import heights_along, outward, resample, room_across, runs_around
+from scantruss.boundary.offset import ON_THE_EDGE, Chance
+from scantruss.surface.samples import sample_surface
+
+RADIUS = 8.0
+
+
+def disc(density, seed=0):
+    """Points by chance on a flat disc, so many for an area."""
+    rng = np.random.default_rng(seed)
+    count = rng.poisson(density * np.pi * RADIUS**2)
+    r, turn = RADIUS * np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
+    return np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * r])
+
+
+def boundary_of(points, length=1.0, **settings):
+    cloud = st.PointCloud.from_array(points)
+    return steps_of(cloud, st.Settings(length=length, **settings)).boundary, cloud.origin
+
+
+def short_of(places, origin, radius=RADIUS):
+    """How far places end before the edge of the disc."""
+    return radius - np.linalg.norm((places + origin)[:, :2], axis=1)
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """What `chance_of` is asked, and how far beyond it answers."""
+    asked, full = [], module.chance_of
+
+    def spy(surface, points, density, radius):
+        found = full(surface, points, density, radius)
+        asked.append((points, found.beyond))
+        return found
+
+    monkeypatch.setattr(find, "chance_of", spy)
+    return asked
+
+
+@pytest.mark.parametrize("density", [15, 40, 120, 500, 2000])
+@pytest.mark.parametrize("scale", [1.0, 30.0])
+def test_points_by_chance_end_before_the_edge_as_far_as_said(density, scale, seen):
+    _, origin = boundary_of(scale * disc(density), scale)
+    ((touched, beyond),) = seen
+    truth = short_of(resample(touched, STEP * scale), origin, scale * RADIUS).mean()
+    assert beyond == pytest.approx(truth, rel=0.25)
+
+
+@pytest.mark.parametrize("density", [40, 120, 500])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_curve_is_nearer_to_the_edge_but_hardly_beyond(density, seed, seen, monkeypatch):
+    points = disc(density, seed)
+    now, origin = boundary_of(points)
+    beyond = seen[0][1]
+    monkeypatch.setattr(find, "chance_of", lambda *_: ON_THE_EDGE)
+    before, _ = boundary_of(points)
+    short, far = (short_of(one.loops[0].points, origin) for one in (now, before))
+    assert abs(short).mean() <= 0.7 * abs(far).mean() and abs(short).max() < abs(far).max()
+    assert np.maximum(-short, 0.0).mean() <= 0.1 * beyond
+    assert short.std() <= 0.75 * far.std()
+
+
+def lattice():
+    x, y = np.meshgrid(np.arange(0, 10.05, 0.1), np.arange(0, 8.05, 0.1))
+    return np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
+
+
+@pytest.mark.parametrize("name", ["lattice", "valve_vertices", "mask"])
+def test_points_on_the_edge_itself_are_its_end(name, seen, monkeypatch):
+    points, length = lattice(), 1.0
+    if name != "lattice":
+        points, length = make(name).points, make(name).length
+    found, _ = boundary_of(points, length)
+    assert seen and all(beyond == 0.0 for _, beyond in seen)
+    monkeypatch.setattr(find, "chance_of", lambda *_: ON_THE_EDGE)
+    same, _ = boundary_of(points, length)
+    assert [loop.points.tobytes() for loop in found.loops] == [loop.points.tobytes() for loop in same.loops]
+
+
+def test_the_paper_ends_at_the_boundary_points(seen):
+    boundary_of(disc(100), method="paper")
+    assert not seen
+
+
+def circle(count, radius=5.0, wave=0.0, waves=0):
+    turn = np.arange(count) * 2 * np.pi / count
+    r = radius + wave * np.cos(waves * turn)
+    return np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * turn])
+
+
+@pytest.fixture(scope="module")
+def plane():
+    """The surface of a plate whose normals look up."""
+    surface = sample_surface(st.PointCloud.from_array(sheet(14, 14, 0.1)), st.Settings(length=1.0)).surface
+    return surface._replace(normals=np.tile([0.0, 0.0, 1.0], (len(surface.normals), 1)))
+
+
+def test_heights_are_those_over_the_line_through_the_neighbours(plane):
+    """On a regular polygon the sagitta of two sides; of a point pushed out by a little so much more."""
+    turns = circle(60)
+    assert heights_along(plane, turns) == pytest.approx(np.full(60, 5.0 * (1 - np.cos(2 * np.pi / 60))))
+    assert heights_along(plane, turns[::-1].copy()) == pytest.approx(-heights_along(plane, turns))  # a hole
+    turns[7] *= 1.01
+    assert heights_along(plane, turns)[7] == pytest.approx(5.05 - 5.0 * np.cos(2 * np.pi / 60))
+
+
+def test_outwards_is_away_from_the_surface(plane):
+    """Of an outer rim away from its middle, of the rim of a hole towards it."""
+    assert outward(plane, circle(200)) == pytest.approx(circle(200, 1.0))
+    assert outward(plane, circle(200)[::-1].copy()) == pytest.approx(-circle(200, 1.0)[::-1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_room_across_is_that_of_a_look_at_all_pairs(seed):
+    rng = np.random.default_rng(seed)
+    turn = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    r = 2.0 + sum(rng.normal(0, 0.25) * np.cos(k * turn + rng.random()) for k in range(2, 9))
+    curve = resample(np.column_stack([r * np.cos(turn), r * np.sin(turn), 0.1 * np.cos(3 * turn)]), 0.05)
+    reach, count = 0.8, len(curve)
+    away = np.linalg.norm(curve[:, None] - curve, axis=2)
+    steps = abs(np.arange(count)[:, None] - np.arange(count))
+    away[np.minimum(steps, count - steps) <= round(3 * reach / 0.05)] = np.inf
+    assert room_across(curve, reach, 0.05) == pytest.approx(np.minimum(away.min(axis=1), reach))
+
+
+def test_runs_go_on_around_the_end_of_a_curve():
+    def told(text):
+        return runs_around(np.array([c == "x" for c in text])).tolist()
+
+    assert told("xxx..x.") == [0, 0, 0, 1, 1, 2, 3]
+    assert told("x..xx..xx") == [0, 1, 1, 2, 2, 3, 3, 0, 0]
+    assert told("....") == [0, 0, 0, 0]
+
+
+def bent(curve, chance, plane, **settings):
+    """The curve of the edge without corners."""
+    return module.curve_of_edge(curve, chance, st.Settings(length=1.0, corner_angle=170.0, **settings), plane)[0]
+
+
+@pytest.mark.parametrize("density", [11.5, 115.0])
+@pytest.mark.parametrize("wave, waves", [(0.3, 16), (0.1, 25), (0.02, 32)])
+def test_more_smoothing_cuts_off_no_more_than_chance_did(wave, waves, density, plane, monkeypatch):
+    """Tongues hardly longer, and only bays in which few points would lie: of real ones most stays."""
+    curve = resample(circle(4000, wave=wave, waves=waves), STEP)
+    chance = Chance(module.BEYOND * density ** (-2 / 3) * 0.2 ** (-1 / 3), density)
+    more = bent(curve, chance, plane)
+    monkeypatch.setattr(module, "WIDER", (module.WINDOW,))
+    usual = bent(curve, chance, plane)
+    moved = np.linalg.norm(more, axis=1) - np.linalg.norm(usual, axis=1)
+    assert -1.3 * module.MOVED * chance.beyond <= moved.min()
+    bay = np.maximum(moved, 0.0).sum() * STEP * density / waves
+    assert bay <= 1.5 * module.BAY
+    if wave == 0.3 and density > 100:  # some twenty points would lie in each bay
+        assert np.ptp(np.linalg.norm(more, axis=1)) > 0.85 * np.ptp(np.linalg.norm(usual, axis=1))
+
+
+def test_what_chance_explains_is_smoothed_more(plane, monkeypatch):
+    curve = resample(circle(4000), STEP)
+    curve *= 1.0 + 0.002 * np.random.default_rng(0).normal(size=(len(curve), 1))
+    more = bent(curve, Chance(0.02, 115.0), plane)
+    monkeypatch.setattr(module, "WIDER", (module.WINDOW,))
+    usual = bent(curve, Chance(0.02, 115.0), plane)
+    assert np.linalg.norm(more, axis=1).std() < 0.6 * np.linalg.norm(usual, axis=1).std()
+
+
+def test_a_slit_stays_open(plane):
+    """The sides of a narrow hole do not come to lie over each other, however far the surface may go on."""
+    x = np.linspace(-3.0, 3.0, 121)
+    low, high = np.column_stack([x, 0 * x - 0.1, 0 * x]), np.column_stack([x[::-1], 0 * x + 0.1, 0 * x])
+    curve = resample(np.concatenate([low, high])[::-1], STEP)  # a hole: clockwise
+    x, y, _ = bent(curve, Chance(0.3, 5.0), plane).T
+    assert 0.5 * (np.roll(x, -1) * y - x * np.roll(y, -1)).sum() > 0.4  # clockwise still: it was 1.2
+    assert abs(y[abs(x) < 2.0]).min() > 0.02
+
+
+def notched(depth, width=0.6):
+    """An outer rim with a triangular notch in a straight side."""
+    half = width / 2
+    turns = [(-5, -4), (-half, -4), (0, depth - 4), (half, -4), (5, -4), (5, 4), (-5, 4)]
+    return resample(np.array([(x, y, 0.0) for x, y in turns]), STEP)
+
+
+@pytest.mark.parametrize("density, kept", [(10.0, False), (400.0, True)])
+def test_a_notch_is_a_corner_where_points_would_lie_in_it(density, kept, plane):
+    """With 1.8 points to its area it is there by chance, with 72 not."""
+    curve, settings = notched(0.6), st.Settings(length=1.0)
+    at, _ = find_corners(curve, settings)
+    corners = module.curve_of_edge(curve, Chance(0.03, density), settings, plane)[1]
+    assert len(at) > 4 and (len(corners) == 4 if not kept else len(corners) == len(at))
+
+
+def test_a_bay_is_as_large_as_it_is(plane):
+    """The triangle of a notch; none at a corner that points outwards."""
+    curve = notched(1.0, 1.6)
+    out = outward(plane, curve)
+    tip = int(np.linalg.norm(curve - [0.0, -3.0, 0.0], axis=1).argmin())
+    corner = int(np.linalg.norm(curve - [5.0, -4.0, 0.0], axis=1).argmin())
+    area = module.bays_at(curve, np.array([tip, corner]), out)
+    assert area[0] == pytest.approx(0.8, rel=0.05) and area[1] == np.inf
+
+
+def test_a_sparse_scan_of_a_round_shell_has_hardly_a_corner():
+    """Ten points for a node: what turns there, turns by chance. Ten rims of fifty members had thirty."""
+    corners = [len(loop.corners) for seed in range(10) for loop in boundary_of(disc(11.5, seed))[0].loops]
+    assert sum(corners) <= 12

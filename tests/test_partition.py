@@ -1,0 +1,171 @@
+"""Two halves of a grid: apart, complete, and the same whoever works on them."""
+
+import numpy as np
+import pytest
+from rough import rough_disc, rough_sphere, same_topology
+
+from scantruss.improve import equalize, perturbation
+from scantruss.improve.partition import Halves
+from scantruss.kernels.mesh.partition import BETWEEN
+from scantruss.runtime import parallel
+
+MAKERS = {
+    "disc": lambda seed: rough_disc(length=0.14, seed=seed, points=9000),
+    "sphere": lambda seed: rough_sphere(count=500, seed=seed, points=6000),
+}
+
+
+@pytest.fixture(params=sorted(MAKERS))
+def make(request):
+    return MAKERS[request.param]
+
+
+def ways(net, start):
+    """Members from a set of nodes to each node, by plain rings."""
+    away, ring, steps = dict.fromkeys(start, 0), list(start), 0
+    while ring:
+        steps += 1
+        ring = [u for v in ring for u in net.ring[v, : net.degree[v]].tolist() if away.setdefault(u, steps) == steps]
+        ring = list(dict.fromkeys(ring))
+    return away
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(3))
+def test_two_rings_of_nodes_lie_between_the_halves(make, seed):
+    net = make(seed).relief().net
+    live = net.degree > 0
+    halves = Halves(net, live)
+    first = np.flatnonzero(live & (halves.label == 0))
+    away = ways(net, first.tolist())
+    assert min(away[v] for v in np.flatnonzero(live & (halves.label == 1)).tolist()) >= 3
+    counts = [int((live & (halves.label == side)).sum()) for side in (0, 1)]
+    assert min(counts) > 0.3 * live.sum() and (live & (halves.label == BETWEEN)).sum() < 0.3 * live.sum()
+
+
+@pytest.mark.kernels
+def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make):
+    net = make(0).relief().net
+    free, used = net.free[: net.spare[0]].copy(), net.used
+    halves = Halves(net, net.degree > 0)
+    stacks = [own.free[: own.spare[0]].tolist() for own in halves.nets]
+    assert sorted(stacks[0] + stacks[1]) == sorted(free.tolist())
+    assert all((halves.label[stack] == side).all() for side, stack in enumerate(stacks))
+    halves.run(lambda side: None)
+    assert sorted(net.free[: net.spare[0]].tolist()) == sorted(free.tolist()) and net.used == used
+
+
+@pytest.mark.kernels
+def test_a_grid_without_work_has_no_halves(make):
+    net = make(0).relief().net
+    halves = Halves(net, np.zeros(len(net.arc), bool))
+    assert (halves.label[net.degree > 0] == BETWEEN).all()
+
+
+def in_shares(make, monkeypatch, seed=1):
+    """A relief small enough for a test that is settled and searched in halves all the same."""
+    monkeypatch.setattr(equalize, "MANY", 50)
+    monkeypatch.setattr(equalize, "ASKING", 10)
+    return make(seed)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(3))
+def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_once(make, seed, monkeypatch):
+    net = in_shares(make, monkeypatch, seed).relief().net
+    first, second, between = equalize.shares_of(net)
+    assert sorted([*first, *second, *between]) == np.flatnonzero(net.degree > 0).tolist()
+    assert min(len(first), len(second)) > 0.3 * (net.degree > 0).sum()
+    beside = {u for v in first.tolist() for u in net.ring[v, : net.degree[v]].tolist()}
+    assert not beside & set(second.tolist())
+    monkeypatch.setattr(equalize, "MANY", 10_000)
+    assert [some.tolist() for some in equalize.shares_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
+
+
+@pytest.mark.parametrize("processors", [1, 4])
+def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, processors, monkeypatch):
+    nets = []
+    for count in (2, processors):
+        monkeypatch.setattr(parallel, "processors", lambda count=count: count)
+        rough = in_shares(make, monkeypatch)
+        relief = rough.relief()
+        equalize.equalize(relief)
+        equalize.finish(relief)
+        assert same_topology(rough.grid, relief.to_grid(rough.grid))
+        nets.append(relief.net)
+    for one, other in zip(*nets, strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
+    energies, sweeps = [], []
+    for many in (50, 10_000):
+        relief = make(seed).relief()
+        monkeypatch.setattr(equalize, "MANY", many)
+        sweeps.append(equalize.settle(relief, equalize.WEIGHT, 1e-7, 400))
+        energies.append(equalize.energy_of_node(relief))
+    assert max(sweeps) < 400
+    assert energies[0] == pytest.approx(energies[1], rel=0.01)
+
+
+def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
+    relief = in_shares(make, monkeypatch, 2).relief()
+    equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
+    net, scratch = relief.net, equalize.new_scratch(relief)
+    seen, run = [], Halves.run
+
+    def of_net():
+        return net.nodes, net.ring, net.degree, net.kind, net.curve, net.ideal, net.line
+
+    def look(halves, work):
+        between = (halves.label == BETWEEN) & (net.degree > 0)
+        old = [array[between].copy() for array in of_net()]
+        run(halves, work)
+        seen.append([np.array_equal(array[between], was) for array, was in zip(of_net(), old, strict=True)])
+
+    monkeypatch.setattr(Halves, "run", look)
+    before = equalize.energy_of_node(relief)
+    kept = equalize.search_once(relief, scratch)
+    assert all(seen[0]) and kept > 0 and equalize.energy_of_node(relief) < before
+    while kept:
+        kept = equalize.search_once(relief, scratch)
+    asking = (net.degree > 0) & (net.degree != net.ideal)
+    assert asking.any() and (scratch.tried[asking] == 1).all()
+
+
+@pytest.mark.parametrize("processors", [1, 4])
+def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, monkeypatch):
+    nets = []
+    for count in (2, processors):
+        monkeypatch.setattr(parallel, "processors", lambda count=count: count)
+        monkeypatch.setattr(perturbation, "MANY", 100)
+        rough = make(1)
+        relief = rough.relief()
+        equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
+        before = equalize.energy_of_node(relief)
+        perturbation.search_widely(relief, "normal")
+        assert equalize.energy_of_node(relief) < before
+        assert same_topology(rough.grid, relief.to_grid(rough.grid))
+        nets.append(relief.net)
+    for one, other in zip(*nets, strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
+    relief = make(2).relief()
+    equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
+    net = relief.net
+    names, seen, run = ("nodes", "ring", "degree"), [], Halves.run
+
+    def look(halves, work):
+        parts = [(halves.label == label) & (net.degree > 0) for label in (BETWEEN, 0, 1)]
+        old = {name: getattr(net, name).copy() for name in names}
+        run(halves, work)
+        seen.append([any((getattr(net, name)[part] != old[name][part]).any() for name in names) for part in parts])
+
+    monkeypatch.setattr(Halves, "run", look)
+    monkeypatch.setattr(perturbation, "MANY", 100)
+    perturbation.search_widely(relief, "normal")
+    assert len(seen) >= 2 and seen[0] == [False, True, True]
+    assert not any(between for between, *_ in seen)

@@ -1,0 +1,373 @@
+"""Sites: the scan at the scale of a member, with oriented normals and links that stay on one sheet."""
+
+import gc
+from functools import cache
+
+import naive
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapes import make
+from small_clouds import ball, cap, sheet, sites_of, tire, turn_of
+from steps import boundary_of
+
+from scantruss import InputError, PointCloud, Settings, grid_from_points
+from scantruss.kernels.geometry.boxes import new_boxes
+from scantruss.kernels.surface.normals import (
+    cut_steep_links,
+    link_weights,
+    orient_normals,
+    site_normals,
+    smooth_normals,
+)
+from scantruss.kernels.surface.samples import choose_sites, group_points, nearest_sites, put_all, settle_points
+from scantruss.scan.cloud import bounds_of
+from scantruss.surface import linked_samples as module
+from scantruss.surface.samples import sample_surface
+
+
+@pytest.mark.parametrize("effort", ["quick", "normal"])
+def test_a_run_leaves_no_memory_to_be_collected(effort):
+    points, chosen = make("cloth", 4000).points, Settings(length=25.0, effort=effort)
+    grid_from_points(points, chosen)  # loading kernels leaves some
+    gc.collect()
+    gc.disable()
+    try:
+        grid_from_points(points, chosen)
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        gc.collect()
+        assert not [type(left) for left in gc.garbage if type(left).__module__.startswith("scantruss")]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
+
+
+def thinned(points, radius, capacity=None):
+    """A site within the radius of each point, and the point of each site; a small capacity lets the table fill up on the way."""
+    capacity = capacity or len(points)
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    owner, begin, count = np.full(len(points), -1, np.int64), 0, 0
+    chosen, places = np.full(capacity, -1, np.int64), np.empty((capacity, 3))
+    boxes = new_boxes(lower, upper, 1.3 * radius, capacity, capacity)
+    while True:
+        begin, count = choose_sites(points, radius, boxes, owner, chosen, places, begin, count)
+        if begin == len(points):
+            assert np.array_equal(places[:count], points[chosen[:count]])
+            return owner, chosen[:count]
+        capacity *= 2
+        chosen = np.concatenate([chosen[:count], np.full(capacity - count, -1, np.int64)])
+        places = np.concatenate([places[:count], np.empty((capacity - count, 3))])
+        boxes = new_boxes(lower, upper, 1.3 * radius, capacity, capacity)
+        put_all(boxes, points, chosen[:count])
+
+
+def linked(points, length=1.0):
+    """Sites of a cloud and their (S, K) neighbours by brute force over the means."""
+    surface = sites_of(points, length).surface
+    pairs = [(s, int(n)) for s, row in enumerate(surface.neighbors) for n in row if n >= 0]
+    return surface, np.array(pairs).reshape(-1, 2)
+
+
+@cache
+def small_ball():
+    """Sites of a ball, prepared once."""
+    return sites_of(ball(2.0, 400)).surface
+
+
+@st.composite
+def clouds(draw):
+    """Random points, flat ones and repeated ones among them, anywhere."""
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    extent = np.array([1.0, draw(st.sampled_from([0.0, 0.2, 1.0])), draw(st.sampled_from([0.0, 0.1, 1.0]))])
+    points = draw(st.sampled_from([-50.0, 0.0, 3.0])) + extent * rng.random((draw(st.integers(2, 80)), 3))
+    return np.concatenate([points, points[: draw(st.integers(0, 5))]])
+
+
+@pytest.mark.kernels
+@given(clouds(), st.floats(0.02, 0.8))
+def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points, radius):
+    owner, chosen = thinned(points, radius)
+    assert chosen.tolist() == naive.thin(points, radius)
+    assert (np.linalg.norm(points - points[chosen[owner]], axis=1) < radius).all()
+    apart = np.linalg.norm(points[chosen][:, None] - points[chosen][None], axis=2)
+    assert (apart[~np.eye(len(chosen), dtype=bool)] >= radius).all()
+    assert (owner[chosen] == np.arange(len(chosen))).all()
+
+
+@pytest.mark.kernels
+@given(clouds(), st.floats(0.02, 0.8))
+def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points, radius):
+    """With links to all the others that is the nearest of all, the first of several that are as near but for rounding."""
+    owner, chosen = thinned(points, radius)
+    places, all_others = points[chosen], np.arange(len(chosen))
+    links = np.stack([np.append(np.delete(all_others, s), -1) for s in all_others])
+    settle_points(points, places, links, owner, 0, len(points))
+    squares = ((points[:, None] - places) ** 2).sum(axis=2)
+    assert owner.tolist() == (squares <= squares.min(axis=1, keepdims=True) * (1 + 1e-6)).argmax(axis=1).tolist()
+
+
+@pytest.mark.kernels
+@given(clouds(), st.floats(0.02, 0.8), st.integers(0, 50))
+def test_sites_move_with_the_cloud(points, radius, seed):
+    """A turn and a shift of the cloud change nothing, unless rounding decides which of two distances is the larger."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    for row in distance:
+        assume(np.diff(np.unique(np.append(row, radius))).min(initial=1.0) > 1e-9)
+    moved = points @ turn_of(seed).T + [3.0, -7.0, 0.5]
+    owner, chosen = thinned(points, radius)
+    other, same = thinned(moved, radius)
+    assert same.tolist() == chosen.tolist()
+    links = np.stack([np.append(np.delete(np.arange(len(chosen)), s), -1) for s in range(len(chosen))])
+    settle_points(points, points[chosen], links, owner, 0, len(points))
+    settle_points(moved, moved[chosen], links, other, 0, len(points))
+    assert other.tolist() == owner.tolist()
+
+
+@pytest.mark.kernels
+@given(clouds(), st.floats(0.02, 0.3))
+def test_room_that_runs_out_on_the_way_makes_no_difference(points, radius):
+    assert thinned(points, radius, 2)[1].tolist() == thinned(points, radius)[1].tolist()
+
+
+@pytest.mark.kernels
+@given(clouds(), st.integers(0, 99))
+def test_points_are_grouped_by_site_with_their_means(points, seed):
+    owner = np.random.default_rng(seed).permutation(np.arange(len(points)) % 7)
+    sites = int(owner.max()) + 1
+    start, mean = np.zeros(sites + 1, np.int64), np.zeros((sites, 3))
+    grouped = np.empty_like(points)
+    group_points(points, owner, start, grouped, mean)
+    assert start[-1] == len(points)
+    for s in range(sites):
+        assert (grouped[start[s] : start[s + 1]] == points[owner == s]).all()
+        assert mean[s] == pytest.approx(points[owner == s].mean(axis=0))
+
+
+@pytest.mark.kernels
+@given(st.integers(0, 1000), st.integers(8, 60), st.floats(0.3, 3.0))
+def test_nearest_sites_are_the_nearest(seed, count, far):
+    places = np.random.default_rng(seed).random((count, 3)) * [2.0, 2.0, 0.2]
+    boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
+    put_all(boxes, places, np.arange(count))
+    found = np.full((count, 6), -1, np.int64)
+    nearest_sites(places, boxes, 0.1, far, found, 0, len(places))
+    for s in range(count):
+        own = [n for n in found[s].tolist() if n >= 0]
+        full = naive.nearest(places, s, 6, far)
+        assert own == (full if len(full) >= 6 else naive.nearest(places, s, 6, 2 * far))
+
+
+@pytest.mark.kernels
+@given(st.integers(0, 1000))
+def test_normals_agree_with_those_of_numpy(seed):
+    rng = np.random.default_rng(seed)
+    mean = rng.normal(size=(13, 3)) * [1.0, 0.8, 0.2] @ turn_of(seed).T + [100.0, -40.0, 7.0]
+    neighbors = np.full((13, 12), -1, np.int64)
+    neighbors[0], neighbors[1, :5] = np.arange(1, 13), [0, 2, 3, 4, 5]
+    normals, thickness = np.empty((13, 3)), np.empty(13)
+    site_normals(mean, neighbors, normals, thickness, 0, len(mean))
+    for s, ring in ((0, list(range(13))), (1, [1, 0, 2, 3, 4, 5])):
+        expected = naive.plane_normal(mean[ring])
+        assert abs(normals[s] @ expected) == pytest.approx(1, abs=1e-6)
+        heights = (mean[ring] - mean[ring].mean(axis=0)) @ expected
+        assert thickness[s] == pytest.approx(np.sqrt((heights**2).mean()), abs=1e-6)
+
+
+@pytest.mark.kernels
+def test_the_normals_of_a_plate_are_those_of_the_plate():
+    turn = turn_of(4)
+    surface = sites_of(sheet(5, 4, 0.25) @ turn.T).surface
+    assert abs(surface.normals @ turn[:, 2]) == pytest.approx(1, abs=1e-9)
+    assert len({bool(up) for up in surface.normals @ turn[:, 2] > 0}) == 1
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("seed", range(4))
+def test_the_normals_of_a_ball_point_outwards_from_its_centre(seed):
+    points = ball(2.0, 500, seed=seed) @ turn_of(seed) + [50.0, -20.0, 3.0]
+    surface = sites_of(points).surface
+    outwards = surface.mean + sites_origin(points) - [50.0, -20.0, 3.0]
+    outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+    assert ((surface.normals * outwards).sum(axis=1) > np.cos(np.radians(6))).all()
+
+
+def sites_origin(points):
+    return PointCloud.from_array(points).origin
+
+
+def test_the_normals_of_a_torus_point_outwards_even_in_its_hole():
+    surface = sites_of(tire(4.0, 1.5, 0.2), 0.8).surface
+    around = surface.mean * [1, 1, 0]
+    centre = 4.0 * around / np.linalg.norm(around, axis=1)[:, None]
+    outwards = (surface.mean - centre) / np.linalg.norm(surface.mean - centre, axis=1)[:, None]
+    assert ((surface.normals * outwards).sum(axis=1) > 0.97).all()
+
+
+@pytest.mark.parametrize("name", ["saddle", "gable", "pantheon", "thin_strip", "terrain"])
+def test_all_normals_of_a_two_sided_surface_are_on_one_side(name):
+    """Linked neighbours face the same way everywhere; the helical strip turns round twice and is still two-sided."""
+    shape = make(name, 20_000)
+    surface, pairs = linked(shape.points, shape.length)
+    agree = (surface.normals[pairs[:, 0]] * surface.normals[pairs[:, 1]]).sum(axis=1)
+    assert (agree > 0).all()
+    boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))  # is not refused
+
+
+def test_one_sided_surfaces_are_refused():
+    shape = make("moebius", 20_000)
+    with pytest.raises(InputError, match="one-sided"):
+        boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed):
+    shape = make("moebius", 12_000, seed=seed, pose=True, scale=0.01)
+    with pytest.raises(InputError, match="one-sided"):
+        boundary_of(PointCloud.from_array(shape.points), Settings(length=1.2 * shape.length))
+
+
+@pytest.mark.kernels
+@given(st.integers(0, 1000))
+@settings(max_examples=6)
+def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed):
+    """Whatever the signs of the normals, all of a piece end on one side: that of its first site or the other."""
+    surface = small_ball()
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(surface.mean))
+    normals = surface.normals * signs[:, None]
+    weights = np.empty(surface.neighbors.shape, np.uint8)
+    link_weights(surface.mean, normals, surface.neighbors, weights, 0, len(weights))
+    order = np.argsort(weights, axis=None, kind="stable")[: int((surface.neighbors >= 0).sum())]
+    piece = np.empty(len(signs), np.int64)
+    orient_normals(surface.mean, normals, surface.neighbors, order, piece)
+    same = (normals * surface.normals).sum(axis=1)
+    assert abs(same) == pytest.approx(1)
+    assert len(set(np.sign(same))) == 1
+    assert (piece == 0).all()
+
+
+@pytest.mark.kernels
+def test_link_weights_are_0_between_mirrored_normals_and_most_without_a_link():
+    """Two places of a circle: each normal is the other one mirrored at the plane half-way, however far apart they are."""
+    angle = np.radians([0.0, 70.0])
+    mean = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    weights = np.empty((2, 2), np.uint8)
+    link_weights(mean, mean.copy(), np.array([[1, -1], [0, -1]]), weights, 0, 2)
+    assert weights[:, 0].max() == 0
+    assert (weights[:, 1] == 255).all()
+    link_weights(mean, np.array([[1.0, 0, 0], [0, 0, 1]]), np.array([[1, -1], [0, -1]]), weights, 0, 2)
+    assert weights[:, 0].min() == 254  # at right angles, mirrored or not
+
+
+@pytest.mark.kernels
+def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay():
+    up, side = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    mean = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0.1, 0, -1)], float)
+    normals = np.array([up, up, up, side])
+    neighbors = np.array([[1, 2, 3], [0, -1, -1], [0, -1, -1], [0, -1, -1]])
+    cut_steep_links(mean, normals, neighbors, 0.75, 0, len(mean))
+    assert neighbors.tolist() == [[2, 3, -1], [-1, -1, -1], [0, -1, -1], [0, -1, -1]]
+
+
+@pytest.mark.kernels
+def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere():
+    normals = np.array([(0, 0, 1), (0, 0.6, 0.8), (0, 0, -1), (1, 0, 0)], float)
+    neighbors = np.array([[1, 2, 3], [-1, -1, -1], [-1, -1, -1], [-1, -1, -1]])
+    smoothed = np.empty((4, 3))
+    smooth_normals(normals, neighbors, 0.7, smoothed, 0, len(normals))
+    expected = np.array([0, 0.6, 2.8]) / np.hypot(0.6, 2.8)
+    assert smoothed[0] == pytest.approx(expected)
+    assert smoothed[1:] == pytest.approx(normals[1:])
+
+
+@pytest.mark.parametrize("gap", [0.6, 0.7])
+def test_links_do_not_lead_to_a_second_sheet(gap):
+    """Two plates less than a member apart: no site that is a member away from the rim is linked to the other plate."""
+    plate = sheet(4, 4, 0.1)
+    surface = sites_of(np.concatenate([plate, plate[:, [1, 0, 2]] + [0, 0, gap]])).surface
+    upper = surface.mean[:, 2] > surface.mean[:, 2].mean()
+    inner = np.flatnonzero((abs(surface.mean[:, :2]) < 1).all(axis=1))
+    assert len(inner) > 50
+    for s in inner:
+        assert all(upper[n] == upper[s] for n in surface.neighbors[s] if n >= 0)
+
+
+@pytest.mark.kernels
+def test_pieces_are_numbered_by_size_and_debris_is_no_piece():
+    large, small = sheet(6, 5, 0.25), sheet(4, 3, 0.25) + np.array([9, 0, 0])
+    debris = sheet(0.5, 0.5, 0.25) + np.array([0, 9, 0])
+    sites = sites_of(np.concatenate([small, debris, large]))
+    assert sites.pieces == (0, 1)
+    assert np.ptp(sites.surface.mean[sites.piece == 0], axis=0)[0] == pytest.approx(6, abs=0.3)
+    assert np.ptp(sites.surface.mean[sites.piece == 1], axis=0)[0] == pytest.approx(4, abs=0.3)
+    assert set(sites.piece) == {0, 1, 2}
+    pieces, share = sites.left_out
+    assert pieces == 1 and 0.25 / 42.25 < share < 3.0 * 0.25 / 42.25  # a small piece is all rim, where sites lie closer
+    assert sites_of(large).left_out == (0, 0.0)
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.12])
+def test_a_rough_cloud_is_seen_as_a_sheet(noise):
+    """Where the points scatter by a tenth of a member, sites lie nearer to the plane than points, and their normals stand on it."""
+    points = sheet(12, 10, 0.1, noise=noise)
+    surface = sites_of(points).surface
+    inside = (abs(surface.mean[:, 0]) < 5) & (abs(surface.mean[:, 1]) < 4)
+    assert surface.mean[inside, 2].std() < 0.6 * noise
+    assert np.degrees(np.arccos(abs(surface.normals[inside, 2]))).mean() < 4
+
+
+def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough():
+    """They stay where they are: moved to the plane around them they would leave the ridges, and others would be chosen."""
+    shape = make("great_court", 100_000)
+    length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
+    sites = sites_of(shape.points, length)
+    thick = (sites.thickness > module.ROUGH * length).mean()
+    assert module.SOME_ROUGH < thick < module.MANY_ROUGH
+    assert shape.distance(sites.surface.mean + PointCloud.from_array(shape.points).origin).max() < module.ROUGH * length
+
+
+def test_the_area_is_about_right():
+    assert sites_of(sheet(10, 8, 0.15)).area == pytest.approx(80, rel=0.2)
+    assert sites_of(ball(3.0, 6000)).area == pytest.approx(36 * np.pi, rel=0.2)
+
+
+@pytest.mark.kernels
+def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay():
+    cloud = PointCloud.from_array(sheet(4, 3, 0.25))
+    first = sample_surface(cloud, Settings(length=1.0))
+    assert sample_surface(cloud, Settings(length=1.0, method="paper")) is first
+    assert sample_surface(cloud, Settings(length=1.5)) is not first
+    assert sample_surface(PointCloud.from_array(sheet(4, 3, 0.25)), Settings(length=1.0)) is not first
+
+
+@pytest.mark.kernels
+def test_same_cloud_same_bytes():
+    a, b = (sites_of(cap(3.0, 1.0, 0.3)) for _ in range(2))
+    for x, y in zip(a.surface[:6], b.surface[:6], strict=True):
+        assert x.tobytes() == y.tobytes()
+
+
+def test_repeated_points_change_no_site():
+    points = sheet(8, 6, 0.2)
+    a = sites_of(points).surface
+    b = sites_of(np.concatenate([points, points[::3]])).surface
+    assert len(a.mean) == len(b.mean)
+    assert a.neighbors.tolist() == b.neighbors.tolist() or abs(a.mean - b.mean).max() < 0.1
+
+
+def test_points_are_sorted_where_their_sites_are_many(monkeypatch):
+    """The same points, each near those before it; points of few sites stay as they are."""
+    monkeypatch.setattr(module, "MANY_SITES", 1_000)
+    points = sheet(20.0, 20.0, 0.3)
+    bounds = bounds_of(points)
+
+    def step(places):
+        return np.linalg.norm(np.diff(places, axis=0), axis=1).mean()
+
+    found = module.thin_dense(points, bounds, 0.2, 0.3)
+    assert step(found) < 0.2 * step(points)
+    assert np.array_equal(np.unique(found, axis=0), np.unique(points, axis=0))
+    assert module.thin_dense(points, bounds, 0.2, 0.05) is points
+    few = points[:900]
+    assert module.thin_dense(few, bounds_of(few), 0.2, 0.3) is few
