@@ -76,10 +76,10 @@ def run() -> None:
     from scantruss.cli.demo_files import SCAN
     from scantruss.cli.main import main
 
-    chance = np.random.default_rng(1)
-    x, y = chance.uniform(-10.0, 10.0, (2, 20_000))
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(-10.0, 10.0, (2, 20_000))
     x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
-    np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + chance.normal(0.0, 0.02, len(x))]))
+    np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + rng.normal(0.0, 0.02, len(x))]))
     for command in COMMANDS:
         words = [word.format(bust=SCAN) for word in command.split()]
         if status := main(words):

@@ -22,11 +22,11 @@ def thin(points, radius):
     return chosen
 
 
-def nearest(positions, site, count, far):
+def nearest(positions, sample, count, far):
     """Ids of the `count` positions nearest to one of them within `far`, nearest first, without itself."""
-    distance = np.linalg.norm(positions - positions[site], axis=1)
+    distance = np.linalg.norm(positions - positions[sample], axis=1)
     order = np.lexsort((np.arange(len(positions)), distance))
-    return [int(s) for s in order if s != site and distance[s] <= far][:count]
+    return [int(s) for s in order if s != sample and distance[s] <= far][:count]
 
 
 def plane_normal(points):
@@ -34,10 +34,10 @@ def plane_normal(points):
     return np.linalg.eigh(np.cov(points.T))[1][:, 0]
 
 
-def reachable(neighbors, mean, site, place, reach):
+def reachable(neighbors, mean, sample, place, reach):
     """Sites linked to one site over sites within `reach` of a place; the first one counts wherever it is."""
     inside = np.linalg.norm(mean - place, axis=1) <= reach
-    found, waiting = {site}, [site]
+    found, waiting = {sample}, [sample]
     while waiting:
         for n in neighbors[waiting.pop()]:
             if n >= 0 and inside[n] and n not in found:

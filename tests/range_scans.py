@@ -5,26 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 
-def random_rotation(chance):
+def random_rotation(rng):
     """A rotation (3, 3), all alike likely."""
-    q, r = np.linalg.qr(chance.normal(size=(3, 3)))
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.sign(np.linalg.det(q))
 
 
-def random_pose(chance, far=3.0):
+def random_pose(rng, far=3.0):
     """A pose (4, 4)."""
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = random_rotation(chance), far * chance.normal(size=3)
+    pose[:3, :3], pose[:3, 3] = random_rotation(rng), far * rng.normal(size=3)
     return pose
 
 
 def body(seed, bumps=14, height=0.3):
     """A star-shaped body about the origin: a function from directions (N, 3) to radii (N,)."""
-    chance = np.random.default_rng(seed)
-    centre = chance.normal(size=(bumps, 3))
+    rng = np.random.default_rng(seed)
+    centre = rng.normal(size=(bumps, 3))
     centre /= np.linalg.norm(centre, axis=1)[:, None]
-    size, width = chance.uniform(-height, height, bumps), chance.uniform(0.15, 0.5, bumps)
+    size, width = rng.uniform(-height, height, bumps), rng.uniform(0.15, 0.5, bumps)
     return lambda u: 1.0 + (size * np.exp(-(((u[:, None] - centre) / width[:, None]) ** 2).sum(axis=2))).sum(axis=1)
 
 
@@ -43,25 +43,25 @@ def surface(radius, u):
     return points, normal / np.linalg.norm(normal, axis=1)[:, None]
 
 
-def scans_of(radius, views, chance, count=12_000, noise=0.0, scale=1.0):
+def scans_of(radius, views, rng, count=12_000, noise=0.0, scale=1.0):
     """Scans [(N, 3)] of a body from view directions, and the poses (4, 4) from the frame of each into that of the body."""
     scans, poses = [], []
     for view in views:
-        points, normal = surface(radius, chance.normal(size=(count, 3)))
+        points, normal = surface(radius, rng.normal(size=(count, 3)))
         seen = points[normal @ (view / np.linalg.norm(view)) > 0.3]
         spacing = np.sqrt(4 * np.pi / count) * 0.5
-        pose = random_pose(chance)
-        world = scale * (seen + noise * spacing * chance.normal(size=seen.shape))
+        pose = random_pose(rng)
+        world = scale * (seen + noise * spacing * rng.normal(size=seen.shape))
         pose[:3, 3] *= scale
         poses.append(pose)
         scans.append((world - pose[:3, 3]) @ pose[:3, :3])
     return scans, poses
 
 
-def around(count, chance):
+def around(count, rng):
     """View directions (count, 3) around a body, some from above and some from below."""
     turn = 2 * np.pi * np.arange(count) / count
-    return np.stack([np.cos(turn), np.sin(turn), chance.uniform(-0.5, 0.5, count)], axis=1)
+    return np.stack([np.cos(turn), np.sin(turn), rng.uniform(-0.5, 0.5, count)], axis=1)
 
 
 def errors_of(found, true, scans, names):

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from scantruss import Grid, PointCloud, Settings
-from scantruss.improve.working_mesh import Relief
-from scantruss.kernels.boundary.curves import Rim
+from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.kernels.boundary.curves import Curves
 from scantruss.surface.samples import sample_surface
 
 
@@ -18,19 +18,19 @@ class Rough(NamedTuple):
 
     cloud: PointCloud
     grid: Grid
-    rim: Rim
+    curves: Curves
     corners: np.ndarray
     settings: Settings
 
-    def relief(self) -> Relief:
+    def mesh(self) -> WorkingMesh:
         """The grid taken apart."""
         surface = sample_surface(self.cloud, self.settings).surface
-        return Relief.from_grid(self.grid, surface, self.rim, self.corners, self.settings.length)
+        return WorkingMesh.from_grid(self.grid, surface, self.curves, self.corners, self.settings.length)
 
 
-def no_rim() -> Rim:
+def no_boundary() -> Curves:
     """The curves of a closed scan: none."""
-    return Rim(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
+    return Curves(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
 
 
 def curve_of(points):
@@ -38,7 +38,7 @@ def curve_of(points):
     points = np.asarray(points, float)
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     arc = np.concatenate([[0.0], np.cumsum(steps)[:-1]])
-    return Rim(points, arc, np.array([0, len(points)]), np.array([steps.sum()]))
+    return Curves(points, arc, np.array([0, len(points)]), np.array([steps.sum()]))
 
 
 def lift(xy, bulge):
@@ -112,7 +112,7 @@ def rough_sphere(count=160, seed=0, points=6000):
     triangles[inward] = triangles[inward][:, ::-1]
     cloud = PointCloud.from_array(spread(points, 0.2))
     grid = Grid(nodes - cloud.origin, triangles, np.zeros(count, bool), cloud.origin)
-    return Rough(cloud, grid, no_rim(), np.zeros((0, 3)), Settings(length=float(grid.lengths.mean())))
+    return Rough(cloud, grid, no_boundary(), np.zeros((0, 3)), Settings(length=float(grid.lengths.mean())))
 
 
 def strip_of(count, half_turns=0):

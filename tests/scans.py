@@ -197,7 +197,7 @@ def mask() -> Truth:
 def hillside() -> Truth:
     """Return lidar ground: rough, an irregular ragged rim with bays, two strips of uneven density."""
     ragged = _wavy(21, ((2.0, 0.16), (0.5, 0.04), (0.12, 0.012)))
-    relief = _wavy(22, ((260, 16), (90, 5), (30, 1.0), (13, 0.35)))
+    mesh = _wavy(22, ((260, 16), (90, 5), (30, 1.0), (13, 0.35)))
 
     def radius(t: Floats) -> Floats:
         return np.asarray(
@@ -208,7 +208,7 @@ def hillside() -> Truth:
 
     def profile(s: Floats, t: Floats) -> Floats:
         x, y = s * radius(t) * np.cos(t), s * radius(t) * np.sin(t)
-        return relief(x, y) + 0.35 * x
+        return mesh(x, y) + 0.35 * x
 
     return dome(
         radius,
@@ -229,10 +229,10 @@ def wooded_hillside() -> Truth:
 
 def quarry() -> Truth:
     """Return ground with a steep wall, a bay in the rim and two inner gaps without points."""
-    relief = _wavy(31, ((200, 10), (60, 3)))
+    mesh = _wavy(31, ((200, 10), (60, 3)))
 
     def z(x: Floats, y: Floats) -> Floats:
-        return np.asarray(relief(x, y) + 30 * np.tanh((x + 30 * np.sin(y / 60)) / 18))
+        return np.asarray(mesh(x, y) + 30 * np.tanh((x + 30 * np.sin(y / 60)) / 18))
 
     def keep(p: Floats) -> Floats:
         x, y = p[:, 0], p[:, 1]

@@ -70,7 +70,7 @@ def turn_of(seed):
     return turn * [1, 1, np.sign(np.linalg.det(turn))]
 
 
-def sites_of(points, length=1.0, **settings):
+def samples_of(points, length=1.0, **settings):
     """The scan prepared for a member length."""
     return sample_surface(PointCloud.from_array(points), Settings(length=length, **settings))
 
@@ -82,11 +82,11 @@ class HandFront:
         """loops: places (H, 2) of closed loops. inner: numbers of the nodes that are not of a boundary."""
         points = sheet(8.0, 8.0, 0.125) if points is None else points
         self.settings = Settings(length=length, **settings)
-        self.sites = sites_of(points, length)
-        self.surface = self.sites.surface
-        self.front = new_front(self.sites, self.settings)
-        self.rules = rules_of(self.settings, self.sites.spacing)
-        self.found, self.patch = np.empty(lists.NEAR, np.int64), np.zeros(PATCH)
+        self.samples = samples_of(points, length)
+        self.surface = self.samples.surface
+        self.front = new_front(self.samples, self.settings)
+        self.rules = rules_of(self.settings, self.samples.spacing)
+        self.found, self.patch = np.empty(lists.MOST_NEAR_NODES, np.int64), np.zeros(PATCH)
         self.segments = []
         for i, loop in enumerate(loops):
             ids = [self.add_node(*place, boundary=True) for place in loop]
@@ -99,10 +99,10 @@ class HandFront:
 
     def add_node(self, x, y, z=0.0, *, boundary=False):
         place = (float(x), float(y), float(z))
-        site = int(((self.surface.mean - place) ** 2).sum(axis=1).argmin())
-        up = (0.0, 0.0, 1.0) if self.surface.normals[site, 2] > 0 else (0.0, 0.0, -1.0)
+        sample = int(((self.surface.mean - place) ** 2).sum(axis=1).argmin())
+        up = (0.0, 0.0, 1.0) if self.surface.normals[sample, 2] > 0 else (0.0, 0.0, -1.0)
         assert up[2] > 0, "the normals of a plate point upwards"
-        n = lists.propose_node(self.front, place, up, site, boundary)
+        n = lists.propose_node(self.front, place, up, sample, boundary)
         lists.add_node(self.front)
         return n
 

@@ -17,23 +17,23 @@ from scantruss import (
 )
 from scantruss.boundary.find import Boundary
 from scantruss.constraints.find import Constraints
-from scantruss.front.orientation_field import Field, Rows
-from scantruss.kernels.front.candidate_nodes import RowNodes
-from scantruss.surface.samples import Sites
+from scantruss.front.orientation_field import Field, FieldStart
+from scantruss.kernels.front.candidate_nodes import CandidateNodes
+from scantruss.surface.samples import SurfaceSamples
 
 
 class Steps(NamedTuple):
     """What a front needs."""
 
-    sites: Sites
+    samples: SurfaceSamples
     boundary: Boundary
     constraints: Constraints
 
 
 def steps_of(cloud: PointCloud, settings: Settings) -> Steps:
     """Return the samples, the boundary and the constraints of a scan."""
-    sites, boundary = find_boundary(sample_surface(cloud, settings), settings)
-    return Steps(sites, *find_constraints(sites, boundary, settings))
+    samples, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    return Steps(samples, *find_constraints(samples, boundary, settings))
 
 
 def boundary_of(cloud: PointCloud, settings: Settings) -> Boundary:
@@ -41,18 +41,20 @@ def boundary_of(cloud: PointCloud, settings: Settings) -> Boundary:
     return find_boundary(sample_surface(cloud, settings), settings)[1]
 
 
-def front_of(cloud: PointCloud, settings: Settings, way: Rows | None = None, **others: Any) -> Grid:
+def front_of(cloud: PointCloud, settings: Settings, way: FieldStart | None = None, **others: Any) -> Grid:
     """Return what a front leaves behind that comes to rows laid in a way; None: that makes all of its nodes itself."""
     steps = steps_of(cloud, settings)
     (field,) = (
-        orientation_fields(steps.sites, steps.boundary, settings, [way]) if way else (Field(Rows(laid=False), None),)
+        orientation_fields(steps.samples, steps.boundary, settings, [way])
+        if way
+        else (Field(FieldStart(laid=False), None),)
     )
     return advance_front(*steps, settings, field.nodes, **others)
 
 
-def rows_of(steps: Steps, length: float, way: Rows) -> RowNodes:
+def rows_of(steps: Steps, length: float, way: FieldStart) -> CandidateNodes:
     """Return the nodes of rows laid in a way."""
-    (field,) = orientation_fields(steps.sites, steps.boundary, Settings(length=length), [way])
+    (field,) = orientation_fields(steps.samples, steps.boundary, Settings(length=length), [way])
     return field.nodes
 
 

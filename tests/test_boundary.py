@@ -33,7 +33,7 @@ def polygon(corners, spacing=0.12, seed=0):
     body = sheet(14, 14, spacing, seed=seed)[:, :2]
     crossing = np.zeros(len(body), int)
     clear = np.full(len(body), np.inf)
-    rim = []
+    curves = []
     for a, b in zip(corners, after, strict=True):
         upward = (a[1] <= body[:, 1]) != (b[1] <= body[:, 1])
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -42,8 +42,8 @@ def polygon(corners, spacing=0.12, seed=0):
         t = np.clip(((body - a) @ (b - a)) / ((b - a) @ (b - a)), 0, 1)
         clear = np.minimum(clear, np.linalg.norm(body - a - t[:, None] * (b - a), axis=1))
         steps = round(np.linalg.norm(b - a) / (0.8 * spacing))
-        rim.append(a + np.arange(steps)[:, None] / steps * (b - a))
-    flat = np.concatenate([body[(crossing % 2 == 1) & (clear > 0.5 * spacing)], *rim])
+        curves.append(a + np.arange(steps)[:, None] / steps * (b - a))
+    flat = np.concatenate([body[(crossing % 2 == 1) & (clear > 0.5 * spacing)], *curves])
     return np.random.default_rng(seed).permutation(np.column_stack([flat, np.zeros(len(flat))]))
 
 
@@ -61,8 +61,8 @@ def assert_surface_on_the_left(boundary, origin, points, length=1.0):
         ahead /= np.linalg.norm(ahead, axis=1)[:, None]
         clear = []
         for k in range(0, len(loop.points), 9):
-            site = ((surface.mean - loop.points[k]) ** 2).sum(axis=1).argmin()
-            left = 0.3 * length * np.cross(surface.normals[site], ahead[k])
+            sample = ((surface.mean - loop.points[k]) ** 2).sum(axis=1).argmin()
+            left = 0.3 * length * np.cross(surface.normals[sample], ahead[k])
             inside, outside = (
                 np.linalg.norm(points - origin - loop.points[k] - s * left, axis=1).min() for s in (1, -1)
             )
@@ -164,7 +164,7 @@ def test_missing_points_here_and_there_make_no_hole():
 def test_closed_clouds_have_no_boundary(points):
     boundary, _ = found(points)
     assert boundary.loops == () and boundary.corners.shape == (0, 3)
-    assert boundary.rim.start.tolist() == [0] and boundary.rim.points.shape == (0, 3)
+    assert boundary.curves.start.tolist() == [0] and boundary.curves.points.shape == (0, 3)
 
 
 def test_every_piece_has_an_external_boundary():
@@ -204,7 +204,7 @@ def test_rims_of_known_shapes(name):
     shape = make(name, seed=1)
     boundary, _ = found(shape.points, shape.length)
     assert len(boundary.loops) == len(shape.loops)
-    lengths = sorted(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum() for rim in shape.loops)
+    lengths = sorted(np.linalg.norm(np.roll(curves, -1, axis=0) - curves, axis=1).sum() for curves in shape.loops)
     assert sorted(loop.length for loop in boundary.loops) == pytest.approx(lengths, rel=0.02)
 
 
@@ -248,12 +248,15 @@ def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed):
 
 def test_the_rim_for_the_kernels_is_made_of_the_loops():
     boundary, _ = found(ring(2.0, 6.0, 0.15))
-    rim = boundary.rim
-    assert rim.start.tolist() == [0, *np.cumsum([len(loop.points) for loop in boundary.loops])]
+    curves = boundary.curves
+    assert curves.start.tolist() == [0, *np.cumsum([len(loop.points) for loop in boundary.loops])]
     for c, loop in enumerate(boundary.loops):
-        points, arc = rim.points[rim.start[c] : rim.start[c + 1]], rim.arc[rim.start[c] : rim.start[c + 1]]
+        points, arc = (
+            curves.points[curves.start[c] : curves.start[c + 1]],
+            curves.arc[curves.start[c] : curves.start[c + 1]],
+        )
         steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-        assert rim.total[c] == pytest.approx(loop.length) == pytest.approx(steps.sum())
+        assert curves.total[c] == pytest.approx(loop.length) == pytest.approx(steps.sum())
         assert arc[0] == 0 and np.diff(arc) == pytest.approx(steps[:-1])
 
 
@@ -314,8 +317,8 @@ class Cancelled(Exception):
 def test_progress_is_reported_and_may_stop_the_search():
     said = []
     cloud, settings = st.PointCloud.from_array(sheet(6, 4, 0.2)), st.Settings(length=1.0)
-    sites = st.sample_surface(cloud, settings)
-    st.find_boundary(sites, settings, progress=lambda stage, share: said.append((stage, share)))
+    samples = st.sample_surface(cloud, settings)
+    st.find_boundary(samples, settings, progress=lambda stage, share: said.append((stage, share)))
     assert {stage for stage, _ in said} == {"boundary"}
     assert [share for _, share in said] == sorted(share for _, share in said) and said[-1][1] == 1.0
 
@@ -323,7 +326,7 @@ def test_progress_is_reported_and_may_stop_the_search():
         raise Cancelled
 
     with pytest.raises(Cancelled):
-        st.find_boundary(sites, settings, progress=stop)
+        st.find_boundary(samples, settings, progress=stop)
 
 
 @pytest.mark.parametrize("seed", range(4))

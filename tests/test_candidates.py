@@ -56,10 +56,10 @@ def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without():
     cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
     by_kind: dict[tuple[object, ...], list[object]] = {}
     for attempt in attempts(cloud, st.Settings(length=1.0)):
-        by_kind.setdefault((attempt.settings.box_size, attempt.settings.method), []).append(attempt.ways)
-    for (_, method), ways in by_kind.items():
-        lone = ways[1:] if method == "default" else ways
-        assert method == "paper" or ways[0] is None
+        by_kind.setdefault((attempt.settings.box_size, attempt.settings.method), []).append(attempt.starts)
+    for (_, method), starts in by_kind.items():
+        lone = starts[1:] if method == "default" else starts
+        assert method == "paper" or starts[0] is None
         assert [(way.scale, way.laid) for (way,) in lone] == [(share, False) for share in LENGTHS]
 
 
@@ -94,7 +94,7 @@ def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch
 
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_a_front_of_another_length_is_taken_where_the_first_fails(monkeypatch, method):
-    refusing(monkeypatch, lambda a: a.ways is not None and a.ways[0].scale == LENGTHS[2])
+    refusing(monkeypatch, lambda a: a.starts is not None and a.starts[0].scale == LENGTHS[2])
     grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0, method=method))
     assert grid.certificate.passed and grid.settings == st.Settings(length=1.0, method=method)
 
@@ -191,7 +191,7 @@ def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape, effort)
 def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_raised(shape, monkeypatch):
     cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length, effort="best")
     steps = steps_of(cloud, settings)
-    fronts = st.advance_fronts(*steps, st.orientation_fields(steps.sites, steps.boundary, settings), settings)
+    fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
     refused = []
 
     def check(grid, *_):

@@ -37,7 +37,7 @@ def made():
     cloud = st.PointCloud.from_array(bent(ring(2.0, 5.0, 0.15)) + SHIFT)
     grid = pipeline.grid_from_cloud(cloud, SETTINGS)
     steps = steps_of(cloud, SETTINGS)
-    return grid, (steps.sites, steps.boundary)
+    return grid, (steps.samples, steps.boundary)
 
 
 def kinds(made, **changes):
@@ -86,8 +86,8 @@ def test_worst_places_are_those_of_plain_loops(made):
 
 
 def test_places_are_in_the_scans_own_frame(made):
-    grid, (sites, _) = made
-    far = sites.surface.mean + grid.origin
+    grid, (samples, _) = made
+    far = samples.surface.mean + grid.origin
     for worst in (grid.certificate.farthest_scan, grid.certificate.farthest_triangle, grid.certificate.node_deviation):
         assert np.linalg.norm(far - worst.where, axis=1).min() < 0.5
 

@@ -47,7 +47,7 @@ def test_the_tree_finds_what_a_look_at_all_points_finds(seed):
     assert np.array_equal(near.tree.points, points[near.tree.ids])
     away = np.sort(((near.tree.points[:, None] - near.tree.points) ** 2).sum(axis=2), axis=1)
     assert np.allclose(near.squares, away[:, 1:17], rtol=1e-12, atol=0)
-    stack, found = np.empty(2 * trees.DEEPEST, np.int64), np.empty(700, np.int64)
+    stack, found = np.empty(2 * trees.STACK_LEVELS, np.int64), np.empty(700, np.int64)
     count = trees.within(near.tree, 0.5, 0.5, 0.5, 0.3, stack, found)
     inside = ((near.tree.points - 0.5) ** 2).sum(axis=1) <= 0.09
     assert np.array_equal(np.sort(found[:count]), np.flatnonzero(inside))
@@ -98,7 +98,7 @@ def test_loose_small_pieces_go_and_lines_of_a_scanner_stay():
 def test_noise_falls_to_a_third_and_the_rim_stays(name):
     spacing = spacing_of(make(name, 15_000), 15_000)
     shape = make(name, 15_000, noise=0.3 * spacing)
-    clean = clean_points(shape.points, normals=False, stray_distance=None)
+    clean = clean_points(shape.points, normals=False, outlier_distance=None)
     points = clean.points + clean.origin
     before, after = shape.points[clean.kept], shape.distance(points)
     assert rms(after) <= rms(shape.distance(before)) / 3
@@ -124,7 +124,9 @@ def test_a_ridge_is_not_rounded():
 def test_two_layers_become_one():
     first, second = make("scallop", 15_000), make("scallop", 15_000, seed=1)
     spacing = spacing_of(first, 60_000)
-    normals = clean_points(second.points, smooth=False, stray_distance=None, duplicates=None, loose_pieces=None).normals
+    normals = clean_points(
+        second.points, smooth=False, outlier_distance=None, duplicates=None, loose_pieces=None
+    ).normals
     both = np.concatenate([first.points, second.points + 0.8 * spacing * normals])
     clean = clean_points(both, smooth=False)
     assert count_of(clean, "layers") > 0.75 * len(both)
@@ -231,14 +233,14 @@ def test_a_narrow_cloud_goes_however_many_points_it_has_and_nothing_where_the_sh
 
 def test_switched_off_all_points_come_back():
     points = make("scallop", 5000, outliers=0.1, duplicates=0.1).points
-    nothing = dict.fromkeys(("duplicates", "stray_distance", "loose_pieces", "layer_distance"))
+    nothing = dict.fromkeys(("duplicates", "outlier_distance", "loose_pieces", "layer_distance"))
     clean = clean_points(points, **nothing, smooth=False, normals=False)
     assert np.array_equal(clean.points + clean.origin, points) and clean.normals is None and clean.steps == ()
 
 
 def test_a_stray_distance_of_0_keeps_all_as_for_a_grid():
     points = make("scallop", 5000, outliers=0.1).points
-    clean = clean_points(points, stray_distance=0, duplicates=None, loose_pieces=0, smooth=False, normals=False)
+    clean = clean_points(points, outlier_distance=0, duplicates=None, loose_pieces=0, smooth=False, normals=False)
     assert len(clean.points) == len(points)
 
 
@@ -247,7 +249,7 @@ def test_info_names_the_command_whose_options_keep_what_is_left_out(tmp_path, ca
     np.save(tmp_path / "a.npy", shape.points)
     assert main(["info", str(tmp_path / "a.npy"), "--length", str(shape.length)]) == 0
     said = "".join(capsys.readouterr())
-    assert "points are left out; scantruss grid --stray-distance 0 keeps them" in said
+    assert "points are left out; scantruss grid --outlier-distance 0 keeps them" in said
     assert "points are left out; scantruss grid --no-drop-repeated keeps them" in said
 
 
@@ -264,7 +266,7 @@ def test_a_scan_far_from_zero_is_cleaned_the_same():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"spacing": 0.0}, {"spacing": -1.0}, {"stray_distance": np.nan}, {"duplicates": -0.1}]
+    "wrong", [{"spacing": 0.0}, {"spacing": -1.0}, {"outlier_distance": np.nan}, {"duplicates": -0.1}]
 )
 def test_impossible_numbers_are_refused(wrong):
     with pytest.raises(st.InputError, match=next(iter(wrong))):
@@ -299,7 +301,7 @@ def test_the_command_refuses_before_it_reads(tmp_path, capsys):
         ([str(scan)], "would overwrite the scan"),
         (["out.ply", "--spacing", "0"], "--spacing must be a positive length in the scan's unit, got 0"),
         (["out.ply", "--duplicates", "-1"], "--duplicates must be a number of 0 or more, got -1"),
-        (["out.ply", "--stray-distance", "-1"], "--stray-distance must be a number of 0 or more, got -1"),
+        (["out.ply", "--outlier-distance", "-1"], "--outlier-distance must be a number of 0 or more, got -1"),
     ):
         assert main(["clean", str(scan), *words]) == 2
         said = capsys.readouterr().err
@@ -341,7 +343,7 @@ def test_repeats_are_left_out_of_a_grid_where_there_are_many():
 def test_without_cleaning_a_grid_keeps_strays():
     shape = make("scallop", 10_000, outliers=0.1)
     cloud = st.PointCloud.from_array(shape.points)
-    assert sample_surface(cloud, st.Settings(length=shape.length)).strays > 900
-    assert sample_surface(cloud, st.Settings(length=shape.length, clean=False)).strays == 0
+    assert sample_surface(cloud, st.Settings(length=shape.length)).outliers > 900
+    assert sample_surface(cloud, st.Settings(length=shape.length, clean=False)).outliers == 0
     with pytest.raises(st.InputError, match="clean"):
         st.Settings(length=1.0, clean="no")

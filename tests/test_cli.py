@@ -28,15 +28,15 @@ LENGTH = "4"
 
 def plate(count=8000, seed=3):
     """Points on a slightly arched plate of 40 x 30."""
-    chance = np.random.default_rng(seed)
-    x, y = chance.uniform(0, 40, count), chance.uniform(0, 30, count)
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(0, 40, count), rng.uniform(0, 30, count)
     return np.stack([x, y, 0.02 * x * (40 - x)], axis=1)
 
 
 def moebius(count=12000, seed=3):
     """Points on a one-sided strip, radius 40, width 24."""
-    chance = np.random.default_rng(seed)
-    turn, across = chance.uniform(0, 2 * np.pi, count), chance.uniform(-12, 12, count)
+    rng = np.random.default_rng(seed)
+    turn, across = rng.uniform(0, 2 * np.pi, count), rng.uniform(-12, 12, count)
     radius = 40 + across * np.cos(turn / 2)
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), across * np.sin(turn / 2)], axis=1)
 
@@ -332,7 +332,7 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
 @pytest.fixture
 def failing(place, monkeypatch):
     """No grid can pass."""
-    monkeypatch.setattr("scantruss.check.defects.UNEVEN", 0.0)
+    monkeypatch.setattr("scantruss.check.defects.UNEVEN_LENGTHS", 0.0)
     return place
 
 

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial import cKDTree
 
 from scantruss.errors import InputError
-from scantruss.kernels.geometry.bounds import BLOCK, move_points, widen_bounds
+from scantruss.kernels.geometry.bounds import POINTS_PER_BLOCK, move_points, widen_bounds
 from scantruss.scan import cloud as clouds
 from scantruss.scan.cloud import PointCloud, bounds_of, measure_spacing
 
@@ -128,10 +128,10 @@ def test_refusals_say_what_is_needed_in_one_line(points: np.ndarray, words: str)
 @pytest.mark.parametrize("shift", [0.0, 5e6])
 def test_a_few_values_that_no_scan_has_are_left_out_and_said(value: float, shift: float) -> None:
     points = bowl(1000) + shift
-    wild = points.copy()
-    wild[[3, 500], 2] = value
-    wild[999] = value * np.array([1.0, -0.5, 0.3])
-    cloud = PointCloud.from_array(wild)
+    invalid = points.copy()
+    invalid[[3, 500], 2] = value
+    invalid[999] = value * np.array([1.0, -0.5, 0.3])
+    cloud = PointCloud.from_array(invalid)
     assert np.array_equal(cloud.points + cloud.origin, np.delete(points, [3, 500, 999], axis=0))
     assert cloud.dropped == 0 and cloud.notes[0].startswith("3 points with coordinates up to")
     assert PointCloud.from_array(points).notes == ()
@@ -222,7 +222,7 @@ def test_importing_the_cloud_needs_numpy_only() -> None:
 def test_the_gap_is_the_median_distance_to_the_sixth_neighbour(count: int) -> None:
     points = bowl(count)
     sixth = cKDTree(points).query(points, k=7)[0][:, 6]
-    close = 1e-12 if count < clouds.FEW else 0.15  # of many points only some are looked at
+    close = 1e-12 if count < clouds.POINTS_FOR_GAP else 0.15  # of many points only some are looked at
     assert PointCloud.from_array(points).gap == pytest.approx(float(np.median(sixth**2)) ** 0.5, rel=close)
 
 
@@ -263,7 +263,7 @@ def test_a_coordinate_that_is_not_finite_shows_in_the_bounds_of_its_axis(odd: fl
 
 @pytest.mark.kernels
 def test_moved_points_and_their_sums_are_those_of_plain_arrays() -> None:
-    points = np.random.default_rng(1).normal(size=(BLOCK + 100, 3)) + [10.0, 20.0, -5.0]
+    points = np.random.default_rng(1).normal(size=(POINTS_PER_BLOCK + 100, 3)) + [10.0, 20.0, -5.0]
     origin = np.array([8.0, 16.0, -4.0])
     moved, sums = np.empty_like(points), np.empty((2, 9))
     move_points(points, origin, moved, sums, 0, 2)

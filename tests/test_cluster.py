@@ -180,7 +180,7 @@ def long_runs(tmp_path_factory):
             "0.01",
             "--keep",
             "nearest",
-            "--rim",
+            "--boundary",
             "--workers",
             "2",
         ],
@@ -257,14 +257,14 @@ def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(keep, address, tm
     np.save(tmp_path / "one.npy", points[:600])
     np.savetxt(tmp_path / "two.xyz", points[600:])
     names = [tmp_path / "one.npy", tmp_path / "two.xyz"]
-    wanted = thin_scan.thin_scan(names, 1.0, keep=keep, rim=True)
+    wanted = thin_scan.thin_scan(names, 1.0, keep=keep, boundary=True)
     shares = []
     with open_workers(scheduler=address) as crew:
         found = thin_scan.thin_scan(
-            names, 1.0, keep=keep, rim=True, workers=crew, progress=lambda stage, share: shares.append(share)
+            names, 1.0, keep=keep, boundary=True, workers=crew, progress=lambda stage, share: shares.append(share)
         )
         assert found.points.tobytes() == wanted.points.tobytes()
-        assert (found.read, found.dropped, found.rim) == (1000, 0, wanted.rim)
+        assert (found.read, found.dropped, found.boundary) == (1000, 0, wanted.boundary)
         with pytest.raises(FormatError, match="does not exist"):
             thin_scan.thin_scan([tmp_path / "three.xyz"], 1.0, workers=crew)
     assert len(shares) > 8 and shares[-1] == 1.0

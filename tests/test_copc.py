@@ -23,11 +23,11 @@ from scantruss.scan.stream.tiles import find_source, tiles_of
 from scantruss.selection import Selection
 from scantruss.settings import Settings
 
-CHANCE = np.random.default_rng(8)
-P = np.round(CHANCE.uniform((4000, 5000, -3), (4090, 5100, 9), (4000, 3)), 3)
-CLASS = CHANCE.choice([2, 6], len(P))
-RETURN = CHANCE.choice([1, 2], len(P))
-WITHHELD = CHANCE.random(len(P)) < 0.1
+RNG = np.random.default_rng(8)
+P = np.round(RNG.uniform((4000, 5000, -3), (4090, 5100, 9), (4000, 3)), 3)
+CLASS = RNG.choice([2, 6], len(P))
+RETURN = RNG.choice([1, 2], len(P))
+WITHHELD = RNG.random(len(P)) < 0.1
 FOOT = 0.3048
 SMALL = "box:4010,5010,4020,5025"
 CROPS = {
@@ -253,12 +253,12 @@ def test_where_nothing_is_left_the_scan_is_described(tmp_path: Path) -> None:
 
 def test_the_thinned_scan_is_that_of_the_whole_file(both) -> None:
     selection = Selection(crop=CROPS["polygon"])
-    found, wanted = (thin_scan(path, 2.0, rim=True, selection=selection) for path in both)
+    found, wanted = (thin_scan(path, 2.0, boundary=True, selection=selection) for path in both)
     assert found.points.tobytes() == wanted.points.tobytes() and found.read == wanted.read
 
 
 def test_points_that_are_not_read_take_no_memory(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("scantruss.scan.stream.fit.FEWEST", 100)
+    monkeypatch.setattr("scantruss.scan.stream.fit.NEVER_TOO_MANY_POINTS", 100)
     path = tmp_path / "a.copc.laz"
     path.write_bytes(DATA)
     assert spacing_to_fit(path, Settings(length=2.0), 2e5) == 0.1

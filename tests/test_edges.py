@@ -46,10 +46,10 @@ SURFACES = {
 def initial_front(name):
     points, length = SURFACES[name]
     settings = st.Settings(length=length)
-    sites, boundary, constraints = steps_of(st.PointCloud.from_array(points()), settings)
+    samples, boundary, constraints = steps_of(st.PointCloud.from_array(points()), settings)
     return (
-        driver.start_front(driver.new_front(sites, settings), sites, boundary, constraints, settings),
-        sites,
+        driver.start_front(driver.new_front(samples, settings), samples, boundary, constraints, settings),
+        samples,
         settings,
     )
 
@@ -148,11 +148,11 @@ def add_lines_from(front, node, places):
 
 
 @given(strategies.lists(strategies.integers(0, 23), min_size=1, max_size=6), strategies.booleans())
-def test_lines_in_any_directions_leave_closed_loops(turns, on_rim):
+def test_lines_in_any_directions_leave_closed_loops(turns, on_boundary):
     """Lines from one node: several in one direction, some of them across the rim."""
     hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0)], points=PLATE)
-    x, y = (0.0, 0.0) if on_rim else (1.5, 1.5)
-    node = 0 if on_rim else hand.add_node(x, y)
+    x, y = (0.0, 0.0) if on_boundary else (1.5, 1.5)
+    node = 0 if on_boundary else hand.add_node(x, y)
     reach, angle = 0.5 + 0.1 * np.arange(len(turns)), np.pi / 12 * np.array(turns)
     add_lines_from(
         hand.front,

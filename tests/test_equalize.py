@@ -35,56 +35,56 @@ def rough(request):
 
 def test_the_slope_of_the_energy_agrees_with_differences():
     rough = rough_disc()
-    relief = rough.relief()
-    net, length = relief.net, rough.settings.length
+    mesh = rough.mesh()
+    net, length = mesh.net, rough.settings.length
     for v in range(0, len(rough.grid.nodes), 5):
         place = net.nodes[v].copy()
-        slope = np.array(kernels.star_energy(net, relief.patches, v, *place, length, 1.7, True)[1:])
+        slope = np.array(kernels.star_energy(net, mesh.patches, v, *place, length, 1.7, True)[1:])
         for c in range(3):
             step = np.eye(3)[c] * 1e-6
-            up = kernels.star_energy(net, relief.patches, v, *(place + step), length, 1.7, False)[0]
-            down = kernels.star_energy(net, relief.patches, v, *(place - step), length, 1.7, False)[0]
+            up = kernels.star_energy(net, mesh.patches, v, *(place + step), length, 1.7, False)[0]
+            down = kernels.star_energy(net, mesh.patches, v, *(place - step), length, 1.7, False)[0]
             assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
 
 
 def test_the_energy_agrees_with_plain_loops(rough):
-    relief = rough.relief()
-    scratch = new_scratch(relief)
-    energy, mean, count = total_energy(relief.net, scratch, rough.settings.length, 1.7)
+    mesh = rough.mesh()
+    scratch = new_scratch(mesh)
+    energy, mean, count = total_energy(mesh.net, scratch, rough.settings.length, 1.7)
     assert energy == pytest.approx(naive.energy(rough.grid, rough.settings.length, 1.7))
     assert mean == pytest.approx(rough.grid.lengths.mean()) and count == len(rough.grid.nodes)
 
 
 def test_a_fold_counts(rough):
-    relief = rough.relief()
-    net, length = relief.net, rough.settings.length
+    mesh = rough.mesh()
+    net, length = mesh.net, rough.settings.length
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
     net.nodes[v] += 3.0 * (net.nodes[net.ring[v, 0]] - net.nodes[v])
     grid = rough.grid.replace(nodes=net.nodes[: len(rough.grid.nodes)].copy())
-    energy = total_energy(net, new_scratch(relief), length, WEIGHT)[0]
+    energy = total_energy(net, new_scratch(mesh), length, WEIGHT)[0]
     assert energy == pytest.approx(naive.energy(grid, length, WEIGHT))
-    settle(relief, WEIGHT, 1e-6, 60)
-    healed = relief.to_grid(rough.grid)
+    settle(mesh, WEIGHT, 1e-6, 60)
+    healed = mesh.to_grid(rough.grid)
     assert naive.energy(healed, length, 0.0) < 0.2 * len(healed.triangles)
 
 
 def test_settling_never_raises_the_energy(rough):
-    relief = rough.relief()
-    scratch, length = new_scratch(relief), rough.settings.length
-    at_rest = relief.net.nodes[relief.net.kind >= REST].copy()
-    before = total_energy(relief.net, scratch, length, WEIGHT)[0]
+    mesh = rough.mesh()
+    scratch, length = new_scratch(mesh), rough.settings.length
+    at_rest = mesh.net.nodes[mesh.net.kind >= REST].copy()
+    before = total_energy(mesh.net, scratch, length, WEIGHT)[0]
     for _ in range(4):
-        settle(relief, WEIGHT, 0.0, 3)
-        after = total_energy(relief.net, scratch, length, WEIGHT)[0]
+        settle(mesh, WEIGHT, 0.0, 3)
+        after = total_energy(mesh.net, scratch, length, WEIGHT)[0]
         assert after <= before + 1e-9
         before = after
-    assert np.array_equal(at_rest, relief.net.nodes[relief.net.kind >= REST])
+    assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= REST])
 
 
 def test_a_move_that_does_not_pay_leaves_no_trace(rough):
-    relief = rough.relief()
-    net, scratch, length = relief.net, new_scratch(relief), rough.settings.length
-    settle(relief, WEIGHT, 1e-4, 20)
+    mesh = rough.mesh()
+    net, scratch, length = mesh.net, new_scratch(mesh), rough.settings.length
+    settle(mesh, WEIGHT, 1e-4, 20)
     live = net.degree > 0
     kept = [array[live].copy() for array in (net.nodes, net.degree, net.arc, net.kind)]
     rings = [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
@@ -97,7 +97,7 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
                     if local_search.disorder(net, move, v, u) > 0 or move > 0:
                         assert (
                             not local_search.try_move(
-                                net, relief.patches, relief.rim, scratch, move, v, u, length, WEIGHT, worth
+                                net, mesh.patches, mesh.curves, scratch, move, v, u, length, WEIGHT, worth
                             )
                             or move == 0
                         )
@@ -109,38 +109,38 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
     assert rings == [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
 
 
-def stated_energy(relief, scratch):
+def stated_energy(mesh, scratch):
     """The energy that the search lowers, but for the share of each node."""
-    energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
-    return energy + PRICE * count * (mean / relief.length - 1) ** 2 - 0.1 * count
+    energy, mean, count = total_energy(mesh.net, scratch, mesh.length, WEIGHT)
+    return energy + PRICE * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
 
 
 def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
-    relief = rough.relief()
-    settle(relief, WEIGHT, 1e-4, 30)
-    scratch = new_scratch(relief)
-    before, kept = stated_energy(relief, scratch), search_once(relief, scratch)
+    mesh = rough.mesh()
+    settle(mesh, WEIGHT, 1e-4, 30)
+    scratch = new_scratch(mesh)
+    before, kept = stated_energy(mesh, scratch), search_once(mesh, scratch)
     assert kept > 0
-    assert stated_energy(relief, scratch) < before
-    assert same_topology(rough.grid, relief.to_grid(rough.grid))
+    assert stated_energy(mesh, scratch) < before
+    assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
 @compiled_only
 @pytest.mark.parametrize("seed", range(4))
 def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     """Also where much is folded: else neighbours could lower their own energies in turn for ever."""
-    relief = rough_sphere(count=160, seed=seed).relief()
-    net, rng = relief.net, np.random.default_rng(seed)
-    net.nodes[: net.used] += 0.6 * relief.length * rng.uniform(-1, 1, (net.used, 3))
-    scratch = new_scratch(relief)
-    before = total_energy(net, scratch, relief.length, WEIGHT)[0]
+    mesh = rough_sphere(count=160, seed=seed).mesh()
+    net, rng = mesh.net, np.random.default_rng(seed)
+    net.nodes[: net.used] += 0.6 * mesh.length * rng.uniform(-1, 1, (net.used, 3))
+    scratch = new_scratch(mesh)
+    before = total_energy(net, scratch, mesh.length, WEIGHT)[0]
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
                 local_search.try_move(
-                    net, relief.patches, relief.rim, scratch, local_search.FLIP, v, u, relief.length, WEIGHT, 0.0
+                    net, mesh.patches, mesh.curves, scratch, local_search.FLIP, v, u, mesh.length, WEIGHT, 0.0
                 )
-                after = total_energy(net, scratch, relief.length, WEIGHT)[0]
+                after = total_energy(net, scratch, mesh.length, WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after
     assert scratch.paid[0] > 10
@@ -148,10 +148,10 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
 
 @compiled_only
 def test_members_become_equal_and_triangles_regular(rough):
-    relief = rough.relief()
-    equalize(relief)
-    finish(relief)
-    after = relief.to_grid(rough.grid)
+    mesh = rough.mesh()
+    equalize(mesh)
+    finish(mesh)
+    after = mesh.to_grid(rough.grid)
     quality, length = after.quality, rough.settings.length
     assert same_topology(rough.grid, after)
     assert quality.shape_mean > max(0.97, rough.grid.quality.shape_mean)
@@ -162,9 +162,9 @@ def test_members_become_equal_and_triangles_regular(rough):
     assert quality.node_deviation_mean < 0.01 * length
     for corner in rough.corners:
         assert np.abs(after.nodes - corner).max(axis=1).min() == 0.0
-    if len(rough.rim.total):
+    if len(rough.curves.total):
         rim = np.concatenate(after.boundary_loops)
-        far = [naive.nearest_on_polyline(rough.rim.points, place, 50) for place in after.nodes[rim]]
+        far = [naive.nearest_on_polyline(rough.curves.points, place, 50) for place in after.nodes[rim]]
         assert max(far) < 0.01 * length
 
 
@@ -173,10 +173,10 @@ def test_members_become_equal_and_triangles_regular(rough):
 def test_the_mean_length_comes_to_the_desired_one(stretch):
     rough = rough_disc(length=0.16)
     rough = rough._replace(settings=rough.settings.replace(length=0.16 * stretch))
-    relief = rough.relief()
-    equalize(relief)
-    finish(relief)
-    after = relief.to_grid(rough.grid)
+    mesh = rough.mesh()
+    equalize(mesh)
+    finish(mesh)
+    after = mesh.to_grid(rough.grid)
     assert same_topology(rough.grid, after)
     assert abs(after.lengths.mean() / (0.16 * stretch) - 1) < 0.06
 
@@ -185,20 +185,20 @@ def test_the_mean_length_comes_to_the_desired_one(stretch):
 def test_the_same_grid_comes_out_twice(rough):
     found = []
     for _ in range(2):
-        relief = rough.relief()
-        equalize(relief)
-        finish(relief)
-        found.append(relief.to_grid(rough.grid))
+        mesh = rough.mesh()
+        equalize(mesh)
+        finish(mesh)
+        found.append(mesh.to_grid(rough.grid))
     assert found[0].nodes.tobytes() == found[1].nodes.tobytes()
     assert found[0].triangles.tobytes() == found[1].triangles.tobytes()
 
 
 def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough):
-    relief = rough.relief()
-    equalize(relief)
-    closed = relief.close(rough.grid)
-    finish(relief)
-    early, late = relief.to_grid(rough.grid, closed), relief.to_grid(rough.grid)
+    mesh = rough.mesh()
+    equalize(mesh)
+    closed = mesh.close(rough.grid)
+    finish(mesh)
+    early, late = mesh.to_grid(rough.grid, closed), mesh.to_grid(rough.grid)
     assert "topology" in vars(early) and early.topology == late.topology
     for name in ("nodes", "triangles", "fixed", "deviation"):
         assert getattr(early, name).tobytes() == getattr(late, name).tobytes()
@@ -212,10 +212,10 @@ def test_a_grid_in_disorder_is_mended():
     nodes[inside, :2] += rough.settings.length * rng.uniform(-0.7, 0.7, (len(inside), 2))
     rough = rough._replace(grid=rough.grid.replace(nodes=nodes))
     assert rough.grid.quality.angle_min < 10
-    relief = rough.relief()
-    equalize(relief)
-    finish(relief)
-    after = relief.to_grid(rough.grid)
+    mesh = rough.mesh()
+    equalize(mesh)
+    finish(mesh)
+    after = mesh.to_grid(rough.grid)
     assert same_topology(rough.grid, after)
     assert after.quality.angle_min > 25 and after.quality.shape_mean > 0.96
 
@@ -226,7 +226,7 @@ LOOP = np.array([(0, 0, 0), (1, 0, 0.2), (1.5, 1, 0), (0.5, 1.7, -0.3), (-0.4, 0
 @given(some.floats(-7, 13), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
 def test_places_on_a_curve_agree_with_sampling(arc, place):
     rim = curve_of(LOOP)
-    curve, at, distance = curves.nearest_on_rim(rim, *place)
+    curve, at, distance = curves.nearest_on_curves(rim, *place)
     assert curve == 0 and distance == pytest.approx(naive.nearest_on_polyline(LOOP, np.array(place)), abs=2e-3)
     there = curves.at_arc(rim, 0, at)
     assert np.linalg.norm(np.array(there[1:]) - place) == pytest.approx(distance, abs=1e-9)
@@ -241,7 +241,7 @@ def test_no_place_on_a_long_curve_is_nearer_than_the_one_found(seed, place):
     wide = 1.0 + 0.6 * np.cos(rng.integers(2, 9) * angle) + rng.normal(0, 0.03, 300)
     rim = curve_of(np.stack([wide * np.cos(angle), wide * np.sin(angle), 0.2 * np.sin(5 * angle)], axis=1))
     squares = [curves.foot_on_segment(rim, 0, i, 0.0, np.inf, *place)[0] for i in range(300)]
-    assert curves.nearest_on_rim(rim, *place)[2] == pytest.approx(np.sqrt(min(squares)), rel=1e-12)
+    assert curves.nearest_on_curves(rim, *place)[2] == pytest.approx(np.sqrt(min(squares)), rel=1e-12)
 
 
 @given(some.floats(0, 5), some.floats(0.01, 1), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
@@ -256,9 +256,9 @@ def test_sliding_stays_within_reach_and_never_leads_away(arc, reach, place):
 
 
 def test_no_curve_is_nearest_where_there_is_none():
-    from rough import no_rim
+    from rough import no_boundary
 
-    assert curves.nearest_on_rim(no_rim(), 0.0, 0.0, 0.0)[0] == -1
+    assert curves.nearest_on_curves(no_boundary(), 0.0, 0.0, 0.0)[0] == -1
 
 
 def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_length(rough):
@@ -276,19 +276,19 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
 @pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
 def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
     rough = rough_disc()
-    relief, length = rough.relief(), rough.settings.length
-    net = relief.net
+    mesh, length = rough.mesh(), rough.settings.length
+    net = mesh.net
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[7])
-    settle(relief, WEIGHT, 1e-5, 60)
+    settle(mesh, WEIGHT, 1e-5, 60)
     rest = net.nodes[v].copy()
-    normal, along = relief.patches[v, 3:6].copy(), relief.patches[v, 6:9].copy()
+    normal, along = mesh.patches[v, 3:6].copy(), mesh.patches[v, 6:9].copy()
     net.nodes[v] = rest + 0.6 * length * along  # it wants to go back, against `along`
-    relief.patches[v, 0:3] = net.nodes[v] + away * length * along
-    relief.patches[v, 9:15] = 0.0
+    mesh.patches[v, 0:3] = net.nodes[v] + away * length * along
+    mesh.patches[v, 9:15] = 0.0
     place = net.nodes[v].copy()
-    gained = kernels.settle_node(net, relief.patches, relief.rim, v, length, WEIGHT, 1e-6, kernels.STRIDE)
+    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, WEIGHT, 1e-6, kernels.STRIDE)
     assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
-    assert np.linalg.norm(net.nodes[v] - relief.patches[v, 0:3]) <= kernels.LEASH * length
+    assert np.linalg.norm(net.nodes[v] - mesh.patches[v, 0:3]) <= kernels.LEASH * length
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
 
 
@@ -296,9 +296,9 @@ def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
     """Successive over-relaxation: what is uneven in the large goes slowly, node by node."""
 
     def energy_after(sweeps, stride):
-        relief = rough.relief()
-        settle(relief, WEIGHT, 0.0, sweeps, stride)
-        return total_energy(relief.net, new_scratch(relief), relief.length, WEIGHT)[0]
+        mesh = rough.mesh()
+        settle(mesh, WEIGHT, 0.0, sweeps, stride)
+        return total_energy(mesh.net, new_scratch(mesh), mesh.length, WEIGHT)[0]
 
     plain, long = energy_after(36, kernels.STRIDE), energy_after(18, LAST_STRIDE)
     assert long < plain * 1.001

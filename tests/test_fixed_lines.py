@@ -12,7 +12,7 @@ from rough import rough_disc
 from scantruss import InputError, Settings, grid_from_points
 from scantruss.cli.options import read_lines
 from scantruss.constraints.fixed_lines import divide, find_corners, simplify
-from scantruss.constraints.network import Network, rim_of
+from scantruss.constraints.network import Network, curves_of
 from scantruss.errors import FormatError
 from scantruss.export.json import encode_json, read_grid
 from scantruss.improve.working_mesh import close_net, open_net
@@ -31,10 +31,10 @@ def plate(count=9000, seed=0):
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-5, 5, (count, 2))
     side = np.linspace(-5, 5, 300)
-    rim = np.concatenate(
+    curves = np.concatenate(
         [np.stack([c, d], axis=1) for s in (-5.0, 5.0) for c, d in ((side, s + 0 * side), (s + 0 * side, side))]
     )
-    xy = np.concatenate([xy, rim])
+    xy = np.concatenate([xy, curves])
     return np.column_stack([xy, height(*xy.T)]) + NOISE * rng.normal(size=(len(xy), 3))
 
 
@@ -118,9 +118,9 @@ def test_a_closed_line_is_a_ring_also_on_a_closed_scan():
 def test_an_end_near_the_rim_comes_to_it_and_one_far_from_it_does_not():
     line = over((-4.6, 0.3), (4.2, 0.3))
     grid = grid_from_points(plate(), Settings(length=1.0, fixed_lines=(line,)))
-    on_rim = set(grid.boundary_loops[0].tolist())
+    on_boundary = set(grid.boundary_loops[0].tolist())
     ends = {node: grid.nodes[node, 0] + grid.origin[0] for node, count in degrees(grid).items() if count == 1}
-    assert sorted((node in on_rim, bool(x > 0)) for node, x in ends.items()) == [(False, True), (True, False)]
+    assert sorted((node in on_boundary, bool(x > 0)) for node, x in ends.items()) == [(False, True), (True, False)]
     assert min(ends.values()) < -4.95 and abs(max(ends.values()) - 4.2) < 0.02
 
 
@@ -222,7 +222,7 @@ def test_no_row_of_moves_takes_a_chain_apart(seed):
     grid = rough.grid.replace(lines=np.sort(np.array([chain[:-1], chain[1:]]).T, axis=1))
     net, source = open_net(grid)
     for v in chain[1:-1]:
-        net.kind[v], net.curve[v] = moves.RIM, 0
+        net.kind[v], net.curve[v] = moves.ON_CURVE, 0
     made = Counter()
     for _ in range(1500):
         a = int(rng.choice(np.flatnonzero((net.degree > 0) & ((net.line != 0) | (rng.random() < 0.7)))))
@@ -250,14 +250,16 @@ def test_no_row_of_moves_takes_a_chain_apart(seed):
 def test_places_slide_along_an_open_curve_and_not_over_its_ends(seed):
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.uniform(0.1, 1.0, (6, 3)), axis=0)
-    rim = rim_of([points], [False])
-    assert is_open(rim, 0) and not is_open(rim_of([points], [True]), 0)
-    total = float(rim.total[0])
-    assert np.allclose(at_arc(rim, 0, total + 1.0)[1:], points[-1]) and np.allclose(at_arc(rim, 0, -1.0)[1:], points[0])
+    curves = curves_of([points], [False])
+    assert is_open(curves, 0) and not is_open(curves_of([points], [True]), 0)
+    total = float(curves.total[0])
+    assert np.allclose(at_arc(curves, 0, total + 1.0)[1:], points[-1]) and np.allclose(
+        at_arc(curves, 0, -1.0)[1:], points[0]
+    )
     place = points[rng.integers(6)] + rng.normal(size=3)
-    arc, *foot = slide(rim, 0, rng.uniform(0, total), 10.0 * total, *place)
+    arc, *foot = slide(curves, 0, rng.uniform(0, total), 10.0 * total, *place)
     arcs = np.linspace(0, total, 2000)
-    dense = np.stack([np.interp(arcs, rim.arc, points[:, c]) for c in range(3)], axis=1)
+    dense = np.stack([np.interp(arcs, curves.arc, points[:, c]) for c in range(3)], axis=1)
     best = np.linalg.norm(dense - place, axis=1).min()
     assert np.linalg.norm(np.array(foot) - place) == pytest.approx(best, abs=2 * total / 2000)
     assert 0.0 <= arc <= total

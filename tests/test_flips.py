@@ -40,9 +40,9 @@ def test_flips_end_where_none_pays(make, seed):
     smallest = [min(min(naive.angles(*g.nodes[t])) for t in g.triangles) for g in (grid, flipped)]
     assert smallest[1] >= smallest[0] - 1e-9
     around = naive.neighbors(flipped)
-    on_rim = {v for edge, third in naive.wings(flipped).items() if len(third) == 1 for v in edge}
+    on_boundary = {v for edge, third in naive.wings(flipped).items() if len(third) == 1 for v in edge}
     for a, b in naive.flips_that_pay(flipped):  # what is left is kept by a guard: an interior node keeps four members
-        assert min(len(around[v]) for v in (a, b) if v not in on_rim) <= 4 or {a, b} <= on_rim
+        assert min(len(around[v]) for v in (a, b) if v not in on_boundary) <= 4 or {a, b} <= on_boundary
 
 
 def flipped_one_by_one(net):

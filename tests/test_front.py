@@ -13,7 +13,7 @@ from steps import boundary_of, front_of, steps_of
 import scantruss as st
 from scantruss.boundary.find import characteristic_points
 from scantruss.front import advance as driver
-from scantruss.front.orientation_field import Rows
+from scantruss.front.orientation_field import FieldStart
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front import gaps
 from scantruss.kernels.front.cases import choose_by_case
@@ -27,7 +27,7 @@ METHODS = ("default", "paper")
 def advanced(points, length=1.0, **others):
     """Grid and boundary of points; the nodes of the grid relative to its origin."""
     cloud, own = st.PointCloud.from_array(points), st.Settings(length=length, **others)
-    return front_of(cloud, own, Rows() if own.method == "default" else None), boundary_of(cloud, own)
+    return front_of(cloud, own, FieldStart() if own.method == "default" else None), boundary_of(cloud, own)
 
 
 def jittered(points, amount=0.02, seed=7):
@@ -163,11 +163,11 @@ def test_the_growth_of_the_arrays_makes_no_difference(name, method, monkeypatch)
     need = 6 + sum(len(characteristic_points(loop, 1.0)[0]) for loop in boundary.loops)
     large, grow, grown = driver.new_front, driver.grown, []
 
-    def small(sites, own):
-        front = large(sites, own)
+    def small(samples, own):
+        front = large(samples, own)
         room = len(front.nodes)
         arrays = [a[: len(a) * need // room].copy() for a in front[:-2]]
-        mean = sites.surface.mean
+        mean = samples.surface.mean
         boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), own.length, need, need)
         return lists.Front(*arrays, front.count, boxes)
 

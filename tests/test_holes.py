@@ -48,7 +48,7 @@ def test_the_surface_goes_on_over_a_hole_of_fifteen_members(name):
     holes = [
         p.points for p in boundary_of(cloud, settings).loops if np.linalg.norm(p.points[0] + cloud.origin - middle) < 4
     ]
-    made_up = fill_holes(steps_of(cloud, settings).sites, holes) + cloud.origin
+    made_up = fill_holes(steps_of(cloud, settings).samples, holes) + cloud.origin
     _, _, distance, most = SURFACES[name]
     assert np.abs(distance(made_up)).max() < most * 2 * RADIUS
     assert np.linalg.norm(made_up - middle, axis=1).max() < 1.4 * RADIUS
@@ -84,8 +84,8 @@ def test_a_hole_longer_than_asked_keeps_its_loop_and_what_is_around_stays():
     assert len(kept.boundary.loops) == 2 and len(closed.boundary.loops) == 1
     for one, other in zip(kept.boundary.loops, same.boundary.loops, strict=True):
         assert np.array_equal(one.points, other.points)
-    assert closed.sites.measured < len(closed.sites.surface.mean)
-    assert kept.sites.measured == len(kept.sites.surface.mean)
+    assert closed.samples.measured < len(closed.samples.surface.mean)
+    assert kept.samples.measured == len(kept.samples.surface.mean)
 
 
 def test_the_outer_rim_of_a_small_piece_is_no_hole():
@@ -104,9 +104,9 @@ def test_a_hole_around_a_bend_is_filled(reach):
     points = np.column_stack([3 * np.cos(turn), 3 * np.sin(turn), z])
     points = points[(turn / np.radians(reach)) ** 2 + (z / 3) ** 2 > 1]
     cloud = st.PointCloud.from_array(points)
-    sites, boundary, _ = steps_of(cloud, st.Settings(length=1.0))
+    samples, boundary, _ = steps_of(cloud, st.Settings(length=1.0))
     hole = [loop.points for loop in boundary.loops if np.abs(loop.points[:, 2] + cloud.origin[2]).max() < 4]
-    made_up = fill_holes(sites, hole) + cloud.origin
+    made_up = fill_holes(samples, hole) + cloud.origin
     off = np.abs(np.hypot(made_up[:, 0], made_up[:, 1]) - 3)
     assert len(hole) == 1
     assert off.max() < (0.03 if reach == 40 else 0.2) * 6

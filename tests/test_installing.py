@@ -69,13 +69,13 @@ def thin(package, folder):
 def test_a_wheel_brings_machine_code_and_its_first_run_does_not_compile(project, tmp_path):
     wheel, _ = build(project)
     assert "none-any" not in wheel.name  # it is for this system
-    site = tmp_path / "site"
+    sample = tmp_path / "site"
     with zipfile.ZipFile(wheel) as content:
-        content.extractall(site)
-    assert machine_code_in(site) and not (project / "out" / "machine_code").exists()
-    assert thin(site, tmp_path / "first") == (False, [])
-    shutil.rmtree(site / "scantruss" / "machine_code")
-    assert thin(site, tmp_path / "second") == (True, sorted(machine_code_in_wheel(wheel)))
+        content.extractall(sample)
+    assert machine_code_in(sample) and not (project / "out" / "machine_code").exists()
+    assert thin(sample, tmp_path / "first") == (False, [])
+    shutil.rmtree(sample / "scantruss" / "machine_code")
+    assert thin(sample, tmp_path / "second") == (True, sorted(machine_code_in_wheel(wheel)))
 
 
 def machine_code_in_wheel(wheel):

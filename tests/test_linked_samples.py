@@ -5,20 +5,20 @@ from itertools import product
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies
-from small_clouds import ball, cap, sheet, sites_of
+from small_clouds import ball, cap, samples_of, sheet
 from steps import steps_of
 
 import scantruss as st
 from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
-from scantruss.settings import SITE, SMOOTH_SITE
-from scantruss.surface.linked_samples import link_sites
-from scantruss.surface.samples import SPARSE, sample_surface, sites_with, with_whole_rim
+from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
+from scantruss.surface.linked_samples import link_samples
+from scantruss.surface.samples import SPARSE, sample_surface, samples_with, with_whole_boundary
 
 
-def apart(sites):
+def apart(samples):
     """How far apart the sites are: the smallest distance that they keep [member lengths]."""
-    return sites.surface.radius
+    return samples.surface.radius
 
 
 def roof(angle, length, points, seed=0):
@@ -48,21 +48,21 @@ OTHER = {
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_a_smooth_scan_has_larger_sites(name):
-    sites = sites_of(SMOOTH[name]())
-    assert sites.smooth and apart(sites) == pytest.approx(SMOOTH_SITE)
-    finer = sites_of(SMOOTH[name](), box_size=SITE)
-    assert not finer.smooth and apart(finer) == pytest.approx(SITE)
-    assert len(finer.surface.mean) > 1.8 * len(sites.surface.mean)
+    samples = samples_of(SMOOTH[name]())
+    assert samples.smooth and apart(samples) == pytest.approx(SMOOTH_SAMPLE_SPACING)
+    finer = samples_of(SMOOTH[name](), box_size=SAMPLE_SPACING)
+    assert not finer.smooth and apart(finer) == pytest.approx(SAMPLE_SPACING)
+    assert len(finer.surface.mean) > 1.8 * len(samples.surface.mean)
 
 
 @pytest.mark.parametrize("name", OTHER)
 def test_any_other_scan_has_the_usual_ones(name):
     """They are, to the byte, those that are asked for by their size."""
     points = OTHER[name]()
-    sites, asked = sites_of(points), sites_of(points, box_size=SITE)
-    assert not sites.smooth
-    assert sites.surface.mean.tobytes() == asked.surface.mean.tobytes()
-    assert sites.strays == asked.strays
+    samples, asked = samples_of(points), samples_of(points, box_size=SAMPLE_SPACING)
+    assert not samples.smooth
+    assert samples.surface.mean.tobytes() == asked.surface.mean.tobytes()
+    assert samples.outliers == asked.outliers
 
 
 @pytest.mark.parametrize("angle", [42, 50, 70, 110])
@@ -70,14 +70,14 @@ def test_any_other_scan_has_the_usual_ones(name):
 def test_no_ridge_is_missed_because_a_scan_looks_smooth(angle, seed):
     """One as long as the shortest that is looked for, in a plain scan."""
     steps = steps_of(st.PointCloud.from_array(roof(angle, 3.5, 300, seed)), st.Settings(length=1.0))
-    assert not steps.sites.smooth and steps.constraints.lines.sharp.sum() == 1
+    assert not steps.samples.smooth and steps.constraints.lines.sharp.sum() == 1
 
 
 def test_flatter_ridges_that_are_asked_for_are_seen():
     points = roof(30, 12, 300)
-    assert sites_of(points).smooth
-    assert not sites_of(points, ridge_angle=25.0).smooth
-    assert sites_of(points, ridge_angle=0.0).smooth  # none is looked for
+    assert samples_of(points).smooth
+    assert not samples_of(points, ridge_angle=25.0).smooth
+    assert samples_of(points, ridge_angle=0.0).smooth  # none is looked for
 
 
 @pytest.mark.kernels
@@ -87,7 +87,7 @@ def test_uneven_sites_are_those_of_a_plain_loop(seed, angle):
     """The normal of a neighbour, mirrored at the plane half-way, against that of the site; the sign of neither counts."""
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(0, 3, (150, 2)), 0.1 * rng.normal(size=150)])
-    found, least = link_sites(points, 0.3, 1.0, 0.2), float(np.cos(np.radians(angle)))
+    found, least = link_samples(points, 0.3, 1.0, 0.2), float(np.cos(np.radians(angle)))
     marks = np.zeros(len(found.mean), np.bool_)
     mark_uneven(found.mean, found.normals, found.neighbors, least, marks, 0, len(marks))
     expected = []
@@ -105,7 +105,7 @@ def test_uneven_sites_are_those_of_a_plain_loop(seed, angle):
 def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(effort):
     """Noisy domes: the same topology; nodes no farther from the true sphere, rim nodes no farther from the true circle."""
     dome, off, rim = cap(6.0, 0.9, 0.06), [], []
-    for seed, size in product(range(3), (None, SITE)):
+    for seed, size in product(range(3), (None, SAMPLE_SPACING)):
         points = dome + 0.01 * np.random.default_rng(seed).normal(size=dome.shape)
         grid = st.grid_from_points(points, st.Settings(length=1.0, effort=effort, box_size=size))
         assert (grid.topology.boundary_loops, grid.topology.euler) == (1, 1) and grid.certificate.passed
@@ -119,25 +119,25 @@ def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(eff
 
 @pytest.mark.kernels
 def test_places_find_the_site_nearest_to_them_from_any_near_by():
-    surface = sites_of(sheet(4, 4, 0.1), box_size=0.4).surface
+    surface = samples_of(sheet(4, 4, 0.1), box_size=0.4).surface
     rng = np.random.default_rng(0)
     places = np.column_stack([rng.uniform(-1.8, 1.8, (60, 2)), np.zeros(60)])
     nearest = np.linalg.norm(surface.mean - places[:, None], axis=2).argmin(axis=1)
-    sites = surface.neighbors[nearest, 0].copy()
-    come_nearer(surface, places, sites)
-    assert sites.tolist() == nearest.tolist()
+    samples = surface.neighbors[nearest, 0].copy()
+    come_nearer(surface, places, samples)
+    assert samples.tolist() == nearest.tolist()
 
 
 def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned():
     """A dense plate; what is added is no smooth surface. All points near the rim are still found, and no larger sites tried."""
     cloud, settings = st.PointCloud.from_array(sheet(8, 8, 0.015)), st.Settings(length=1.0)
-    sites = sample_surface(cloud, settings)
-    assert sites.smooth and sites.whole is not None and len(sites.surface.points) < 0.1 * len(cloud.points)
+    samples = sample_surface(cloud, settings)
+    assert samples.smooth and samples.whole is not None and len(samples.surface.points) < 0.1 * len(cloud.points)
     rng = np.random.default_rng(1)
     rough = rng.uniform(-0.5, 0.5, (4000, 3)) * [1, 1, 0.6]
-    filled = sites_with(sites, rough, settings)
-    assert not filled.smooth and filled.apart == sites.apart
+    filled = samples_with(samples, rough, settings)
+    assert not filled.smooth and filled.sample_spacing == samples.sample_spacing
     rim = np.column_stack([np.full(80, 4.0), np.linspace(-4, 4, 80), np.zeros(80)]) - cloud.origin
-    taken = set(map(tuple, with_whole_rim(filled, filled.surface, rim).points.tolist()))
-    near = abs(cloud.points[:, 0] + cloud.origin[0] - 4.0) < sites.apart
+    taken = set(map(tuple, with_whole_boundary(filled, filled.surface, rim).points.tolist()))
+    near = abs(cloud.points[:, 0] + cloud.origin[0] - 4.0) < samples.sample_spacing
     assert near.sum() > 500 and set(map(tuple, cloud.points[near].tolist())) <= taken

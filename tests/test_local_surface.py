@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_clouds import ball, sheet, sites_of, turn_of
+from small_clouds import ball, samples_of, sheet, turn_of
 
 from scantruss.kernels.surface.local_surface import (
     PATCH,
@@ -24,10 +24,10 @@ from scantruss.kernels.surface.local_surface import (
 @cache
 def small_ball():
     """Sites of a ball, prepared once."""
-    return sites_of(ball(2.0, 400)).surface
+    return samples_of(ball(2.0, 400)).surface
 
 
-def nearest_site(surface, place):
+def nearest_sample(surface, place):
     return int(((surface.mean - place) ** 2).sum(axis=1).argmin())
 
 
@@ -35,7 +35,7 @@ def foot_of(surface, place, patches=None):
     """Foot of a place by a fresh patch."""
     patches = np.zeros((1, PATCH)) if patches is None else patches
     if patches[0, 16] == 0:
-        patches[0, 15] = nearest_site(surface, place)
+        patches[0, 15] = nearest_sample(surface, place)
     return np.array(onto_surface(surface, patches, 0, *(float(c) for c in place)))
 
 
@@ -50,11 +50,11 @@ def inner_places(rng, width, count):
 def test_planes_are_reproduced_exactly(seed):
     """Tilted or not: the foot is the foot on the plane, the normal that of the plane."""
     turn = turn_of(seed)
-    surface = sites_of(sheet(5, 5, 0.25, seed=seed) @ turn.T).surface
+    surface = samples_of(sheet(5, 5, 0.25, seed=seed) @ turn.T).surface
     for place in inner_places(np.random.default_rng(seed), 5.0, 3):
         patch = np.zeros(PATCH)
         at = tuple(turn @ place)
-        fit_patch(surface, patch, nearest_site(surface, at), at)
+        fit_patch(surface, patch, nearest_sample(surface, at), at)
         foot = np.array(onto_patch(patch, at))
         assert foot == pytest.approx(turn @ (place * [1, 1, 0]), abs=1e-8)
         assert abs(np.array(patch_normal(patch, at)) @ turn[:, 2]) == pytest.approx(1, abs=1e-12)
@@ -62,7 +62,7 @@ def test_planes_are_reproduced_exactly(seed):
 
 @pytest.mark.kernels
 def test_planes_are_reproduced_exactly_at_their_rim_too():
-    surface = sites_of(sheet(5, 5, 0.25)).surface
+    surface = samples_of(sheet(5, 5, 0.25)).surface
     for place in ([2.5, 0.3, 0.1], [2.5, 2.5, 0.1], [-2.4, 2.5, -0.1]):
         assert foot_of(surface, place) == pytest.approx([*place[:2], 0], abs=1e-8)
 
@@ -91,7 +91,7 @@ def test_quadrics_are_reproduced_nearly_exactly(coefficients):
 
     points = sheet(5, 5, 0.2)
     points[:, 2] = height(points)
-    surface = sites_of(points).surface
+    surface = samples_of(points).surface
     for place in np.array([(0, 0, 0.1), (0.8, -0.5, 0.1), (-1.0, 1.2, -0.1), (1.5, 0.2, 0.0)]):
         foot = foot_of(surface, place)
         assert foot[2] == pytest.approx(height(foot), abs=2e-3)
@@ -103,7 +103,7 @@ def test_quadrics_are_reproduced_nearly_exactly(coefficients):
 
 def test_the_foot_lies_on_a_noisy_ball_within_half_the_noise():
     noise = 0.02
-    surface = sites_of(ball(5.0, 40_000, noise=noise)).surface
+    surface = samples_of(ball(5.0, 40_000, noise=noise)).surface
     rng = np.random.default_rng(2)
     places = rng.normal(size=(150, 3))
     places *= (5.0 + rng.uniform(-0.2, 0.2, 150) / 1)[:, None] / np.linalg.norm(places, axis=1)[:, None]
@@ -116,11 +116,11 @@ def test_the_foot_lies_on_a_noisy_ball_within_half_the_noise():
 
 @pytest.mark.kernels
 def test_the_normal_of_a_patch_is_that_of_the_ball():
-    surface = sites_of(ball(3.0, 1500)).surface
+    surface = samples_of(ball(3.0, 1500)).surface
     for place in np.random.default_rng(5).normal(size=(5, 3)):
         place = 3.0 * place / np.linalg.norm(place)
         patch = np.zeros(PATCH)
-        fit_patch(surface, patch, nearest_site(surface, place), tuple(place))
+        fit_patch(surface, patch, nearest_sample(surface, place), tuple(place))
         beside = place + 0.2 * np.cross(place / 3.0, [0.6, 0.0, 0.8])
         for p in (place, beside):
             expected = p / np.linalg.norm(p)
@@ -130,7 +130,7 @@ def test_the_normal_of_a_patch_is_that_of_the_ball():
 @pytest.mark.kernels
 def test_a_patch_is_fitted_anew_where_the_place_has_gone():
     """The foot depends on where the place is, not on where the patch was fitted first."""
-    surface = sites_of(ball(3.0, 1500)).surface
+    surface = samples_of(ball(3.0, 1500)).surface
     patches = np.zeros((1, PATCH))
     angles = np.linspace(0, 2.5, 26)
     for angle in angles:
@@ -147,7 +147,7 @@ def test_outliers_are_ignored(share):
     points = sheet(10, 10, 0.08)
     lifted = rng.random(len(points)) < share
     points[lifted, 2] += rng.uniform(0.3, 0.6, lifted.sum())
-    surface = sites_of(points).surface
+    surface = samples_of(points).surface
     heights = np.array([foot_of(surface, p)[2] for p in inner_places(rng, 10.0, 60) * [1, 1, 0]])
     assert abs(heights).mean() < 0.3 * share * 0.45
 
@@ -156,7 +156,7 @@ def test_outliers_are_ignored(share):
 def test_walking_and_feet_stay_on_their_sheet():
     """Of two plates 0.7 members apart, each keeps its own, wherever between them the place is."""
     lower = sheet(4, 4, 0.125)
-    surface = sites_of(np.concatenate([lower, lower[:, [1, 0, 2]] + [0, 0, 0.7]])).surface
+    surface = samples_of(np.concatenate([lower, lower[:, [1, 0, 2]] + [0, 0, 0.7]])).surface
     middle = surface.mean[:, 2].mean()
     for start in np.flatnonzero(surface.mean[:, 2] < middle)[::17]:
         end = walk(surface, int(start), (0.5, -0.5, 0.6))
@@ -175,7 +175,7 @@ def test_walking_ends_where_no_neighbour_is_nearer(seed):
     place = rng.normal(size=3)
     place *= 2.0 / np.linalg.norm(place)
     end = walk(surface, int(rng.integers(len(surface.mean))), tuple(place))
-    assert end == nearest_site(surface, place)  # a ball has no dead ends
+    assert end == nearest_sample(surface, place)  # a ball has no dead ends
 
 
 @pytest.mark.kernels
@@ -184,15 +184,15 @@ def test_walking_ends_where_no_neighbour_is_nearer(seed):
 def test_a_flood_reaches_what_is_linked_within_reach(seed, reach):
     surface = small_ball()
     rng = np.random.default_rng(seed)
-    site = int(rng.integers(len(surface.mean)))
-    place = surface.mean[site] + 0.1 * rng.normal(size=3)
-    count = flood(surface, site, tuple(place), reach)
+    sample = int(rng.integers(len(surface.mean)))
+    place = surface.mean[sample] + 0.1 * rng.normal(size=3)
+    count = flood(surface, sample, tuple(place), reach)
     found = surface.queue[:count].tolist()
-    expected = naive.reachable(surface.neighbors, surface.mean, site, place, reach)
-    assert found[0] == site and len(set(found)) == count
+    expected = naive.reachable(surface.neighbors, surface.mean, sample, place, reach)
+    assert found[0] == sample and len(set(found)) == count
     assert set(found) == expected
     for other in rng.integers(len(surface.mean), size=5).tolist():
-        assert linked(surface, site, other, tuple(place), reach) == (other in expected)
+        assert linked(surface, sample, other, tuple(place), reach) == (other in expected)
 
 
 @cache
@@ -200,7 +200,7 @@ def slit_sheet():
     """Sites of a sheet with a slit from its middle to one side: around its end there are links, across it none."""
     points = sheet(8.0, 8.0, 0.12)
     slit = (np.abs(points[:, 0]) < 0.9) & (points[:, 1] < 0.0)
-    return sites_of(points[~slit]).surface
+    return samples_of(points[~slit]).surface
 
 
 @pytest.mark.kernels

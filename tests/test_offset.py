@@ -9,9 +9,9 @@ from steps import steps_of
 import scantruss as st
 from scantruss.boundary import find
 from scantruss.boundary import offset as module
-from scantruss.boundary.corners import STEP, find_corners
+from scantruss.boundary.corners import CURVE_STEP, find_corners
 from scantruss.boundary.curves import heights_along, outward, resample, room_across, runs_around
-from scantruss.boundary.offset import ON_THE_EDGE, Chance
+from scantruss.boundary.offset import NO_BIAS, SamplingBias
 from scantruss.surface.samples import sample_surface
 
 RADIUS = 8.0
@@ -37,15 +37,15 @@ def short_of(places, origin, radius=RADIUS):
 
 @pytest.fixture
 def seen(monkeypatch):
-    """What `chance_of` is asked, and how far beyond it answers."""
-    asked, full = [], module.chance_of
+    """What `sampling_bias_of` is asked, and how far beyond it answers."""
+    asked, full = [], module.sampling_bias_of
 
     def spy(surface, points, density, radius):
         found = full(surface, points, density, radius)
         asked.append((points, found.beyond))
         return found
 
-    monkeypatch.setattr(find, "chance_of", spy)
+    monkeypatch.setattr(find, "sampling_bias_of", spy)
     return asked
 
 
@@ -54,7 +54,7 @@ def seen(monkeypatch):
 def test_points_by_chance_end_before_the_edge_as_far_as_said(density, scale, seen):
     _, origin = boundary_of(scale * disc(density), scale)
     ((touched, beyond),) = seen
-    truth = short_of(resample(touched, STEP * scale), origin, scale * RADIUS).mean()
+    truth = short_of(resample(touched, CURVE_STEP * scale), origin, scale * RADIUS).mean()
     assert beyond == pytest.approx(truth, rel=0.25)
 
 
@@ -64,7 +64,7 @@ def test_the_curve_is_nearer_to_the_edge_but_hardly_beyond(density, seed, seen, 
     points = disc(density, seed)
     now, origin = boundary_of(points)
     beyond = seen[0][1]
-    monkeypatch.setattr(find, "chance_of", lambda *_: ON_THE_EDGE)
+    monkeypatch.setattr(find, "sampling_bias_of", lambda *_: NO_BIAS)
     before, _ = boundary_of(points)
     short, far = (short_of(one.loops[0].points, origin) for one in (now, before))
     assert abs(short).mean() <= 0.7 * abs(far).mean() and abs(short).max() < abs(far).max()
@@ -84,7 +84,7 @@ def test_points_on_the_edge_itself_are_its_end(name, seen, monkeypatch):
         points, length = make(name).points, make(name).length
     found, _ = boundary_of(points, length)
     assert seen and all(beyond == 0.0 for _, beyond in seen)
-    monkeypatch.setattr(find, "chance_of", lambda *_: ON_THE_EDGE)
+    monkeypatch.setattr(find, "sampling_bias_of", lambda *_: NO_BIAS)
     same, _ = boundary_of(points, length)
     assert [loop.points.tobytes() for loop in found.loops] == [loop.points.tobytes() for loop in same.loops]
 
@@ -144,34 +144,34 @@ def test_runs_go_on_around_the_end_of_a_curve():
     assert told("....") == [0, 0, 0, 0]
 
 
-def bent(curve, chance, plane, **settings):
+def bent(curve, rng, plane, **settings):
     """The curve of the edge without corners."""
-    return module.curve_of_edge(curve, chance, st.Settings(length=1.0, corner_angle=170.0, **settings), plane)[0]
+    return module.offset_curve(curve, rng, st.Settings(length=1.0, corner_angle=170.0, **settings), plane)[0]
 
 
 @pytest.mark.parametrize("density", [11.5, 115.0])
 @pytest.mark.parametrize("wave, waves", [(0.3, 16), (0.1, 25), (0.02, 32)])
 def test_more_smoothing_cuts_off_no_more_than_chance_did(wave, waves, density, plane, monkeypatch):
     """Tongues hardly longer, and only bays in which few points would lie: of real ones most stays."""
-    curve = resample(circle(4000, wave=wave, waves=waves), STEP)
-    chance = Chance(module.BEYOND * density ** (-2 / 3) * 0.2 ** (-1 / 3), density)
-    more = bent(curve, chance, plane)
+    curve = resample(circle(4000, wave=wave, waves=waves), CURVE_STEP)
+    rng = SamplingBias(module.BEYOND * density ** (-2 / 3) * 0.2 ** (-1 / 3), density)
+    more = bent(curve, rng, plane)
     monkeypatch.setattr(module, "WIDER", (module.WINDOW,))
-    usual = bent(curve, chance, plane)
+    usual = bent(curve, rng, plane)
     moved = np.linalg.norm(more, axis=1) - np.linalg.norm(usual, axis=1)
-    assert -1.3 * module.MOVED * chance.beyond <= moved.min()
-    bay = np.maximum(moved, 0.0).sum() * STEP * density / waves
+    assert -1.3 * module.MOVED * rng.beyond <= moved.min()
+    bay = np.maximum(moved, 0.0).sum() * CURVE_STEP * density / waves
     assert bay <= 1.5 * module.BAY
     if wave == 0.3 and density > 100:  # some twenty points would lie in each bay
         assert np.ptp(np.linalg.norm(more, axis=1)) > 0.85 * np.ptp(np.linalg.norm(usual, axis=1))
 
 
 def test_what_chance_explains_is_smoothed_more(plane, monkeypatch):
-    curve = resample(circle(4000), STEP)
+    curve = resample(circle(4000), CURVE_STEP)
     curve *= 1.0 + 0.002 * np.random.default_rng(0).normal(size=(len(curve), 1))
-    more = bent(curve, Chance(0.02, 115.0), plane)
+    more = bent(curve, SamplingBias(0.02, 115.0), plane)
     monkeypatch.setattr(module, "WIDER", (module.WINDOW,))
-    usual = bent(curve, Chance(0.02, 115.0), plane)
+    usual = bent(curve, SamplingBias(0.02, 115.0), plane)
     assert np.linalg.norm(more, axis=1).std() < 0.6 * np.linalg.norm(usual, axis=1).std()
 
 
@@ -179,8 +179,8 @@ def test_a_slit_stays_open(plane):
     """The sides of a narrow hole do not come to lie over each other, however far the surface may go on."""
     x = np.linspace(-3.0, 3.0, 121)
     low, high = np.column_stack([x, 0 * x - 0.1, 0 * x]), np.column_stack([x[::-1], 0 * x + 0.1, 0 * x])
-    curve = resample(np.concatenate([low, high])[::-1], STEP)  # a hole: clockwise
-    x, y, _ = bent(curve, Chance(0.3, 5.0), plane).T
+    curve = resample(np.concatenate([low, high])[::-1], CURVE_STEP)  # a hole: clockwise
+    x, y, _ = bent(curve, SamplingBias(0.3, 5.0), plane).T
     assert 0.5 * (np.roll(x, -1) * y - x * np.roll(y, -1)).sum() > 0.4  # clockwise still: it was 1.2
     assert abs(y[abs(x) < 2.0]).min() > 0.02
 
@@ -189,7 +189,7 @@ def notched(depth, width=0.6):
     """An outer rim with a triangular notch in a straight side."""
     half = width / 2
     turns = [(-5, -4), (-half, -4), (0, depth - 4), (half, -4), (5, -4), (5, 4), (-5, 4)]
-    return resample(np.array([(x, y, 0.0) for x, y in turns]), STEP)
+    return resample(np.array([(x, y, 0.0) for x, y in turns]), CURVE_STEP)
 
 
 @pytest.mark.parametrize("density, kept", [(10.0, False), (400.0, True)])
@@ -197,7 +197,7 @@ def test_a_notch_is_a_corner_where_points_would_lie_in_it(density, kept, plane):
     """With 1.8 points to its area it is there by chance, with 72 not."""
     curve, settings = notched(0.6), st.Settings(length=1.0)
     at, _ = find_corners(curve, settings)
-    corners = module.curve_of_edge(curve, Chance(0.03, density), settings, plane)[1]
+    corners = module.offset_curve(curve, SamplingBias(0.03, density), settings, plane)[1]
     assert len(at) > 4 and (len(corners) == 4 if not kept else len(corners) == len(at))
 
 

@@ -12,7 +12,7 @@ from steps import front_of, rows_of, steps_of
 
 import scantruss as st
 from scantruss.front import orientation_field as laying
-from scantruss.front.orientation_field import Rows, first_row, make_levels, orientation_fields
+from scantruss.front.orientation_field import FieldStart, lattice_start, make_levels, orientation_fields
 from scantruss.kernels.surface import orientation_field as kernels
 from scantruss.runtime import parallel
 
@@ -74,12 +74,12 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
 
 @pytest.mark.parametrize("name", ["plate", "ball"])
 def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
-    monkeypatch.setattr(laying, "MANY", 300)
+    monkeypatch.setattr(laying, "SAMPLES_FOR_THREADS", 300)
     points = sheet(12.0, 8.0, 0.15, seed=1) if name == "plate" else ball(3.0, 8000)
     _, scan = scanned(points, 0.5)
-    levels, _, shares = make_levels(scan.sites.surface, 0.5)
-    assert len(shares[0]) == 3 and len(shares[-1]) == 1
-    for posts, share in zip(levels, shares, strict=True):
+    levels, _, independent_sets = make_levels(scan.samples.surface, 0.5)
+    assert len(independent_sets[0]) == 3 and len(independent_sets[-1]) == 1
+    for posts, share in zip(levels, independent_sets, strict=True):
         assert sorted(np.concatenate(share).tolist()) == list(range(len(posts.mean)))
         if len(share) == 3:
             first, second, between = (set(some.tolist()) for some in share)
@@ -91,12 +91,12 @@ def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
 
 @pytest.mark.parametrize("processors", [1, 4])
 def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch):
-    monkeypatch.setattr(laying, "MANY", 40)
+    monkeypatch.setattr(laying, "SAMPLES_FOR_THREADS", 40)
     found = []
     for count in (2, processors):
         monkeypatch.setattr(parallel, "processors", lambda count=count: count)
         _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=3), 1.0)
-        found.append(rows_of(scan, 1.0, Rows(20.0)))
+        found.append(rows_of(scan, 1.0, FieldStart(20.0)))
     assert found[0].places.tobytes() == found[1].places.tobytes()
 
 
@@ -105,7 +105,7 @@ def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch)
 def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, left_out):
     """All lie on it. Up to an eighth of its nodes are nearest to no post and are left out: the front makes these itself."""
     _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)
-    nodes = rows_of(scan, 1.0, Rows())
+    nodes = rows_of(scan, 1.0, FieldStart())
     away, near = cKDTree(nodes.places).query(nodes.places, k=7)
     inside = (np.abs(nodes.places[:, :2]) < [4.5, 2.5]).all(axis=1)
     assert inside.sum() > 40
@@ -122,8 +122,8 @@ def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, 
 @pytest.mark.parametrize("turn", [10.0, 30.0])
 def test_rows_turn_as_they_are_told(turn):
     _, scan = scanned(sheet(12.0, 8.0, 0.2), 1.0)
-    _, straight, node = first_row(scan.sites, scan.boundary, 1.0, 0.0)
-    _, turned, same = first_row(scan.sites, scan.boundary, 1.0, turn)
+    _, straight, node = lattice_start(scan.samples, scan.boundary, 1.0, 0.0)
+    _, turned, same = lattice_start(scan.samples, scan.boundary, 1.0, turn)
     assert node == same
     cosine = np.dot(straight, turned) / np.linalg.norm(straight) / np.linalg.norm(turned)
     assert np.degrees(np.arccos(cosine)) == pytest.approx(turn, abs=1e-6)
@@ -136,7 +136,7 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
     found = {}
     keep, laying._chosen = laying._chosen, lambda posts, owner, length: found.update(posts=posts)
     try:
-        rows_of(scan, shape.length, Rows())
+        rows_of(scan, shape.length, FieldStart())
     finally:
         laying._chosen = keep
     posts = found["posts"]
@@ -155,12 +155,12 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
 def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
-    surface = scan.sites.surface
+    surface = scan.samples.surface
     levels, owners, _ = make_levels(surface, shape.length)
     assert len(levels) == len(owners) > 2
     places = surface.mean
     for level, (posts, owner) in enumerate(zip(levels, owners, strict=True)):
-        radius = laying.APART * shape.length * laying.COARSER**level
+        radius = laying.LEVEL_SPACING * shape.length * laying.COARSER**level
         assert set(owner.tolist()) == set(range(len(posts.mean)))
         first = places[np.unique(owner, return_index=True)[1]]
         assert np.linalg.norm(places - first[owner], axis=1).max() < radius
@@ -175,13 +175,13 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
 def test_fields_made_together_are_those_made_alone():
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
-    ways = [Rows(10.0 * turn, scale) for turn in range(3) for scale in (1.0, 1.02)]
-    together = orientation_fields(scan.sites, scan.boundary, st.Settings(length=shape.length), ways)
-    for way, field in zip(ways, together, strict=True):
-        assert field.way == way
+    starts = [FieldStart(10.0 * turn, scale) for turn in range(3) for scale in (1.0, 1.02)]
+    together = orientation_fields(scan.samples, scan.boundary, st.Settings(length=shape.length), starts)
+    for way, field in zip(starts, together, strict=True):
+        assert field.start == way
         alone = rows_of(scanned(shape.points, shape.length)[1], shape.length, way)
         assert field.nodes.places.tobytes() == alone.places.tobytes()
-    assert len({field.nodes.places.tobytes() for field in together}) == len(ways)
+    assert len({field.nodes.places.tobytes() for field in together}) == len(starts)
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal", "best"])
@@ -192,13 +192,13 @@ def test_no_rows_are_laid_by_the_paper_or_where_lengths_differ(effort):
         st.Settings(length_field=[(x, 0.0, 0.0, 1.0 + abs(x) / 8) for x in (-5.0, 0.0, 5.0)], effort=effort),
     ):
         scan = steps_of(st.PointCloud.from_array(points), asked)
-        assert all(field.nodes is None for field in orientation_fields(scan.sites, scan.boundary, asked))
+        assert all(field.nodes is None for field in orientation_fields(scan.samples, scan.boundary, asked))
 
 
 def test_nodes_of_rows_keep_apart_and_lie_near_the_scan():
     points = ball(5.0, 20_000)
     _, scan = scanned(points, 1.0)
-    nodes = rows_of(scan, 1.0, Rows())
+    nodes = rows_of(scan, 1.0, FieldStart())
     assert len(nodes.places) == pytest.approx(4 * np.pi * 25 / (0.866 * 1.02**2), rel=0.1)
     assert cKDTree(nodes.places).query(nodes.places, k=2)[0][:, 1].min() >= 0.6 * 1.02 - 1e-9
     assert abs(np.linalg.norm(nodes.places + scanned(points, 1.0)[0].origin, axis=1) - 5.0).max() < 0.2
@@ -210,7 +210,7 @@ def test_rows_turn_and_move_with_the_scan():
     turn = Rotation.from_rotvec([0.3, -0.8, 0.5])
     moved = turn.apply(shape.points) + [10.0, 20.0, -30.0]
     (one, first), (two, second) = (scanned(points, shape.length) for points in (shape.points, moved))
-    a, b = (rows_of(scan, shape.length, Rows(10.0)) for scan in (first, second))
+    a, b = (rows_of(scan, shape.length, FieldStart(10.0)) for scan in (first, second))
     expected = turn.apply(a.places + one.origin) + [10.0, 20.0, -30.0]
     assert np.abs(b.places + two.origin - expected).max() < 1e-7 * shape.length
 
@@ -219,8 +219,8 @@ def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
     shape = make("scallop")
     cloud, scan = scanned(shape.points, shape.length)
     own = st.Settings(length=shape.length)
-    nodes = rows_of(scan, shape.length, Rows())
-    with_rows, without = (front_of(cloud, own, way) for way in (Rows(), None))
+    nodes = rows_of(scan, shape.length, FieldStart())
+    with_rows, without = (front_of(cloud, own, way) for way in (FieldStart(), None))
     away = cKDTree(with_rows.nodes).query(nodes.places)[0]
     assert (away < 1e-9).mean() > 0.8
     assert with_rows.quality.valence6 > without.quality.valence6
@@ -229,10 +229,10 @@ def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
 
 def test_a_closed_surface_begins_with_a_triangle_of_rows():
     cloud, scan = scanned(ball(5.0, 20_000), 1.0)
-    grid = front_of(cloud, st.Settings(length=1.0), Rows())
+    grid = front_of(cloud, st.Settings(length=1.0), FieldStart())
     first = np.linalg.norm(np.diff(grid.nodes[grid.triangles[0]][[0, 1, 2, 0]], axis=0), axis=1)
     assert first == pytest.approx(1.02, abs=0.1)
-    nodes = rows_of(scan, 1.0, Rows())
+    nodes = rows_of(scan, 1.0, FieldStart())
     assert cKDTree(nodes.places).query(grid.nodes[grid.triangles[0]])[0].max() < 1e-9
 
 
@@ -240,5 +240,5 @@ def test_appointed_positions_are_nodes_of_the_front():
     cloud = st.PointCloud.from_array(sheet(12.0, 8.0, 0.2))
     wanted = [(0.3, 0.2, 0.0), (3.1, -1.7, 0.0), (-4.4, 2.2, 0.0)]
     own = st.Settings(length=1.0, fixed=wanted)
-    grid = front_of(cloud, own, Rows())
+    grid = front_of(cloud, own, FieldStart())
     assert cKDTree(grid.nodes + grid.origin).query(wanted)[0].max() < 1e-12

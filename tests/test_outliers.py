@@ -6,7 +6,7 @@ from shapes import make
 
 import scantruss as st
 from scantruss.kernels.geometry.boxes import new_boxes
-from scantruss.kernels.scan import outliers as kernels_of_strays
+from scantruss.kernels.scan import outliers as kernels_of_outliers
 from scantruss.kernels.surface import samples as kernels
 from scantruss.scan.clean import clean_points, outliers
 from scantruss.scan.clean.nearby import Nearby
@@ -42,11 +42,11 @@ def marked(name, count, **options):
 def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface_is_lost(name, options):
     """Strays lie anywhere in the box enlarged by three tenths to all sides, those on the surface included."""
     shape, is_true, spacing = marked(name, 30_000, **options)
-    stray = outliers.find_strays(shape.points, 3.0)
+    outlier = outliers.find_outliers(shape.points, 3.0)
     away = shape.distance(shape.points)
-    assert stray[~is_true & (away > spacing)].mean() >= 0.999
-    assert stray[~is_true & (away > 4 * shape.noise)].mean() >= 0.995
-    assert stray[is_true].mean() <= 0.005
+    assert outlier[~is_true & (away > spacing)].mean() >= 0.999
+    assert outlier[~is_true & (away > 4 * shape.noise)].mean() >= 0.995
+    assert outlier[is_true].mean() <= 0.005
 
 
 @pytest.mark.parametrize("name", ["fold_over", "terrain", "flat_plate"])
@@ -56,37 +56,37 @@ def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name):
     The others of the plate lie in its own plane, a sparse surface: with other seeds between .91 and .97 of them are found.
     """
     shape, is_true, spacing = marked(name, 30_000)
-    stray = outliers.find_strays(shape.points, 3.0)
+    outlier = outliers.find_outliers(shape.points, 3.0)
     far = ~is_true & (shape.distance(shape.points) > 3 * spacing)
-    assert stray[far].mean() >= (0.9 if name == "flat_plate" else 0.995)
-    assert stray[is_true].mean() <= 0.005
+    assert outlier[far].mean() >= (0.9 if name == "flat_plate" else 0.995)
+    assert outlier[is_true].mean() <= 0.005
 
 
 def test_strays_among_noise_are_found():
     spacing = np.sqrt(make("cloth", 30_000).area / 30_000)
     shape, is_true, _ = marked("cloth", 30_000, noise=0.3 * spacing)
-    stray = outliers.find_strays(shape.points, 3.0)
-    assert stray[~is_true & (shape.distance(shape.points) > 2 * spacing)].mean() >= 0.999
-    assert stray[is_true].mean() <= 0.005
+    outlier = outliers.find_outliers(shape.points, 3.0)
+    assert outlier[~is_true & (shape.distance(shape.points) > 2 * spacing)].mean() >= 0.999
+    assert outlier[is_true].mean() <= 0.005
 
 
 def test_a_scan_without_strays_is_not_searched(monkeypatch):
     def never(*_):
         raise AssertionError("looked for strays")
 
-    monkeypatch.setattr("scantruss.surface.samples.find_strays", never)
+    monkeypatch.setattr("scantruss.surface.samples.find_outliers", never)
     shape = make("scallop", 20_000)
-    assert sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).strays == 0
+    assert sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).outliers == 0
 
 
 def test_strays_are_counted_left_out_and_kept_if_asked():
     shape = make("scallop", 20_000, outliers=0.05)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)
     cleaned = sample_surface(cloud, own)
-    assert 0.9 * 1000 < cleaned.strays < 1010
-    assert len(cleaned.surface.points) == len(shape.points) - cleaned.strays
-    kept = sample_surface(cloud, own.replace(stray_distance=0.0))
-    assert kept.strays == 0 and len(kept.surface.points) == len(shape.points)
+    assert 0.9 * 1000 < cleaned.outliers < 1010
+    assert len(cleaned.surface.points) == len(shape.points) - cleaned.outliers
+    kept = sample_surface(cloud, own.replace(outlier_distance=0.0))
+    assert kept.outliers == 0 and len(kept.surface.points) == len(shape.points)
 
 
 def test_a_tenth_of_strays_does_not_change_the_topology():
@@ -97,8 +97,8 @@ def test_a_tenth_of_strays_does_not_change_the_topology():
 
 
 def test_few_or_coinciding_points_are_no_strays():
-    assert not outliers.find_strays(np.zeros((5, 3)), 3.0).any()
-    assert not outliers.find_strays(np.repeat(np.eye(3), 30, axis=0), 3.0)[:0].any()
+    assert not outliers.find_outliers(np.zeros((5, 3)), 3.0).any()
+    assert not outliers.find_outliers(np.repeat(np.eye(3), 30, axis=0), 3.0)[:0].any()
 
 
 def test_parts_of_the_sites_find_the_same_neighbours():
@@ -106,9 +106,9 @@ def test_parts_of_the_sites_find_the_same_neighbours():
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 0.2, 500, 500)
     kernels.put_all(boxes, points, np.arange(500))
     whole, parts = (np.full((500, 6), -1, np.int64) for _ in range(2))
-    kernels.nearest_sites(points, boxes, 0.1, 0.5, whole, 0, 500)
+    kernels.nearest_samples(points, boxes, 0.1, 0.5, whole, 0, 500)
     for begin, end in ((0, 7), (7, 300), (300, 500)):
-        kernels.nearest_sites(points, boxes, 0.1, 0.5, parts, begin, end)
+        kernels.nearest_samples(points, boxes, 0.1, 0.5, parts, begin, end)
     assert np.array_equal(whole, parts)
 
 
@@ -118,10 +118,10 @@ def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed):
     shape = make("terrain", 20_000, outliers=0.1, seed=seed)
     away = shape.distance(shape.points)
     true, far = away < 0.5, away > 1.5 * measure_gap(shape.points)
-    stray = outliers.find_strays(shape.points, 3.0, shape.length)
+    outlier = outliers.find_outliers(shape.points, 3.0, shape.length)
     assert far.sum() > 800
-    assert stray[far].mean() > 0.97
-    assert stray[true].mean() < 0.002
+    assert outlier[far].mean() > 0.97
+    assert outlier[true].mean() < 0.002
 
 
 def pleated(width, depth, count=20_000):
@@ -139,7 +139,7 @@ def pleated(width, depth, count=20_000):
 @pytest.mark.parametrize("width, depth", [(2, 3), (4, 8), (6, 8)])
 def test_sharp_pleats_are_no_cloud_of_strays(width, depth):
     """There the nearest points lie as thick as in a cloud, and yet they are the surface."""
-    assert outliers.find_strays(pleated(width, depth), 3.0).mean() <= 0.005
+    assert outliers.find_outliers(pleated(width, depth), 3.0).mean() <= 0.005
 
 
 def test_a_far_dense_ball_goes_though_it_has_a_tenth_of_the_points():
@@ -165,7 +165,7 @@ def test_planes_are_measured_as_principal_axes_tell(seed, flat):
     near = Nearby.of(points)
     which = np.arange(0, 60, 3)
     thick, aside = np.empty((2, len(which)))
-    kernels_of_strays.measure_planes(near.tree, which, near.neighbors, thick, aside, 0, len(which))
+    kernels_of_outliers.measure_planes(near.tree, which, near.neighbors, thick, aside, 0, len(which))
     for row, p in enumerate(which):
         beside = near.tree.points[near.neighbors[p]] - near.tree.points[p]
         mean, normal, squares = principal(beside)
@@ -183,8 +183,8 @@ def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(s
     near = Nearby.of(points)
     alive, which = rng.random(150) < 0.7, np.arange(0, 150, 7)
     bulk = np.empty(len(which))
-    kernels_of_strays.measure_bulk(near.tree, alive, which, bulk, 0, len(which))
-    most = kernels_of_strays.BULK
+    kernels_of_outliers.measure_bulk(near.tree, alive, which, bulk, 0, len(which))
+    most = kernels_of_outliers.BULK
     for row, p in enumerate(which):
         order = np.argsort(((near.tree.points - near.tree.points[p]) ** 2).sum(axis=1), kind="stable")[: 2 * most]
         around = near.tree.points[order[alive[order]][:most]]
@@ -199,5 +199,5 @@ def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(extent, expect
     near = Nearby.of(points)
     middle = np.flatnonzero(np.linalg.norm(near.tree.points, axis=1) < 0.5)[:200]
     bulk = np.empty(len(middle))
-    kernels_of_strays.measure_bulk(near.tree, np.ones(8000, np.bool_), middle, bulk, 0, len(middle))
+    kernels_of_outliers.measure_bulk(near.tree, np.ones(8000, np.bool_), middle, bulk, 0, len(middle))
     assert bulk.mean() == pytest.approx(expected, abs=0.1)

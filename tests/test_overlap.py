@@ -25,24 +25,24 @@ SPACING = 0.12
 @pytest.fixture(scope="module")
 def views():
     """Two overlapping views of a body, and the true pose from the first to the second."""
-    chance = np.random.default_rng(3)
-    scans, poses = scans_of(body(2), [(1.0, 0.0, 0.0), (0.8, 0.6, 0.1)], chance, count=4000)
+    rng = np.random.default_rng(3)
+    scans, poses = scans_of(body(2), [(1.0, 0.0, 0.0), (0.8, 0.6, 0.1)], rng, count=4000)
     return make_view(scans[0], SPACING), make_view(scans[1], SPACING), invert(poses[1]) @ poses[0]
 
 
 @given(some.integers(0, 2**32 - 1))
 def test_the_nearest_place_is_the_nearest(seed):
-    chance = np.random.default_rng(seed)
-    places = chance.random((40, 3))
-    boxes, reach = boxes_of(places, 0.2), chance.uniform(0.05, 0.5)
-    for x in chance.uniform(-0.3, 1.3, (20, 3)):
+    rng = np.random.default_rng(seed)
+    places = rng.random((40, 3))
+    boxes, reach = boxes_of(places, 0.2), rng.uniform(0.05, 0.5)
+    for x in rng.uniform(-0.3, 1.3, (20, 3)):
         away, at = cKDTree(places).query(x)
         assert kernels.nearest(boxes, places, *x, reach) == (at if away <= reach else -1)
 
 
 def test_the_first_place_within_reach_is_the_first():
-    chance = np.random.default_rng(1)
-    points, places = chance.random((200, 3)), chance.random((40, 3))
+    rng = np.random.default_rng(1)
+    points, places = rng.random((200, 3)), rng.random((40, 3))
     owner = np.empty(200, np.int64)
     kernels.first_places(points, boxes_of(places, 0.2), places, 0.25, owner)
     near = np.linalg.norm(points[:, None] - places, axis=2) <= 0.25
@@ -55,7 +55,7 @@ def test_places_keep_their_spacing_and_normals_face_outside(views):
         assert view.bulge > 0.5
         middle = view.points.mean(axis=0)
         assert ((view.points - middle) * view.normals).sum(axis=1).mean() > 0.0
-        assert 0.05 < view.rim.mean() < 0.6
+        assert 0.05 < view.on_boundary.mean() < 0.6
 
 
 def slow_values(p, n, q, m):
@@ -100,7 +100,7 @@ def slow_sums(a, b, pose, reach, soft, sharp, centre):
     for p, n in zip(move(pose, a.points), turn_by(pose, a.normals), strict=False):
         away, q = cKDTree(b.points).query(p)
         m = b.normals[q]
-        if away > reach or b.rim[q] or n @ m < 0.6:
+        if away > reach or b.on_boundary[q] or n @ m < 0.6:
             continue
         e = 1.0 / sharp
         covariance = 2 * np.eye(3) - (1 - e) * (np.outer(n, n) + np.outer(m, m))
@@ -124,7 +124,7 @@ def test_a_step_sums_what_generalized_icp_says(views):
     centre = b.points.mean(axis=0)
     sums = np.zeros((7, 7))
     count = kernels.step_sums(
-        a.points, a.normals, a.rim, b.points, b.normals, b.rim, b.boxes, pose, pose,
+        a.points, a.normals, a.on_boundary, b.points, b.normals, b.on_boundary, b.boxes, pose, pose,
         1.0, 1, 0.2, 0.05, 100.0, centre[None], sums,
     )  # fmt: skip
     slow, many = slow_sums(a, b, pose, 0.2, 0.05, 100.0, centre)
@@ -143,7 +143,7 @@ def test_judging_counts_what_agrees_and_what_does_not(views):
         for p, n in zip(move(there, a.points), turn_by(there, a.normals), strict=False):
             away, q = tree.query(p)
             off = (p - b.points[q]) @ b.normals[q]
-            if away > reach or b.rim[q] or away**2 - off**2 > 2.25 * SPACING**2:
+            if away > reach or b.on_boundary[q] or away**2 - off**2 > 2.25 * SPACING**2:
                 continue
             if n @ b.normals[q] < -0.2:
                 behind += 1
@@ -152,7 +152,9 @@ def test_judging_counts_what_agrees_and_what_does_not(views):
             else:
                 against += 1
         sums = np.zeros(5)
-        kernels.judge(a.points, a.normals, b.points, b.normals, b.rim, b.boxes, there, 1.0, SPACING, near, reach, sums)
+        kernels.judge(
+            a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes, there, 1.0, SPACING, near, reach, sums
+        )
         assert sums[:4] == pytest.approx([agreeing, against, squares, behind])
     right, wrong = (judge(a, b, p, 1.0, near, reach) for p in (pose, there))
     assert right.agreement > 0.9 > wrong.agreement and right.score > wrong.score
@@ -169,15 +171,15 @@ def test_alignment_finds_back(views):
 
 @given(some.integers(0, 2**32 - 1))
 def test_poses(seed):
-    chance = np.random.default_rng(seed)
-    pose, other = random_pose(chance), random_pose(chance)
-    points = chance.normal(size=(7, 3))
+    rng = np.random.default_rng(seed)
+    pose, other = random_pose(rng), random_pose(rng)
+    points = rng.normal(size=(7, 3))
     assert np.allclose(move(invert(pose), move(pose, points)), points)
     q = quaternion_of(pose)
     assert np.isclose(np.linalg.norm(q), 1.0) and q[3] >= 0.0
     half = np.degrees(2 * np.arccos(min(abs(q @ quaternion_of(other)), 1.0)))
     assert angle_between(pose, other) == pytest.approx(half, abs=1e-4)
-    axis = chance.normal(size=3)
+    axis = rng.normal(size=3)
     motion = small_motion(axis, np.zeros(3), points[0])
     assert np.allclose(move(motion, points[:1]), points[:1])
     assert np.allclose(turn_by(motion, axis[None]), axis)
@@ -187,17 +189,17 @@ def test_poses(seed):
 
 @given(some.integers(0, 2**32 - 1))
 def test_a_step_is_the_solution(seed):
-    chance = np.random.default_rng(seed)
-    a, load = chance.normal(size=(12, 20)), chance.normal(size=12)
+    rng = np.random.default_rng(seed)
+    a, load = rng.normal(size=(12, 20)), rng.normal(size=12)
     assert np.allclose(solve(a @ a.T, load, 1.0), -np.linalg.solve(a @ a.T, load), atol=1e-2)
 
 
 def test_depth_is_the_distance_from_the_rim(views):
     view = views[0]
-    rims = np.ascontiguousarray(view.points[view.rim])
+    boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.empty(len(view.points))
-    blending.depths(view.points, rims, boxes_of(rims, 0.3), 0.5, depth)
-    assert np.allclose(depth, np.minimum(cKDTree(rims).query(view.points)[0], 0.5))
+    blending.depths(view.points, boundary_points, boxes_of(boundary_points, 0.3), 0.5, depth)
+    assert np.allclose(depth, np.minimum(cKDTree(boundary_points).query(view.points)[0], 0.5))
 
 
 def test_a_second_layer_moves_points_to_the_mean_and_takes_what_it_sees_better():

@@ -48,7 +48,7 @@ def test_equation_1_a_box_is_larger_than_the_spacing_and_smaller_than_the_smalle
     cloud = st.PointCloud.from_array(sheet(5, 4, 0.2))
     size = sample_surface(cloud, settings).boxes.size
     assert cloud.spacing < size.max()
-    assert size.max() < settings.closed_rim / math.pi  # the diameter of a hole with that rim
+    assert size.max() < settings.closed_boundary_length / math.pi  # the diameter of a hole with that rim
 
 
 @pytest.mark.kernels
@@ -411,9 +411,9 @@ def test_section_3_3_characteristic_points_at_the_desired_length():
 @pytest.mark.parametrize("way", ["external", "all"])
 def test_section_3_6_internal_boundaries_are_active_or_inactive(way):
     cloud, ways = plate_with_hole()
-    sites, boundary, constraints = steps_of(cloud, ways[way])
+    samples, boundary, constraints = steps_of(cloud, ways[way])
     assert (len(boundary.external), len(boundary.internal)) == (1, 1)
-    front = start_front(new_front(sites, ways[way]), sites, boundary, constraints, ways[way])
+    front = start_front(new_front(samples, ways[way]), samples, boundary, constraints, ways[way])
     count = front.count[lists.SEGMENTS]
     away = np.linalg.norm(front.nodes[front.tail[:count], :2], axis=1)
     assert (front.state[:count][away > 4] == lists.ACTIVE).all()

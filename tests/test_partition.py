@@ -5,7 +5,7 @@ import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
 from scantruss.improve import equalize, perturbation
-from scantruss.improve.partition import Halves
+from scantruss.improve.partition import Partition
 from scantruss.kernels.mesh.partition import BETWEEN
 from scantruss.runtime import parallel
 
@@ -33,38 +33,38 @@ def ways(net, start):
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(3))
 def test_two_rings_of_nodes_lie_between_the_halves(make, seed):
-    net = make(seed).relief().net
+    net = make(seed).mesh().net
     live = net.degree > 0
-    halves = Halves(net, live)
-    first = np.flatnonzero(live & (halves.label == 0))
+    partition = Partition(net, live)
+    first = np.flatnonzero(live & (partition.label == 0))
     away = ways(net, first.tolist())
-    assert min(away[v] for v in np.flatnonzero(live & (halves.label == 1)).tolist()) >= 3
-    counts = [int((live & (halves.label == side)).sum()) for side in (0, 1)]
-    assert min(counts) > 0.3 * live.sum() and (live & (halves.label == BETWEEN)).sum() < 0.3 * live.sum()
+    assert min(away[v] for v in np.flatnonzero(live & (partition.label == 1)).tolist()) >= 3
+    counts = [int((live & (partition.label == side)).sum()) for side in (0, 1)]
+    assert min(counts) > 0.3 * live.sum() and (live & (partition.label == BETWEEN)).sum() < 0.3 * live.sum()
 
 
 @pytest.mark.kernels
 def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make):
-    net = make(0).relief().net
+    net = make(0).mesh().net
     free, used = net.free[: net.spare[0]].copy(), net.used
-    halves = Halves(net, net.degree > 0)
-    stacks = [own.free[: own.spare[0]].tolist() for own in halves.nets]
+    partition = Partition(net, net.degree > 0)
+    stacks = [own.free[: own.spare[0]].tolist() for own in partition.nets]
     assert sorted(stacks[0] + stacks[1]) == sorted(free.tolist())
-    assert all((halves.label[stack] == side).all() for side, stack in enumerate(stacks))
-    halves.run(lambda side: None)
+    assert all((partition.label[stack] == side).all() for side, stack in enumerate(stacks))
+    partition.run(lambda side: None)
     assert sorted(net.free[: net.spare[0]].tolist()) == sorted(free.tolist()) and net.used == used
 
 
 @pytest.mark.kernels
 def test_a_grid_without_work_has_no_halves(make):
-    net = make(0).relief().net
-    halves = Halves(net, np.zeros(len(net.arc), bool))
-    assert (halves.label[net.degree > 0] == BETWEEN).all()
+    net = make(0).mesh().net
+    partition = Partition(net, np.zeros(len(net.arc), bool))
+    assert (partition.label[net.degree > 0] == BETWEEN).all()
 
 
-def in_shares(make, monkeypatch, seed=1):
+def in_independent_sets(make, monkeypatch, seed=1):
     """A relief small enough for a test that is settled and searched in halves all the same."""
-    monkeypatch.setattr(equalize, "MANY", 50)
+    monkeypatch.setattr(equalize, "MANY_NODES", 50)
     monkeypatch.setattr(equalize, "ASKING", 10)
     return make(seed)
 
@@ -72,14 +72,14 @@ def in_shares(make, monkeypatch, seed=1):
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(3))
 def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_once(make, seed, monkeypatch):
-    net = in_shares(make, monkeypatch, seed).relief().net
-    first, second, between = equalize.shares_of(net)
+    net = in_independent_sets(make, monkeypatch, seed).mesh().net
+    first, second, between = equalize.independent_sets_of(net)
     assert sorted([*first, *second, *between]) == np.flatnonzero(net.degree > 0).tolist()
     assert min(len(first), len(second)) > 0.3 * (net.degree > 0).sum()
     beside = {u for v in first.tolist() for u in net.ring[v, : net.degree[v]].tolist()}
     assert not beside & set(second.tolist())
-    monkeypatch.setattr(equalize, "MANY", 10_000)
-    assert [some.tolist() for some in equalize.shares_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
+    monkeypatch.setattr(equalize, "MANY_NODES", 10_000)
+    assert [some.tolist() for some in equalize.independent_sets_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
 
 
 @pytest.mark.parametrize("processors", [1, 4])
@@ -87,12 +87,12 @@ def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, proces
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(parallel, "processors", lambda count=count: count)
-        rough = in_shares(make, monkeypatch)
-        relief = rough.relief()
-        equalize.equalize(relief)
-        equalize.finish(relief)
-        assert same_topology(rough.grid, relief.to_grid(rough.grid))
-        nets.append(relief.net)
+        rough = in_independent_sets(make, monkeypatch)
+        mesh = rough.mesh()
+        equalize.equalize(mesh)
+        equalize.finish(mesh)
+        assert same_topology(rough.grid, mesh.to_grid(rough.grid))
+        nets.append(mesh.net)
     for one, other in zip(*nets, strict=True):
         assert one.tobytes() == other.tobytes()
 
@@ -101,35 +101,35 @@ def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, proces
 def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
     energies, sweeps = [], []
     for many in (50, 10_000):
-        relief = make(seed).relief()
-        monkeypatch.setattr(equalize, "MANY", many)
-        sweeps.append(equalize.settle(relief, equalize.WEIGHT, 1e-7, 400))
-        energies.append(equalize.energy_of_node(relief))
+        mesh = make(seed).mesh()
+        monkeypatch.setattr(equalize, "MANY_NODES", many)
+        sweeps.append(equalize.settle(mesh, equalize.WEIGHT, 1e-7, 400))
+        energies.append(equalize.energy_of_node(mesh))
     assert max(sweeps) < 400
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
 
 
 def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
-    relief = in_shares(make, monkeypatch, 2).relief()
-    equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
-    net, scratch = relief.net, equalize.new_scratch(relief)
-    seen, run = [], Halves.run
+    mesh = in_independent_sets(make, monkeypatch, 2).mesh()
+    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    net, scratch = mesh.net, equalize.new_scratch(mesh)
+    seen, run = [], Partition.run
 
     def of_net():
         return net.nodes, net.ring, net.degree, net.kind, net.curve, net.ideal, net.line
 
-    def look(halves, work):
-        between = (halves.label == BETWEEN) & (net.degree > 0)
+    def look(partition, work):
+        between = (partition.label == BETWEEN) & (net.degree > 0)
         old = [array[between].copy() for array in of_net()]
-        run(halves, work)
+        run(partition, work)
         seen.append([np.array_equal(array[between], was) for array, was in zip(of_net(), old, strict=True)])
 
-    monkeypatch.setattr(Halves, "run", look)
-    before = equalize.energy_of_node(relief)
-    kept = equalize.search_once(relief, scratch)
-    assert all(seen[0]) and kept > 0 and equalize.energy_of_node(relief) < before
+    monkeypatch.setattr(Partition, "run", look)
+    before = equalize.energy_of_node(mesh)
+    kept = equalize.search_once(mesh, scratch)
+    assert all(seen[0]) and kept > 0 and equalize.energy_of_node(mesh) < before
     while kept:
-        kept = equalize.search_once(relief, scratch)
+        kept = equalize.search_once(mesh, scratch)
     asking = (net.degree > 0) & (net.degree != net.ideal)
     assert asking.any() and (scratch.tried[asking] == 1).all()
 
@@ -139,33 +139,33 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(parallel, "processors", lambda count=count: count)
-        monkeypatch.setattr(perturbation, "MANY", 100)
+        monkeypatch.setattr(perturbation, "NODES_OF_LARGE_GRID", 100)
         rough = make(1)
-        relief = rough.relief()
-        equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
-        before = equalize.energy_of_node(relief)
-        perturbation.search_widely(relief, "normal")
-        assert equalize.energy_of_node(relief) < before
-        assert same_topology(rough.grid, relief.to_grid(rough.grid))
-        nets.append(relief.net)
+        mesh = rough.mesh()
+        equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+        before = equalize.energy_of_node(mesh)
+        perturbation.search_widely(mesh, "normal")
+        assert equalize.energy_of_node(mesh) < before
+        assert same_topology(rough.grid, mesh.to_grid(rough.grid))
+        nets.append(mesh.net)
     for one, other in zip(*nets, strict=True):
         assert one.tobytes() == other.tobytes()
 
 
 def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
-    relief = make(2).relief()
-    equalize.settle(relief, equalize.WEIGHT, 1e-3, 20)
-    net = relief.net
-    names, seen, run = ("nodes", "ring", "degree"), [], Halves.run
+    mesh = make(2).mesh()
+    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    net = mesh.net
+    names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 
-    def look(halves, work):
-        parts = [(halves.label == label) & (net.degree > 0) for label in (BETWEEN, 0, 1)]
+    def look(partition, work):
+        parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN, 0, 1)]
         old = {name: getattr(net, name).copy() for name in names}
-        run(halves, work)
+        run(partition, work)
         seen.append([any((getattr(net, name)[part] != old[name][part]).any() for name in names) for part in parts])
 
-    monkeypatch.setattr(Halves, "run", look)
-    monkeypatch.setattr(perturbation, "MANY", 100)
-    perturbation.search_widely(relief, "normal")
+    monkeypatch.setattr(Partition, "run", look)
+    monkeypatch.setattr(perturbation, "NODES_OF_LARGE_GRID", 100)
+    perturbation.search_widely(mesh, "normal")
     assert len(seen) >= 2 and seen[0] == [False, True, True]
     assert not any(between for between, *_ in seen)

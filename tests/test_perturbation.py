@@ -20,9 +20,9 @@ MAKERS = {
 def settled(request):
     """A rough grid, settled, with room for kicks."""
     rough = MAKERS[request.param]()
-    relief = rough.relief()
-    settle(relief, WEIGHT, 1e-4, 30)
-    return rough, relief, new_scratch(relief), new_area(relief)
+    mesh = rough.mesh()
+    settle(mesh, WEIGHT, 1e-4, 30)
+    return rough, mesh, new_scratch(mesh), new_area(mesh)
 
 
 def trace(net):
@@ -32,128 +32,138 @@ def trace(net):
     return used.tolist(), rings, net.nodes[used].tobytes(), net.arc[used].tobytes(), net.degree[used].tobytes()
 
 
-def energy_of(relief, scratch):
-    return total_energy(relief.net, scratch, relief.length, WEIGHT)[0]
+def energy_of(mesh, scratch):
+    return total_energy(mesh.net, scratch, mesh.length, WEIGHT)[0]
 
 
-def kick(relief, scratch, area, v, worth, heat=0.0):
-    listed = kernels.list_area(relief.net, relief.patches, area, v) == kernels.LISTED
-    return listed and kernels.kick(
-        relief.net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, worth, 0.0, heat, kernels.HOPE
+def perturb(mesh, scratch, area, v, worth, temperature=0.0):
+    listed = kernels.list_area(mesh.net, mesh.patches, area, v) == kernels.LISTED
+    return listed and kernels.perturb(
+        mesh.net,
+        mesh.patches,
+        mesh.curves,
+        scratch,
+        area,
+        mesh.length,
+        WEIGHT,
+        worth,
+        0.0,
+        temperature,
+        kernels.ALLOWANCE_SEARCHED,
     )
 
 
 @pytest.mark.kernels
 def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     """If a node more or less may cost nothing, at most what moves no node pays."""
-    _, relief, scratch, area = settled
-    net = relief.net
-    before, free, patches = trace(net), int(net.spare[0]), relief.patches[net.degree > 0].tobytes()
-    kicked = 0
+    _, mesh, scratch, area = settled
+    net = mesh.net
+    before, free, patches = trace(net), int(net.spare[0]), mesh.patches[net.degree > 0].tobytes()
+    perturbed = 0
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
-        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
-        kicked += kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
-        kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
-        kernels.search_area(net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, 0.05)
-        kernels.put_area_back(net, relief.patches, area)
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
+        perturbed += kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
+        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, WEIGHT)
+        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, WEIGHT, 0.05)
+        kernels.put_area_back(net, mesh.patches, area)
         assert int(net.spare[0]) == free and trace(net) == before
-        assert relief.patches[net.degree > 0].tobytes() == patches
-    assert kicked > 20
+        assert mesh.patches[net.degree > 0].tobytes() == patches
+    assert perturbed > 20
 
 
 @pytest.mark.kernels
 def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
-    _, relief, scratch, area = settled
-    net = relief.net
+    _, mesh, scratch, area = settled
+    net = mesh.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
-        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
-        before = kernels.area_energy(net, scratch, area, relief.length, WEIGHT), energy_of(relief, scratch)
-        kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
-        kernels.settle_area(net, relief.patches, relief.rim, area, relief.length, WEIGHT)
-        kernels.search_area(net, relief.patches, relief.rim, scratch, area, relief.length, WEIGHT, 0.0)
-        after = kernels.area_energy(net, scratch, area, relief.length, WEIGHT), energy_of(relief, scratch)
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
+        before = kernels.area_energy(net, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
+        kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
+        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, WEIGHT)
+        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, WEIGHT, 0.0)
+        after = kernels.area_energy(net, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 
 def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(settled):
-    rough, relief, scratch, area = settled
-    net, paid = relief.net, 0
+    rough, mesh, scratch, area = settled
+    net, paid = mesh.net, 0
     for v in np.flatnonzero(net.degree > 0).tolist() * 2:
         if net.degree[v] == 0:
             continue
-        before, free = energy_of(relief, scratch), int(net.spare[0])
-        if kick(relief, scratch, area, v, 0.03):
+        before, free = energy_of(mesh, scratch), int(net.spare[0])
+        if perturb(mesh, scratch, area, v, 0.03):
             paid += 1
-            assert energy_of(relief, scratch) < before + 0.03 * (free - int(net.spare[0])) - 9e-5
+            assert energy_of(mesh, scratch) < before + 0.03 * (free - int(net.spare[0])) - 9e-5
     assert paid > 3
-    assert same_topology(rough.grid, relief.to_grid(rough.grid))
+    assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
 def test_heat_lets_a_kick_cost_something(settled):
-    _, relief, scratch, area = settled
+    _, mesh, scratch, area = settled
     rises = 0
-    for v in np.flatnonzero(relief.net.degree > 0).tolist():
-        before = energy_of(relief, scratch)
-        if relief.net.degree[v] > 0 and kick(relief, scratch, area, v, 0.0, heat=0.5):
-            rises += energy_of(relief, scratch) > before
+    for v in np.flatnonzero(mesh.net.degree > 0).tolist():
+        before = energy_of(mesh, scratch)
+        if mesh.net.degree[v] > 0 and perturb(mesh, scratch, area, v, 0.0, temperature=0.5):
+            rises += energy_of(mesh, scratch) > before
     assert rises > 0
 
 
 @pytest.mark.parametrize("effort", ["normal", "best"])
 def test_the_wide_search_lowers_the_energy_the_same_way_every_time(settled, effort):
-    rough, relief, _, _ = settled
-    before = energy_of_node(relief)
-    search_widely(relief, effort)
-    other = MAKERS["disc" if (relief.net.is_open == 1).any() else "sphere"]().relief()
+    rough, mesh, _, _ = settled
+    before = energy_of_node(mesh)
+    search_widely(mesh, effort)
+    other = MAKERS["disc" if (mesh.net.is_open == 1).any() else "sphere"]().mesh()
     settle(other, WEIGHT, 1e-4, 30)
     search_widely(other, effort)
-    assert energy_of_node(relief) < before
-    assert trace(relief.net) == trace(other.net)
-    assert same_topology(rough.grid, relief.to_grid(rough.grid))
+    assert energy_of_node(mesh) < before
+    assert trace(mesh.net) == trace(other.net)
+    assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
 def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
-    rough, relief, _, _ = settled
-    grid = relief.to_grid(rough.grid)
+    rough, mesh, _, _ = settled
+    grid = mesh.to_grid(rough.grid)
     mean = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean()
-    slow = naive_grid.energy(grid, relief.length, WEIGHT) / len(grid.nodes) + PRICE * (mean / relief.length - 1.0) ** 2
-    assert energy_of_node(relief) == pytest.approx(slow, rel=1e-9)
+    slow = naive_grid.energy(grid, mesh.length, WEIGHT) / len(grid.nodes) + PRICE * (mean / mesh.length - 1.0) ** 2
+    assert energy_of_node(mesh) == pytest.approx(slow, rel=1e-9)
 
 
 @pytest.mark.kernels
 def test_a_defect_is_left_alone(settled):
-    _, relief, _, area = settled
-    relief.net.kind[:] = kernels.LOCKED
-    first = int(np.flatnonzero(relief.net.degree > 0)[0])
-    assert kernels.list_area(relief.net, relief.patches, area, first) == kernels.UNFIT
+    _, mesh, _, area = settled
+    mesh.net.kind[:] = kernels.LOCKED
+    first = int(np.flatnonzero(mesh.net.degree > 0)[0])
+    assert kernels.list_area(mesh.net, mesh.patches, area, first) == kernels.UNFIT
 
 
 @pytest.mark.kernels
 def test_an_area_that_reaches_out_of_bounds_is_told(settled):
-    _, relief, _, area = settled
-    net = relief.net
+    _, mesh, _, area = settled
+    net = mesh.net
     first = int(np.flatnonzero(net.degree > 0)[0])
-    assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
+    assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
     around = area.around[: area.gathered[0]].copy()
     for out in around[:: max(len(around) // 5, 1)].tolist():
         area.out[out] = 1
-        assert kernels.list_area(net, relief.patches, area, first) == kernels.BEYOND
+        assert kernels.list_area(net, mesh.patches, area, first) == kernels.BEYOND
         area.out[out] = 0
-    assert kernels.list_area(net, relief.patches, area, first) == kernels.LISTED
+    assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
 
 
 @pytest.mark.kernels
 def test_a_net_is_as_before_until_a_member_of_the_area_changes(settled):
-    _, relief, scratch, area = settled
-    net, changed = relief.net, 0
+    _, mesh, scratch, area = settled
+    net, changed = mesh.net, 0
     for v in np.flatnonzero(net.degree > 0)[::4].tolist():
         before = trace(net)[:2]
-        assert kernels.list_area(net, relief.patches, area, v) == kernels.LISTED
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
         assert kernels.is_as_before(net, area)
-        made = kernels.move_at_random(net, relief.patches, relief.rim, scratch, area)
+        made = kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
         used, rings = trace(net)[:2]
         same = used == before[0] and all(set(a) == set(b) for a, b in zip(rings, before[1], strict=True))
         assert kernels.is_as_before(net, area) == same
         changed += made > 0 and not same
-        kernels.put_area_back(net, relief.patches, area)
+        kernels.put_area_back(net, mesh.patches, area)
     assert changed > 3

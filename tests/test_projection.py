@@ -33,19 +33,19 @@ def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> N
 
     At a corner it has a quarter of them, so nothing is averaged there, but the noise is hardly made larger either.
     """
-    inside, rim, corners = [], [], []
+    inside, curves, corners = [], [], []
     for seed in range(3):
         shape = make(name, 100_000, seed=seed, noise=0.01 * make(name).length)
         grid = st.grid_from_points(shape.points, st.Settings(length=shape.length, effort="quick"))
         nodes = grid.nodes + grid.origin
         off = heights(shape, nodes) / shape.noise
         at_corner = cKDTree(nodes).query(shape.corners)[1]
-        at_rim = np.zeros(len(nodes), bool)
-        at_rim[grid.edges[grid.edge_uses == 1]] = True
-        inside.append(off[~at_rim].mean())
+        at_boundary = np.zeros(len(nodes), bool)
+        at_boundary[grid.edges[grid.edge_uses == 1]] = True
+        inside.append(off[~at_boundary].mean())
         corners.append(off[at_corner].mean())
-        at_rim[at_corner] = False
-        rim.append(off[at_rim].mean())
+        at_boundary[at_corner] = False
+        curves.append(off[at_boundary].mean())
     one_point = np.sqrt(2 / np.pi)  # mean distance of a measured point from its true place along the normal, in noises
-    assert np.mean(inside) <= one_point / np.sqrt(17) and np.mean(rim) <= one_point / np.sqrt(5)
+    assert np.mean(inside) <= one_point / np.sqrt(17) and np.mean(curves) <= one_point / np.sqrt(5)
     assert np.mean(corners) <= 1.5

@@ -238,9 +238,9 @@ def test_arrays_of_any_numbers(tmp_path: Path, kind: str) -> None:
 
 
 def test_what_no_scan_has_is_told_with_the_other_notes(tmp_path: Path) -> None:
-    wild = roof(1000)
-    wild[5, 2] = -3.4e38
-    np.savez(tmp_path / "a.npz", wild, roof(1000))
+    invalid = roof(1000)
+    invalid[5, 2] = -3.4e38
+    np.savez(tmp_path / "a.npz", invalid, roof(1000))
     first, second = read_points(tmp_path / "a.npz").notes
     assert "arr_0" in first and second.startswith("1 points with coordinates up to 3.4e+38")
 

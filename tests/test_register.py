@@ -31,8 +31,8 @@ def clouds_of(scans):
 @pytest.fixture(scope="module")
 def scanned():
     """Four scans around a body, their poses, and what became of them."""
-    chance = np.random.default_rng(4)
-    scans, poses = scans_of(body(1), around(4, chance), chance, noise=0.1)
+    rng = np.random.default_rng(4)
+    scans, poses = scans_of(body(1), around(4, rng), rng, noise=0.1)
     return scans, poses, splice_scans(clouds_of(scans), NAMES)
 
 
@@ -90,8 +90,8 @@ def test_the_same_to_the_byte_with_one_thread(scanned, monkeypatch):
 
 def test_a_stranger_is_left_out_by_name(scanned):
     scans, poses, _ = scanned
-    chance = np.random.default_rng(9)
-    stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], chance)
+    rng = np.random.default_rng(9)
+    stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], rng)
     result = splice_scans(clouds_of([stranger[0], *scans[:3]]), ["stranger", *NAMES[:3]])
     assert result.left_out == ("stranger",) and result.frame == "a"
     assert not any("stranger" in (pair.first, pair.second) for pair in result.pairs)
@@ -100,15 +100,15 @@ def test_a_stranger_is_left_out_by_name(scanned):
 
 
 def test_scans_without_overlap_are_refused_by_name():
-    chance = np.random.default_rng(2)
-    scans, _ = scans_of(body(1), [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], chance)
+    rng = np.random.default_rng(2)
+    scans, _ = scans_of(body(1), [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], rng)
     with pytest.raises(InputError, match="front, back do not fit together"):
         splice_scans(clouds_of(scans), ["front", "back"])
 
 
 def test_a_sphere_fits_in_many_ways_and_is_refused():
-    chance = np.random.default_rng(2)
-    scans, _ = scans_of(lambda u: np.ones(len(u)), around(3, chance), chance, count=6000)
+    rng = np.random.default_rng(2)
+    scans, _ = scans_of(lambda u: np.ones(len(u)), around(3, rng), rng, count=6000)
     with pytest.raises(InputError, match="do not fit together"):
         splice_scans(clouds_of(scans))
 
@@ -116,13 +116,13 @@ def test_a_sphere_fits_in_many_ways_and_is_refused():
 @pytest.fixture(scope="module")
 def saddles():
     """Two scans of a saddle, which looks the same when turned by half a turn, and their poses."""
-    chance = np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     scans, poses = [], []
     for seed, side in enumerate((-1.0, 1.0)):
         x, y = np.random.default_rng(seed).uniform(-1, 1, (2, 30_000))
         whole = np.stack([x, y, 0.45 * (x * x - y * y)], axis=1)
         seen = whole[np.hypot(x - 0.35 * side, y) < 0.75]
-        pose = random_pose(chance)
+        pose = random_pose(rng)
         poses.append(pose)
         scans.append((seen - pose[:3, 3]) @ pose[:3, :3])
     return scans, poses
@@ -139,9 +139,9 @@ def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_give
 
 def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(saddles):
     scans, _ = saddles
-    chance = np.random.default_rng(100)
+    rng = np.random.default_rng(100)
     with pytest.raises(InputError, match="in more ways than one"):
-        splice_scans(clouds_of(scans), NAMES[:2], poses={name: random_pose(chance) for name in NAMES[:2]})
+        splice_scans(clouds_of(scans), NAMES[:2], poses={name: random_pose(rng) for name in NAMES[:2]})
 
 
 def test_units_do_not_matter(scanned):
@@ -252,8 +252,8 @@ def test_what_cannot_be_spliced_is_refused(clouds, words):
 
 
 def test_poses_are_read_back_as_they_were_written(tmp_path):
-    chance = np.random.default_rng(5)
-    poses = {f"{k}.ply": random_pose(chance) for k in range(40)}
+    rng = np.random.default_rng(5)
+    poses = {f"{k}.ply": random_pose(rng) for k in range(40)}
     path = tmp_path / "poses.json"
     path.write_text(json.dumps({"scans": {name: pose_values(pose) for name, pose in poses.items()}}))
     for name, pose in read_poses(path).items():

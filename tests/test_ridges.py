@@ -203,8 +203,8 @@ def test_a_fold_is_measured_where_it_is():
         found = np.zeros(FOUND)
         for x in (-0.2, 0.0, 0.25):
             place = np.array([x, 0.3, -slope * abs(x)]) - cloud.origin
-            site = int(((tracer.surface.mean - place) ** 2).sum(axis=1).argmin())
-            assert fit_fold(tracer.surface, site, tuple(place), (0.0, 0.0, 0.0), 0.8, tracer.buffer, found)
+            sample = int(((tracer.surface.mean - place) ** 2).sum(axis=1).argmin())
+            assert fit_fold(tracer.surface, sample, tuple(place), (0.0, 0.0, 0.0), 0.8, tracer.buffer, found)
             assert np.abs(found[[0, 2]] + cloud.origin[[0, 2]]).max() < 0.02
             assert abs(found[4]) > 0.999 and np.degrees(found[6]) == pytest.approx(degrees, abs=5.0)
             assert found[7] > 1000 and found[8] < 0.02

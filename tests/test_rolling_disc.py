@@ -5,7 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from naive import reachable
-from small_clouds import sheet, sites_of
+from small_clouds import samples_of, sheet
 
 from scantruss.kernels.boundary.loops import DIRECTIONS, free_directions, has_gap
 from scantruss.kernels.geometry.vectors import across
@@ -23,18 +23,18 @@ def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(others,
     mean = np.concatenate([np.zeros((1, 3)), around])
     links = np.full((len(mean), 9), -1)
     links[0, : len(others)] = np.arange(1, len(mean))
-    surface = sites_of(sheet(3, 3, 0.2)).surface._replace(mean=mean, neighbors=links)
+    surface = samples_of(sheet(3, 3, 0.2)).surface._replace(mean=mean, neighbors=links)
     found = has_gap(surface, 0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), np.radians(widest), np.empty((9, 3)))
     assert found == bool((gaps > np.radians(widest)).any())
 
 
-def widest_free(surface, site, radius):
+def widest_free(surface, sample, radius):
     """Middle of the widest run of directions in which a disc that touches a site holds no other one, 9 where there is none."""
-    mean, u = surface.mean, np.array(across(tuple(surface.normals[site])))
+    mean, u = surface.mean, np.array(across(tuple(surface.normals[sample])))
     turns = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    out = np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * np.cross(surface.normals[site], u)
-    others = sorted(reachable(surface.neighbors, mean, site, mean[site], 2 * radius) - {site})
-    away = np.linalg.norm(mean[others] - (mean[site] + radius * out)[:, None], axis=2)
+    out = np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * np.cross(surface.normals[sample], u)
+    others = sorted(reachable(surface.neighbors, mean, sample, mean[sample], 2 * radius) - {sample})
+    away = np.linalg.norm(mean[others] - (mean[sample] + radius * out)[:, None], axis=2)
     assume(np.abs(away - radius).min(initial=radius) > 1e-9)
     free, runs = (away > radius).all(axis=1), []
     for first in range(DIRECTIONS):
@@ -51,20 +51,20 @@ def widest_free(surface, site, radius):
 def test_a_site_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed, radius):
     """Points by chance leave gaps between their neighbours at many sites, into most of which no disc fits."""
     rng = np.random.default_rng(seed)
-    surface = sites_of(np.pad(rng.uniform(0, 2, (250, 2)), ((0, 0), (0, 1))), length=0.3).surface
+    surface = samples_of(np.pad(rng.uniform(0, 2, (250, 2)), ((0, 0), (0, 1))), length=0.3).surface
     count, widest = len(surface.mean), np.radians(75.0)
     radii, free = radius * rng.uniform(0.5, 1.2, count), np.empty(count)
     free_directions(surface, radii, widest, free, 0, count)
     ahead, inside = np.empty((surface.neighbors.shape[1], 3)), 0
-    for site in range(count):
-        u = across(tuple(surface.normals[site]))
-        v = tuple(np.cross(surface.normals[site], u))
-        if not has_gap(surface, site, u, v, widest, ahead):
-            assert free[site] == 9.0
+    for sample in range(count):
+        u = across(tuple(surface.normals[sample]))
+        v = tuple(np.cross(surface.normals[sample], u))
+        if not has_gap(surface, sample, u, v, widest, ahead):
+            assert free[sample] == 9.0
             continue
-        expected, length, ties = widest_free(surface, site, radii[site])
-        assert (free[site] < 9.0) == (length > 0)
+        expected, length, ties = widest_free(surface, sample, radii[sample])
+        assert (free[sample] < 9.0) == (length > 0)
         inside += length == 0
         if length and ties == 1:
-            assert abs((free[site] - expected + np.pi) % (2 * np.pi) - np.pi) < 1e-9
+            assert abs((free[sample] - expected + np.pi) % (2 * np.pi) - np.pi) < 1e-9
     assert inside

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import make
-from small_clouds import ball, cap, sheet, sites_of, tire, turn_of
+from small_clouds import ball, cap, samples_of, sheet, tire, turn_of
 from steps import boundary_of
 
 from scantruss import InputError, PointCloud, Settings, grid_from_points
@@ -18,10 +18,10 @@ from scantruss.kernels.surface.normals import (
     cut_steep_links,
     link_weights,
     orient_normals,
-    site_normals,
+    sample_normals,
     smooth_normals,
 )
-from scantruss.kernels.surface.samples import choose_sites, group_points, nearest_sites, put_all, settle_points
+from scantruss.kernels.surface.samples import choose_samples, group_points, nearest_samples, put_all, settle_points
 from scantruss.scan.cloud import bounds_of
 from scantruss.surface import linked_samples as module
 from scantruss.surface.samples import sample_surface
@@ -52,7 +52,7 @@ def thinned(points, radius, capacity=None):
     chosen, places = np.full(capacity, -1, np.int64), np.empty((capacity, 3))
     boxes = new_boxes(lower, upper, 1.3 * radius, capacity, capacity)
     while True:
-        begin, count = choose_sites(points, radius, boxes, owner, chosen, places, begin, count)
+        begin, count = choose_samples(points, radius, boxes, owner, chosen, places, begin, count)
         if begin == len(points):
             assert np.array_equal(places[:count], points[chosen[:count]])
             return owner, chosen[:count]
@@ -65,7 +65,7 @@ def thinned(points, radius, capacity=None):
 
 def linked(points, length=1.0):
     """Sites of a cloud and their (S, K) neighbours by brute force over the means."""
-    surface = sites_of(points, length).surface
+    surface = samples_of(points, length).surface
     pairs = [(s, int(n)) for s, row in enumerate(surface.neighbors) for n in row if n >= 0]
     return surface, np.array(pairs).reshape(-1, 2)
 
@@ -73,7 +73,7 @@ def linked(points, length=1.0):
 @cache
 def small_ball():
     """Sites of a ball, prepared once."""
-    return sites_of(ball(2.0, 400)).surface
+    return samples_of(ball(2.0, 400)).surface
 
 
 @st.composite
@@ -135,12 +135,12 @@ def test_room_that_runs_out_on_the_way_makes_no_difference(points, radius):
 @given(clouds(), st.integers(0, 99))
 def test_points_are_grouped_by_site_with_their_means(points, seed):
     owner = np.random.default_rng(seed).permutation(np.arange(len(points)) % 7)
-    sites = int(owner.max()) + 1
-    start, mean = np.zeros(sites + 1, np.int64), np.zeros((sites, 3))
+    samples = int(owner.max()) + 1
+    start, mean = np.zeros(samples + 1, np.int64), np.zeros((samples, 3))
     grouped = np.empty_like(points)
     group_points(points, owner, start, grouped, mean)
     assert start[-1] == len(points)
-    for s in range(sites):
+    for s in range(samples):
         assert (grouped[start[s] : start[s + 1]] == points[owner == s]).all()
         assert mean[s] == pytest.approx(points[owner == s].mean(axis=0))
 
@@ -152,7 +152,7 @@ def test_nearest_sites_are_the_nearest(seed, count, far):
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
     put_all(boxes, places, np.arange(count))
     found = np.full((count, 6), -1, np.int64)
-    nearest_sites(places, boxes, 0.1, far, found, 0, len(places))
+    nearest_samples(places, boxes, 0.1, far, found, 0, len(places))
     for s in range(count):
         own = [n for n in found[s].tolist() if n >= 0]
         full = naive.nearest(places, s, 6, far)
@@ -167,7 +167,7 @@ def test_normals_agree_with_those_of_numpy(seed):
     neighbors = np.full((13, 12), -1, np.int64)
     neighbors[0], neighbors[1, :5] = np.arange(1, 13), [0, 2, 3, 4, 5]
     normals, thickness = np.empty((13, 3)), np.empty(13)
-    site_normals(mean, neighbors, normals, thickness, 0, len(mean))
+    sample_normals(mean, neighbors, normals, thickness, 0, len(mean))
     for s, ring in ((0, list(range(13))), (1, [1, 0, 2, 3, 4, 5])):
         expected = naive.plane_normal(mean[ring])
         assert abs(normals[s] @ expected) == pytest.approx(1, abs=1e-6)
@@ -178,7 +178,7 @@ def test_normals_agree_with_those_of_numpy(seed):
 @pytest.mark.kernels
 def test_the_normals_of_a_plate_are_those_of_the_plate():
     turn = turn_of(4)
-    surface = sites_of(sheet(5, 4, 0.25) @ turn.T).surface
+    surface = samples_of(sheet(5, 4, 0.25) @ turn.T).surface
     assert abs(surface.normals @ turn[:, 2]) == pytest.approx(1, abs=1e-9)
     assert len({bool(up) for up in surface.normals @ turn[:, 2] > 0}) == 1
 
@@ -187,18 +187,18 @@ def test_the_normals_of_a_plate_are_those_of_the_plate():
 @pytest.mark.parametrize("seed", range(4))
 def test_the_normals_of_a_ball_point_outwards_from_its_centre(seed):
     points = ball(2.0, 500, seed=seed) @ turn_of(seed) + [50.0, -20.0, 3.0]
-    surface = sites_of(points).surface
-    outwards = surface.mean + sites_origin(points) - [50.0, -20.0, 3.0]
+    surface = samples_of(points).surface
+    outwards = surface.mean + samples_origin(points) - [50.0, -20.0, 3.0]
     outwards /= np.linalg.norm(outwards, axis=1)[:, None]
     assert ((surface.normals * outwards).sum(axis=1) > np.cos(np.radians(6))).all()
 
 
-def sites_origin(points):
+def samples_origin(points):
     return PointCloud.from_array(points).origin
 
 
 def test_the_normals_of_a_torus_point_outwards_even_in_its_hole():
-    surface = sites_of(tire(4.0, 1.5, 0.2), 0.8).surface
+    surface = samples_of(tire(4.0, 1.5, 0.2), 0.8).surface
     around = surface.mean * [1, 1, 0]
     centre = 4.0 * around / np.linalg.norm(around, axis=1)[:, None]
     outwards = (surface.mean - centre) / np.linalg.norm(surface.mean - centre, axis=1)[:, None]
@@ -285,7 +285,7 @@ def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere():
 def test_links_do_not_lead_to_a_second_sheet(gap):
     """Two plates less than a member apart: no site that is a member away from the rim is linked to the other plate."""
     plate = sheet(4, 4, 0.1)
-    surface = sites_of(np.concatenate([plate, plate[:, [1, 0, 2]] + [0, 0, gap]])).surface
+    surface = samples_of(np.concatenate([plate, plate[:, [1, 0, 2]] + [0, 0, gap]])).surface
     upper = surface.mean[:, 2] > surface.mean[:, 2].mean()
     inner = np.flatnonzero((abs(surface.mean[:, :2]) < 1).all(axis=1))
     assert len(inner) > 50
@@ -297,21 +297,21 @@ def test_links_do_not_lead_to_a_second_sheet(gap):
 def test_pieces_are_numbered_by_size_and_debris_is_no_piece():
     large, small = sheet(6, 5, 0.25), sheet(4, 3, 0.25) + np.array([9, 0, 0])
     debris = sheet(0.5, 0.5, 0.25) + np.array([0, 9, 0])
-    sites = sites_of(np.concatenate([small, debris, large]))
-    assert sites.pieces == (0, 1)
-    assert np.ptp(sites.surface.mean[sites.piece == 0], axis=0)[0] == pytest.approx(6, abs=0.3)
-    assert np.ptp(sites.surface.mean[sites.piece == 1], axis=0)[0] == pytest.approx(4, abs=0.3)
-    assert set(sites.piece) == {0, 1, 2}
-    pieces, share = sites.left_out
+    samples = samples_of(np.concatenate([small, debris, large]))
+    assert samples.pieces == (0, 1)
+    assert np.ptp(samples.surface.mean[samples.piece == 0], axis=0)[0] == pytest.approx(6, abs=0.3)
+    assert np.ptp(samples.surface.mean[samples.piece == 1], axis=0)[0] == pytest.approx(4, abs=0.3)
+    assert set(samples.piece) == {0, 1, 2}
+    pieces, share = samples.left_out
     assert pieces == 1 and 0.25 / 42.25 < share < 3.0 * 0.25 / 42.25  # a small piece is all rim, where sites lie closer
-    assert sites_of(large).left_out == (0, 0.0)
+    assert samples_of(large).left_out == (0, 0.0)
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.12])
 def test_a_rough_cloud_is_seen_as_a_sheet(noise):
     """Where the points scatter by a tenth of a member, sites lie nearer to the plane than points, and their normals stand on it."""
     points = sheet(12, 10, 0.1, noise=noise)
-    surface = sites_of(points).surface
+    surface = samples_of(points).surface
     inside = (abs(surface.mean[:, 0]) < 5) & (abs(surface.mean[:, 1]) < 4)
     assert surface.mean[inside, 2].std() < 0.6 * noise
     assert np.degrees(np.arccos(abs(surface.normals[inside, 2]))).mean() < 4
@@ -321,15 +321,17 @@ def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough():
     """They stay where they are: moved to the plane around them they would leave the ridges, and others would be chosen."""
     shape = make("great_court", 100_000)
     length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
-    sites = sites_of(shape.points, length)
-    thick = (sites.thickness > module.ROUGH * length).mean()
+    samples = samples_of(shape.points, length)
+    thick = (samples.thickness > module.ROUGH * length).mean()
     assert module.SOME_ROUGH < thick < module.MANY_ROUGH
-    assert shape.distance(sites.surface.mean + PointCloud.from_array(shape.points).origin).max() < module.ROUGH * length
+    assert (
+        shape.distance(samples.surface.mean + PointCloud.from_array(shape.points).origin).max() < module.ROUGH * length
+    )
 
 
 def test_the_area_is_about_right():
-    assert sites_of(sheet(10, 8, 0.15)).area == pytest.approx(80, rel=0.2)
-    assert sites_of(ball(3.0, 6000)).area == pytest.approx(36 * np.pi, rel=0.2)
+    assert samples_of(sheet(10, 8, 0.15)).area == pytest.approx(80, rel=0.2)
+    assert samples_of(ball(3.0, 6000)).area == pytest.approx(36 * np.pi, rel=0.2)
 
 
 @pytest.mark.kernels
@@ -343,22 +345,22 @@ def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay():
 
 @pytest.mark.kernels
 def test_same_cloud_same_bytes():
-    a, b = (sites_of(cap(3.0, 1.0, 0.3)) for _ in range(2))
+    a, b = (samples_of(cap(3.0, 1.0, 0.3)) for _ in range(2))
     for x, y in zip(a.surface[:6], b.surface[:6], strict=True):
         assert x.tobytes() == y.tobytes()
 
 
 def test_repeated_points_change_no_site():
     points = sheet(8, 6, 0.2)
-    a = sites_of(points).surface
-    b = sites_of(np.concatenate([points, points[::3]])).surface
+    a = samples_of(points).surface
+    b = samples_of(np.concatenate([points, points[::3]])).surface
     assert len(a.mean) == len(b.mean)
     assert a.neighbors.tolist() == b.neighbors.tolist() or abs(a.mean - b.mean).max() < 0.1
 
 
 def test_points_are_sorted_where_their_sites_are_many(monkeypatch):
     """The same points, each near those before it; points of few sites stay as they are."""
-    monkeypatch.setattr(module, "MANY_SITES", 1_000)
+    monkeypatch.setattr(module, "MANY_SAMPLES", 1_000)
     points = sheet(20.0, 20.0, 0.3)
     bounds = bounds_of(points)
 

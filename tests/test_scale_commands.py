@@ -23,11 +23,11 @@ HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
 def plate(count=60_000, seed=3, noise=0.02):
     """Points on an arched plate of 40 x 30 with a round hole."""
-    chance = np.random.default_rng(seed)
-    x, y = chance.uniform(0, 40, count), chance.uniform(0, 30, count)
+    rng = np.random.default_rng(seed)
+    x, y = rng.uniform(0, 40, count), rng.uniform(0, 30, count)
     keep = np.hypot(x - HOLE[0], y - HOLE[1]) > HOLE[2]
     x, y = x[keep], y[keep]
-    return np.stack([x, y, 0.01 * x * (40 - x) + chance.normal(0, noise, len(x))], axis=1)
+    return np.stack([x, y, 0.01 * x * (40 - x) + rng.normal(0, noise, len(x))], axis=1)
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_thin_writes_one_point_a_box(place, capsys):
     assert np.array_equal(np.load("thin.npy"), wanted)
     said = capsys.readouterr().out
     assert f"{len(both):,} points thinned to {len(wanted):,}; wrote thin.npy" in said
-    assert main(["thin", "*.npy", "-o", "near.ply", "--spacing", "2", "--keep", "nearest", "--rim"]) == 0
+    assert main(["thin", "*.npy", "-o", "near.ply", "--spacing", "2", "--keep", "nearest", "--boundary"]) == 0
     assert "of them along the rim" in capsys.readouterr().out
     near = st.read_points("near.ply")
     assert len(near.points) > len(thin_points(np.concatenate([both, wanted]), 2.0))
@@ -114,7 +114,7 @@ def test_memory_follows_the_result_and_not_the_scan(tmp_path):
 # ---- larger than memory --------------------------------------------------------------------------------------------
 
 
-def rim_of(grid):
+def curves_of(grid):
     """Mean distance of the rim nodes outside (positive) of the true rim of the plate."""
     nodes = (grid.nodes + grid.origin)[np.concatenate(grid.boundary_loops)]
     x, y = nodes[:, 0], nodes[:, 1]
@@ -137,15 +137,15 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     rims = [boundary_of(*each).loops for each in ((cloud, thinned), (st.PointCloud.from_array(points), settings))]
     for one, other in zip(*rims, strict=True):
         assert one.length == pytest.approx(other.length, rel=0.002) and len(one.corners) == len(other.corners)
-    assert abs(rim_of(whole)) < 0.003  # of the true rim
-    assert abs(rim_of(found)) < 0.0075
+    assert abs(curves_of(whole)) < 0.003  # of the true rim
+    assert abs(curves_of(found)) < 0.0075
     nodes = found.nodes + found.origin
     assert np.abs(nodes[:, 2] - 0.01 * nodes[:, 0] * (40 - nodes[:, 0])).mean() < 0.01
     assert abs(found.quality.shape_mean - whole.quality.shape_mean) < 0.005
 
 
 def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, monkeypatch):
-    monkeypatch.setattr(fit, "FEWEST", 1000)
+    monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     words = ["grid", "scan.npy", "grid.obj", "--length", "4", "--effort", "quick"]
     assert main([*words, "--memory", "1MB"]) == 0
     assert "thinned while it was read, from 5" in capsys.readouterr().out
@@ -159,7 +159,7 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
 
 
 def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatch):
-    monkeypatch.setattr(fit, "FEWEST", 1000)
+    monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     assert main(["info", "scan.npy"]) == 0
     whole = capsys.readouterr().out
     assert main(["info", "scan.npy", "--memory", "1MB"]) == 0
@@ -182,7 +182,7 @@ def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatc
 @pytest.mark.parametrize("place_of_all", [(0, 0, 0), (5e5, 5.4e6, 200)])
 def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, monkeypatch, place_of_all):
     """One point in a hundred at (0, 0, 0), with others at a far place: no echo."""
-    monkeypatch.setattr(fit, "FEWEST", 1000)
+    monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     monkeypatch.setattr(fit, "BULK", 3000)
     points = plate() + place_of_all
     np.save("clean.npy", points)
@@ -201,8 +201,8 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, mo
 
 def test_a_first_look_sees_thin_far_ends(place):
     """A few points of a scan reach as far again as all others: a scanner sees far in few directions."""
-    chance = np.random.default_rng(0)
-    points = np.concatenate([chance.uniform(-1, 1, (20_000, 3)), chance.uniform(-3, 3, (100, 3))])
+    rng = np.random.default_rng(0)
+    points = np.concatenate([rng.uniform(-1, 1, (20_000, 3)), rng.uniform(-3, 3, (100, 3))])
     np.save("far.npy", points)
     found = fit.spacing_to_look("far.npy", st.Settings(length=1.0))
     assert found == pytest.approx(np.linalg.norm(np.ptp(points, axis=0)) / fit.LOOK, rel=0.01)

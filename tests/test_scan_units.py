@@ -213,10 +213,10 @@ def test_parquet_says_its_unit_in_its_columns(tmp_path: Path) -> None:
 
 def woods(foot: float) -> tuple[np.ndarray, np.ndarray]:
     """Ground and trees 20 m high in metres / foot, with how many returns their pulses had."""
-    chance = np.random.default_rng(2)
-    x, y = chance.uniform(0, 300, (2, 20_000))
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(0, 300, (2, 20_000))
     wooded = (x // 60 + y // 60) % 2 == 0
-    high = np.where(wooded & (chance.random(20_000) < 0.6), chance.uniform(14, 24, 20_000), 0)
+    high = np.where(wooded & (rng.random(20_000) < 0.6), rng.uniform(14, 24, 20_000), 0)
     return np.column_stack([x, y, (high + 0.05 * x) / foot]), np.where(wooded, 2, 1)
 
 

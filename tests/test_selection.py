@@ -22,11 +22,11 @@ from scantruss.selection import Selection, polygon_text, read_crop
 from scantruss.settings import Settings
 
 P = plate(600)
-CHANCE = np.random.default_rng(6)
-CLASS = CHANCE.choice([2, 5, 6], len(P))
-COUNT = CHANCE.integers(1, 4, len(P))
-NUMBER = np.minimum(CHANCE.integers(1, 4, len(P)), COUNT)
-CONFIDENCE = np.round(CHANCE.random(len(P)), 2)
+RNG = np.random.default_rng(6)
+CLASS = RNG.choice([2, 5, 6], len(P))
+COUNT = RNG.integers(1, 4, len(P))
+NUMBER = np.minimum(RNG.integers(1, 4, len(P)), COUNT)
+CONFIDENCE = np.round(RNG.random(len(P)), 2)
 NAMES = ("x", "y", "z", "Classification", "Return_Number", "Number_Of_Returns", "Scalar_Confidence")
 TABLE = np.column_stack([P, CLASS, NUMBER, COUNT, CONFIDENCE])
 
@@ -109,7 +109,7 @@ def test_all_at_once_and_nothing_left(tmp_path: Path) -> None:
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 def test_what_a_las_file_calls_deleted_is_left_out(tmp_path: Path, version: str, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
-    withheld = CHANCE.random(len(P)) < 0.2
+    withheld = RNG.random(len(P)) < 0.2
     path.write_bytes(las(P, suffix, version=version, classification=CLASS, withheld=withheld.astype("u1")))
     for classes in ((), (6,)):
         expected = P[~withheld & np.isin(CLASS, classes or CLASS)]
@@ -145,10 +145,10 @@ def inside(x: float, y: float, ring: list[tuple[float, float]]) -> bool:
 
 @given(st.integers(0, 1000), st.integers(3, 9))
 def test_inside_a_polygon_is_what_turns_around(seed: int, corners: int) -> None:
-    chance = np.random.default_rng(seed)
-    angle = np.sort(chance.random(corners) * 2 * np.pi)
-    ring = (chance.uniform(2, 9, (corners, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])).tolist()
-    places = chance.uniform(-10, 10, (60, 2))
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.random(corners) * 2 * np.pi)
+    ring = (rng.uniform(2, 9, (corners, 1)) * np.column_stack([np.cos(angle), np.sin(angle)])).tolist()
+    places = rng.uniform(-10, 10, (60, 2))
     found = in_polygon(places, [np.array(ring)])
     assert found.tolist() == [inside(x, y, [tuple(c) for c in ring]) for x, y in places.tolist()]
 
@@ -292,7 +292,7 @@ def test_packed_text_and_several_files_select_too(tmp_path: Path) -> None:
 
 def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch) -> None:
     """Of points that are NaN nothing is told, and nobody is warned of them."""
-    monkeypatch.setattr(chunks, "SAMPLE", 100)
+    monkeypatch.setattr(chunks, "POINTS_DESCRIBED", 100)
     rows = np.zeros(600, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("class", "f4"), ("confidence", "f8")])
     rows["x"], rows["y"], rows["z"] = P.T
     rows["class"], rows["confidence"] = CLASS, np.nan

@@ -5,7 +5,7 @@ import pytest
 from shapes import make
 
 from scantruss.cli.main import main
-from scantruss.cli.shared import say_of_cloud
+from scantruss.cli.shared import report_cloud
 from scantruss.report.terminal import Bars
 from scantruss.scan.cloud import PointCloud
 
@@ -35,6 +35,6 @@ def test_one_of_several_clouds_is_named(capsys):
     )
     cloud = PointCloud(np.zeros((1, 3)), np.zeros(3), dropped=2, notes=notes)
     for name in ("", "a.las"):
-        say_of_cloud(Bars(), cloud, name)
+        report_cloud(Bars(), cloud, name)
     nans = "2 points with NaN or infinite coordinates are left out"
     assert capsys.readouterr().out.splitlines() == [*notes, nans, f"a.las: {notes[0]}", notes[1], f"a.las: {nans}"]

@@ -10,7 +10,7 @@ from steps import steps_of
 
 import scantruss as st
 from scantruss.check.certify import certify
-from scantruss.check.sheets import faults_on_sheets, nodes_of_sites
+from scantruss.check.sheets import faults_on_sheets, nodes_of_samples
 from scantruss.kernels.boundary import loops as kernels
 from scantruss.kernels.surface import normals as facing
 from scantruss.pipeline import grid_from_cloud
@@ -22,10 +22,10 @@ def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed):
     """Turns .5 to .9 members apart."""
     shape = hard("rolled", seed)
     cloud = st.PointCloud.from_array(shape.points)
-    sites, boundary, _ = steps_of(cloud, st.Settings(length=shape.length))
-    surface = sites.surface
-    site, place = np.nonzero(surface.neighbors >= 0)
-    middle = 0.5 * (surface.mean[site] + surface.mean[surface.neighbors[site, place]]) + cloud.origin
+    samples, boundary, _ = steps_of(cloud, st.Settings(length=shape.length))
+    surface = samples.surface
+    sample, place = np.nonzero(surface.neighbors >= 0)
+    middle = 0.5 * (surface.mean[sample] + surface.mean[surface.neighbors[sample, place]]) + cloud.origin
     assert shape.distance(middle[::7]).max() < 0.1 * shape.length
     (loop,), (true,) = boundary.loops, shape.loops
     assert len(loop.corners) == 4
@@ -51,12 +51,12 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next():
     settings = st.Settings(length=1.0, effort="quick")
     both = grid_from_cloud(cloud, settings)
     assert both.topology.components == 2
-    sites = sample_surface(cloud, settings)
-    assert faults_on_sheets(both, sites, nodes_of_sites(both, sites, 1.0)) == []
+    samples = sample_surface(cloud, settings)
+    assert faults_on_sheets(both, samples, nodes_of_samples(both, samples, 1.0)) == []
     lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
     used, numbered = np.unique(lower, return_inverse=True)
     half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
-    (fault,) = faults_on_sheets(half, sites, nodes_of_sites(half, sites, 1.0))
+    (fault,) = faults_on_sheets(half, samples, nodes_of_samples(half, samples, 1.0))
     assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
@@ -69,12 +69,12 @@ def test_thick_sites_give_up_thin_ones_that_stand_over_them():
     neighbors[0] = (1, 4, 5, 16)
     normals, thickness = np.tile([0.0, 0.0, 1.0], (32, 1)), np.zeros(32)
     normals[0], thickness[0] = (0.6, 0.0, 0.8), 0.5
-    facing.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    facing.trust_thin_samples(mean, normals, neighbors, thickness, 0.1, 0.75)
     assert neighbors[0].tolist() == [1, 4, 5, -1]
     assert abs(normals[0]) == pytest.approx([0, 0, 1]) and thickness[0] == pytest.approx(0)
     thickness[:] = 0.5  # none of them is thin
     neighbors[0] = (1, 4, 5, 16)
-    facing.trust_thin_sites(mean, normals, neighbors, thickness, 0.1, 0.75)
+    facing.trust_thin_samples(mean, normals, neighbors, thickness, 0.1, 0.75)
     assert neighbors[0].tolist() == [1, 4, 5, 16]
 
 
@@ -111,12 +111,12 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     """The members across a line are gone; nodes on both sides are near in space, far in the grid."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
-    grid, sites = grid_from_cloud(cloud, settings), sample_surface(cloud, settings)
-    assert faults_on_sheets(grid, sites, nodes_of_sites(grid, sites, 1.0)) == []
+    grid, samples = grid_from_cloud(cloud, settings), sample_surface(cloud, settings)
+    assert faults_on_sheets(grid, samples, nodes_of_samples(grid, samples, 1.0)) == []
     x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
     slit = (abs(x) < 0.6) & (y < 1.5)
-    torn = grid.replace(triangles=grid.triangles[~slit])
-    (fault,) = faults_on_sheets(torn, sites, nodes_of_sites(torn, sites, 1.0))
+    disconnected = grid.replace(triangles=grid.triangles[~slit])
+    (fault,) = faults_on_sheets(disconnected, samples, nodes_of_samples(disconnected, samples, 1.0))
     assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5
 
 
@@ -124,9 +124,9 @@ def test_certificates_of_one_scan_can_be_made_side_by_side():
     """They leave alone what look-ups write to: two threads in one queue had led to nowhere."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(6, 6, 0.15, seed=3))
-    grid, (sites, boundary, _) = grid_from_cloud(cloud, settings), steps_of(cloud, settings)
-    surface = sites.surface
+    grid, (samples, boundary, _) = grid_from_cloud(cloud, settings), steps_of(cloud, settings)
+    surface = samples.surface
     before = [array.copy() for array in (surface.stamp, surface.queue, surface.counter)]
-    assert certify(grid, sites, boundary, settings).passed
+    assert certify(grid, samples, boundary, settings).passed
     for array, kept in zip((surface.stamp, surface.queue, surface.counter), before, strict=True):
         assert (array == kept).all()

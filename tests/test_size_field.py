@@ -9,7 +9,7 @@ from hypothesis import settings as limits
 from hypothesis import strategies as some
 from marks import compiled_only
 from rough import rough_disc
-from small_clouds import ball, cap, ring, sheet, sites_of
+from small_clouds import ball, cap, ring, samples_of, sheet
 from steps import boundary_of
 
 import scantruss as st
@@ -44,8 +44,8 @@ def across(points, low, high):
 
 def field_of(points, **settings):
     """The desired lengths at the sites of a cloud [scan unit], and the surface."""
-    sites = sites_of(points, settings.pop("length", 0.0), **settings)
-    return sites.surface.length * sites.surface.field, sites.surface
+    samples = samples_of(points, settings.pop("length", 0.0), **settings)
+    return samples.surface.length * samples.surface.field, samples.surface
 
 
 def targets(grid):
@@ -162,7 +162,7 @@ def test_between_sites_a_length_is_that_of_the_sites_around():
 
 @pytest.mark.parametrize(("points", "curvature"), [(ball(5.0, 8000), 1 / 5), (tube(4.0, 12.0, 0.2), 1 / 4)])
 def test_the_curvature_of_a_ball_and_a_tube_is_one_over_the_radius(points, curvature):
-    bends = measured_bends(sites_of(points, 1.0).surface, 2.0)
+    bends = measured_bends(samples_of(points, 1.0).surface, 2.0)
     assert np.abs(bends / curvature - 1.0).max() < 0.1 and np.median(bends) == pytest.approx(curvature, rel=0.02)
 
 
@@ -196,22 +196,22 @@ def test_members_over_a_bowl_bulge_alike_where_they_are_not_cut_off():
 
 def test_the_energy_goes_by_the_lengths_desired_at_both_ends():
     rough = rough_disc()
-    relief = rough.relief()
-    net, length = relief.net, rough.settings.length
+    mesh = rough.mesh()
+    net, length = mesh.net, rough.settings.length
     net.desired[:] = np.random.default_rng(0).uniform(0.7, 1.5, len(net.desired))
     grid = rough.grid.replace(desired=length * net.desired[: len(rough.grid.nodes)])
     stretch = grid.stretches(length)
-    plain = total_energy(net, new_scratch(relief), length, 0.0)[0]
-    energy, mean, _ = total_energy(net, new_scratch(relief), length, 1.7)
+    plain = total_energy(net, new_scratch(mesh), length, 0.0)[0]
+    energy, mean, _ = total_energy(net, new_scratch(mesh), length, 1.7)
     assert energy - plain == pytest.approx(1.7 * ((stretch - 1.0) ** 2).sum())
     assert mean == pytest.approx(length * stretch.mean())
     for v in range(0, len(grid.nodes), 7):
         place = net.nodes[v].copy()
-        slope = np.array(star_energy(net, relief.patches, v, *place, length, 1.7, True)[1:])
+        slope = np.array(star_energy(net, mesh.patches, v, *place, length, 1.7, True)[1:])
         for c in range(3):
             step = np.eye(3)[c] * 1e-6
-            up = star_energy(net, relief.patches, v, *(place + step), length, 1.7, False)[0]
-            down = star_energy(net, relief.patches, v, *(place - step), length, 1.7, False)[0]
+            up = star_energy(net, mesh.patches, v, *(place + step), length, 1.7, False)[0]
+            down = star_energy(net, mesh.patches, v, *(place - step), length, 1.7, False)[0]
             assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
 
 

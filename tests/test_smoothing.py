@@ -14,7 +14,7 @@ from scantruss.improve.smoothing import (
     smooth,
 )
 from scantruss.kernels.mesh import smoothing as kernels
-from scantruss.kernels.mesh.grid import REST, RIM
+from scantruss.kernels.mesh.grid import ON_CURVE, REST
 
 
 @pytest.fixture(scope="module")
@@ -48,23 +48,23 @@ def test_the_criterion_is_the_setting():
 
 
 def test_the_state_agrees_with_plain_loops(disc):
-    relief = disc.relief()
-    start = relief.net.nodes + 0.1
-    shape, spread, moved = kernels.state_of(relief.net, start)
+    mesh = disc.mesh()
+    start = mesh.net.nodes + 0.1
+    shape, spread, moved = kernels.state_of(mesh.net, start)
     assert shape == pytest.approx(disc.grid.quality.shape_mean)
     assert spread == pytest.approx(disc.grid.quality.length_std)
     assert moved == pytest.approx(0.1 * 3**0.5)
 
 
 def test_a_step_agrees_with_its_twin(disc):
-    relief = disc.relief()
-    net = relief.net
+    mesh = disc.mesh()
+    net = mesh.net
     before, spare = net.nodes.copy(), np.empty_like(net.nodes)
     kernels.move_to_middle(net, 0.4, spare)
     for v, around in naive.neighbors(disc.grid).items():
         expected = before[v]
         if net.kind[v] < REST:
-            there = net.ring[v, [0, net.degree[v] - 1]].tolist() if net.kind[v] == RIM else sorted(around)
+            there = net.ring[v, [0, net.degree[v] - 1]].tolist() if net.kind[v] == ON_CURVE else sorted(around)
             expected = naive.middle(before, there, v, 0.4)
         assert net.nodes[v] == pytest.approx(expected, abs=1e-12)
 
@@ -72,9 +72,9 @@ def test_a_step_agrees_with_its_twin(disc):
 @pytest.mark.parametrize("make", [rough_disc, rough_sphere])
 def test_smoothing_improves_shape_and_lengths_and_keeps_the_topology(make):
     rough = make()
-    relief = rough.relief()
-    result = smooth(relief, rough.settings)
-    after = relief.to_grid(rough.grid)
+    mesh = rough.mesh()
+    result = smooth(mesh, rough.settings)
+    after = mesh.to_grid(rough.grid)
     assert result.passes > 0
     assert same_topology(rough.grid, after)
     assert after.quality.shape_mean > rough.grid.quality.shape_mean
@@ -85,10 +85,10 @@ def test_smoothing_improves_shape_and_lengths_and_keeps_the_topology(make):
 def test_a_smaller_criterion_ends_earlier_and_is_kept(disc):
     passes = []
     for allowed in (1e-9, 0.01, 0.03, 1.0):
-        relief = disc.relief()
-        start = relief.net.nodes.copy()
-        result = smooth(relief, disc.settings.replace(max_deviation=allowed * disc.settings.length))
-        assert kernels.state_of(relief.net, start)[2] <= allowed * disc.settings.length
+        mesh = disc.mesh()
+        start = mesh.net.nodes.copy()
+        result = smooth(mesh, disc.settings.replace(max_deviation=allowed * disc.settings.length))
+        assert kernels.state_of(mesh.net, start)[2] <= allowed * disc.settings.length
         assert (result.stop == "c") == (allowed < 1)
         passes.append(result.passes)
     assert passes[0] == 0 and passes == sorted(passes)
@@ -96,27 +96,27 @@ def test_a_smaller_criterion_ends_earlier_and_is_kept(disc):
 
 def test_the_pass_after_which_it_stops_is_undone(disc):
     free = disc.settings.replace(max_deviation=100.0)
-    relief = disc.relief()
-    result = smooth(relief, free)
+    mesh = disc.mesh()
+    result = smooth(mesh, free)
     assert result.stop in ("a", "b")
-    again = disc.relief()
+    again = disc.mesh()
     limited = smooth(again, free.replace(smooth_passes=result.passes))
     assert limited == (result.passes, "")
-    assert np.array_equal(relief.net.nodes, again.net.nodes)
+    assert np.array_equal(mesh.net.nodes, again.net.nodes)
 
 
 def test_no_pass_leaves_the_grid_as_it_was(disc):
-    relief = disc.relief()
-    before = relief.net.nodes.copy()
-    assert smooth(relief, disc.settings.replace(smooth_passes=0)) == (0, "")
-    assert np.array_equal(relief.net.nodes, before)
+    mesh = disc.mesh()
+    before = mesh.net.nodes.copy()
+    assert smooth(mesh, disc.settings.replace(smooth_passes=0)) == (0, "")
+    assert np.array_equal(mesh.net.nodes, before)
 
 
 def test_a_plate_stays_a_plate_and_its_corners_stay():
     plate = rough_disc(bulge=0.0, corners=True)
-    relief = plate.relief()
-    smooth(relief, plate.settings)
-    after = relief.to_grid(plate.grid)
+    mesh = plate.mesh()
+    smooth(mesh, plate.settings)
+    after = mesh.to_grid(plate.grid)
     assert np.abs(after.nodes[:, 2]).max() < 1e-9
     for corner in plate.corners:
         assert np.abs(after.nodes - corner).max(axis=1).min() == 0.0

@@ -36,7 +36,7 @@ def test_the_first_point_of_each_box_stays(seed, size):
 @pytest.mark.parametrize("room", [1, 64, 1 << 16])
 def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
     points = np.random.default_rng(7).uniform(0, 1, (3000, 3))
-    monkeypatch.setattr(streamline, "PART", 500)
+    monkeypatch.setattr(streamline, "POINTS_PER_THREAD", 500)
     monkeypatch.setattr(streamline, "ROOM", room)
     monkeypatch.setattr(streamline, "MOST_ROOM", room)
     found = []
@@ -50,8 +50,8 @@ def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
 def test_a_scan_as_dense_as_its_patches_need_is_taken_whole():
     assert not is_dense(0.5, 1.0) and is_dense(0.3, 1.0) and not is_dense(0.0, 1.0)
     shape = make("cloth", 20_000, seed=0)
-    sites = sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
-    assert len(sites.surface.points) == 20_000
+    samples = sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
+    assert len(samples.surface.points) == 20_000
 
 
 def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
@@ -59,8 +59,8 @@ def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
     shape = make("l_plate", 300_000, seed=2)
     settings = st.Settings(length=1.5 * shape.length, effort="quick")
     cloud = st.PointCloud.from_array(shape.points)
-    sites = sample_surface(cloud, settings)
-    assert len(sites.surface.points) < 100_000
+    samples = sample_surface(cloud, settings)
+    assert len(samples.surface.points) < 100_000
     grid = st.grid_from_points(shape.points, settings)
     assert (grid.topology.boundary_loops, grid.topology.euler) == (len(shape.loops), shape.euler)
     nodes = grid.nodes + grid.origin
@@ -75,8 +75,8 @@ def test_the_rim_of_a_dense_scan_is_found_with_all_its_points():
     angle, radius = rng.uniform(0, 2 * np.pi, 400_000), 10.0 * np.sqrt(rng.uniform(0, 1, 400_000))
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(400_000)])
     cloud, settings = st.PointCloud.from_array(points), st.Settings(length=2.0)
-    sites = sample_surface(cloud, settings)
-    assert sites.whole is not None and len(sites.surface.points) < 60_000
+    samples = sample_surface(cloud, settings)
+    assert samples.whole is not None and len(samples.surface.points) < 60_000
     (loop,) = boundary_of(cloud, settings).loops
     inside = 10.0 - np.linalg.norm((loop.points + cloud.origin)[:, :2], axis=1)
     assert -0.001 < inside.mean() < 0.012  # a spacing is .016

@@ -248,7 +248,7 @@ def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys):
 
 
 def test_grid_thins_what_is_selected_and_repeats_it(capsys, monkeypatch):
-    monkeypatch.setattr(fit, "FEWEST", 100)
+    monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 100)
     points = plate(20_000)
     Path("a.las").write_bytes(las(points, records=(wkt(BOTH),), classification=np.arange(len(points)) % 3))
     words = ["--length", "4", "--effort", "quick", "--class", "0,1", "--crop", "box:0,0,40,25"]
@@ -260,7 +260,7 @@ def test_grid_thins_what_is_selected_and_repeats_it(capsys, monkeypatch):
     cloud, read = read_thinned("a.las", Settings.read("a.settings.json"))
     held = read_points("a.las", selection=Selection(classes=(0, 1), crop=("box:0,0,40,25",)))
     assert read == len(held.points) and cloud.unit == "m" and cloud.name == "a.las"
-    wanted = thin_points(held.points + held.origin, 0.2, rim=True)
+    wanted = thin_points(held.points + held.origin, 0.2, boundary=True)
     assert np.allclose(cloud.points + cloud.origin, wanted, rtol=0, atol=1e-9)
     assert main(["grid", "a.las", "again.obj", "--settings", "a.settings.json"]) == 0
     assert Path("again.obj").read_bytes() == Path("a.obj").read_bytes()

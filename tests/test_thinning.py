@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from scantruss.errors import InputError
-from scantruss.scan.stream.thinning import Rows, Thinning, nearest_in, nearest_points, points_at_rim, thin_points
+from scantruss.scan.stream.thinning import Rows, Thinning, nearest_in, nearest_points, points_at_boundary, thin_points
 
 pytestmark = pytest.mark.kernels
 
@@ -23,12 +23,12 @@ def scans(draw):
     return np.concatenate([points, points[: count // 4], on_sides]), spacing
 
 
-def in_parts(points, spacing, cuts, *, merged, rim=False):
+def in_parts(points, spacing, cuts, *, merged, boundary=False):
     """Rows of points that are added in parts, or thinned part by part and then put together."""
-    whole = Thinning(spacing, rim=rim)
+    whole = Thinning(spacing, boundary=boundary)
     for part in np.split(points, cuts):
         if merged:
-            own = Thinning(spacing, rim=rim)
+            own = Thinning(spacing, boundary=boundary)
             own.add(part)
             whole.add_rows(own.take_rows())
         else:
@@ -66,9 +66,9 @@ def test_any_order_and_any_parts_give_the_same_bytes(scan, seed):
     rng = np.random.default_rng(seed)
     mixed = points[rng.permutation(len(points))]
     cuts = np.sort(rng.integers(0, len(points), rng.integers(0, 5)))
-    wanted = in_parts(points, spacing, [], merged=False, rim=True)
-    assert same_rows(wanted, in_parts(mixed, spacing, cuts, merged=False, rim=True))
-    assert same_rows(wanted, in_parts(mixed, spacing, cuts, merged=True, rim=True))
+    wanted = in_parts(points, spacing, [], merged=False, boundary=True)
+    assert same_rows(wanted, in_parts(mixed, spacing, cuts, merged=False, boundary=True))
+    assert same_rows(wanted, in_parts(mixed, spacing, cuts, merged=True, boundary=True))
     parts = [nearest_in([part], wanted.rows, spacing) for part in np.split(mixed, cuts)]
     whole = nearest_in([points], wanted.rows, spacing)
     count = len(wanted.rows)
@@ -78,7 +78,7 @@ def test_any_order_and_any_parts_give_the_same_bytes(scan, seed):
 @given(scans())
 def test_extremes_are_the_outermost_points_of_a_box(scan):
     points, spacing = scan
-    rows = in_parts(points, spacing, [], merged=False, rim=True)
+    rows = in_parts(points, spacing, [], merged=False, boundary=True)
     boxes = np.floor(points / spacing).astype(np.int64)
     for row, extremes in zip(rows.rows, rows.extremes.reshape(-1, 6, 3), strict=True):
         mates = points[(boxes == row[:3]).all(axis=1)]
@@ -134,8 +134,8 @@ def plate(count, seed=1):
 
 def test_the_rim_is_kept_and_nothing_but_the_rim():
     points, inside = plate(12_000)
-    rows = in_parts(points, 1.0, [], merged=False, rim=True)
-    kept = points_at_rim(rows, 1.0)
+    rows = in_parts(points, 1.0, [], merged=False, boundary=True)
+    kept = points_at_boundary(rows, 1.0)
     place = {tuple(point): depth for point, depth in zip(points.tolist(), inside, strict=True)}
     depth = np.array([place[tuple(point)] for point in kept.tolist()])  # each is a point of the scan
     assert depth.max() < 2.5
@@ -149,4 +149,4 @@ def test_the_rim_is_kept_and_nothing_but_the_rim():
 
 def test_a_single_point_is_its_own_mean_and_not_kept_twice():
     points = np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.6, 0.5]])
-    assert np.allclose(thin_points(points, 1.0, rim=True), points, atol=1e-9)
+    assert np.allclose(thin_points(points, 1.0, boundary=True), points, atol=1e-9)

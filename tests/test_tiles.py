@@ -99,7 +99,7 @@ def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(way, tmp_path,
     write(path, cloud())
     wanted = np.asarray(READERS[path.suffix](path, ()).points, float)
     for tile, chunk, alone in ((10**9, 10**9, True), (97, 50, False), (250, 64, True), (10, 3, False)):
-        monkeypatch.setattr(chunks, "BLOCK", 24 * chunk)
+        monkeypatch.setattr(chunks, "TEXT_BYTES_PER_BLOCK", 24 * chunk)
         tiles = list(tiles_of([find_source(path)], tile))
         found = [one.points for part in tiles for one in read_ahead(read_chunks(part, None, chunk, alone=alone))]
         both = np.concatenate(found)
@@ -118,13 +118,13 @@ def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path, monkeypatch):
     np.save(tmp_path / "all.npy", points)
     np.save(tmp_path / "tile-2.npy", points[:300])
     write_ply(tmp_path / "tile-10.ply", points[300:])
-    whole = thin_scan([tmp_path / "all.npy"], 2.0, rim=True)
+    whole = thin_scan([tmp_path / "all.npy"], 2.0, boundary=True)
     for names in (["tile-2.npy", "tile-10.ply"], ["tile-10.ply", "tile-2.npy"]):
         for keep in ("mean", "nearest"):
             wanted = thin_scan([tmp_path / "all.npy"], 2.0, keep=keep)
             found = thin_scan([tmp_path / name for name in names], 2.0, keep=keep)
             assert found.points.tobytes() == wanted.points.tobytes() and found.read == wanted.read == COUNT
-    assert whole.rim and len(whole.points) - whole.rim == len(thin_scan([tmp_path / "all.npy"], 2.0).points)
+    assert whole.boundary and len(whole.points) - whole.boundary == len(thin_scan([tmp_path / "all.npy"], 2.0).points)
 
 
 def damaged_las(path):

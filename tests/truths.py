@@ -110,8 +110,8 @@ def scallop() -> Truth:
 
     lift = height(z)
     surface = disc(outline, np.array([0.0, 0.0]), int(55 / (length * STEP)), lift)
-    near_rim = np.array([48.3, 14.0])  # about half a member from the rim: the paper's node a
-    fixed = lift(np.array([near_rim, (-12.0, 15.0), (8.0, -20.0)]))
+    near_boundary = np.array([48.3, 14.0])  # about half a member from the rim: the paper's node a
+    fixed = lift(np.array([near_boundary, (-12.0, 15.0), (8.0, -20.0)]))
     return Truth((surface,), length, count=120_000, corners=lift(ears), fixed=fixed)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 SHORT = 5.0  #: a first call shorter than this is repeated, and the median of the repetitions counts [s]
 MEGA = 1e6
-FEW = 200_000  #: with so many points the neighbour search is done thrice
+SLOW_SEARCH_POINTS = 200_000  #: with so many points the neighbour search is done thrice
 
 
 def memory() -> tuple[float, float]:
@@ -86,7 +86,9 @@ def measured(job: dict[str, Any]) -> dict[str, Any]:
         "seconds": statistics.median(seconds[1:] or seconds),
         "memory": most,
         "added": max(0.0, most - before),  # the points and the work; the programs and their imports not
-        "search": statistics.median(neighbour_search(scan.points) for _ in range(3 if len(scan.points) <= FEW else 1)),
+        "search": statistics.median(
+            neighbour_search(scan.points) for _ in range(3 if len(scan.points) <= SLOW_SEARCH_POINTS else 1)
+        ),
     }
 
 

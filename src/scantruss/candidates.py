@@ -13,11 +13,11 @@ from .check.certify import certified
 from .constraints.ridges import find_ridges
 from .errors import FrontError
 from .front.advance import advance_front
-from .front.orientation_field import Field, Rows
+from .front.orientation_field import Field, FieldStart
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .runtime.parallel import processors
-from .settings import SITE
+from .settings import SAMPLE_SPACING
 from .surface.samples import sample_surface
 from .surface.scratch import with_own_scratch
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from .boundary.find import Boundary
     from .constraints.find import Constraints
     from .grid.grid import Grid
-    from .improve.working_mesh import Relief
+    from .improve.working_mesh import WorkingMesh
     from .scan.cloud import PointCloud
     from .settings import Settings
-    from .surface.samples import Sites
+    from .surface.samples import SurfaceSamples
 
 Progress = Callable[[str, float], None]
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-FINALISTS = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
+FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 POOR = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 BATCHES = 2  # times that finalists are tried
 LENGTHS = (
@@ -51,7 +51,9 @@ class Attempt:
     """One attempt at a grid."""
 
     settings: Settings
-    ways: tuple[Rows, ...] | None = None  #: how its fronts are laid out; None: as the effort of the settings allows
+    starts: tuple[FieldStart, ...] | None = (
+        None  #: how its fronts are laid out; None: as the effort of the settings allows
+    )
 
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
@@ -61,19 +63,19 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
-    sites = sample_surface(cloud, settings)
+    samples = sample_surface(cloud, settings)
     if (
         settings.ridge_angle > 0.0
         and settings.method == "default"
-        and not sites.smooth
-        and find_ridges(sites, settings)
+        and not samples.smooth
+        and find_ridges(samples, settings)
     ):
         settings = settings.replace(ridge_angle=0.0)
         yield from _same_scan(settings)
     if settings.method == "default":
-        if sites.smooth:
-            yield from _same_scan(settings.replace(box_size=SITE))
-        for size in (share * (settings.box_size or SITE) for share in COARSER):
+        if samples.smooth:
+            yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
+        for size in (share * (settings.box_size or SAMPLE_SPACING) for share in COARSER):
             if size <= COARSEST:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
@@ -84,7 +86,7 @@ def _same_scan(settings: Settings) -> Iterator[Attempt]:
     if settings.method == "default":
         yield Attempt(settings)
     for share in LENGTHS:
-        yield Attempt(settings, (Rows(scale=share, laid=False),))
+        yield Attempt(settings, (FieldStart(scale=share, laid=False),))
 
 
 @dataclass(eq=False)
@@ -93,14 +95,14 @@ class Candidate:
 
     front: Grid
     settings: Settings  #: how it is improved
-    relief: Relief
+    mesh: WorkingMesh
     grid: Grid | None = None  #: improved to the end, with its certificate
     fault: FrontError | None = None  #: why it is not to be used
 
     @property
     def energy(self) -> float:
         """The energy that falls, for a node: grids of other numbers of nodes can be compared."""
-        return energy_of_node(self.relief)
+        return energy_of_node(self.mesh)
 
     @property
     def is_poor(self) -> bool:
@@ -109,7 +111,7 @@ class Candidate:
 
 
 def advance_fronts(
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     fields: Sequence[Field],
@@ -127,11 +129,11 @@ def advance_fronts(
     lone = progress if len(fields) == 1 else None
 
     def advance(field: Field) -> Grid | FrontError:
-        way, rows = field
-        own = settings if way.laid else settings.replace(length=way.scale * settings.length)
-        scratch = replace(sites, surface=with_own_scratch(sites.surface))
+        start, nodes = field
+        own = settings if start.laid else settings.replace(length=start.scale * settings.length)
+        scratch = replace(samples, surface=with_own_scratch(samples.surface))
         try:
-            return advance_front(scratch, boundary, constraints, own, rows, progress=lone)
+            return advance_front(scratch, boundary, constraints, own, nodes, progress=lone)
         except FrontError as error:
             return error
 
@@ -144,7 +146,7 @@ def advance_fronts(
 
 def improve_fronts(
     fronts: Sequence[Grid],
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
@@ -156,21 +158,21 @@ def improve_fronts(
         progress("optimize", 0.0)
 
     def improve(front: Grid) -> Candidate:
-        relief = improve_first(front, sites, boundary, constraints, settings)
-        return Candidate(front, settings, relief)
+        mesh = improve_first(front, samples, boundary, constraints, settings)
+        return Candidate(front, settings, mesh)
 
     found = _side_by_side(improve, fronts, _part(progress, "optimize", 0.0, 0.5))
     ordered = sorted(found, key=lambda candidate: candidate.energy) if len(found) > 1 else found
     if settings.effort == "best" and len(ordered) > 1:
         # the first once more as normal ends it: on thin parts annealing may lose
         again = replace(improve(ordered[0].front), settings=settings.replace(effort="normal"))
-        ordered.insert(FINALISTS["best"] - 1, again)
+        ordered.insert(FULLY_IMPROVED["best"] - 1, again)
     return ordered
 
 
 def best_that_passes(
     candidates: Sequence[Candidate],
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
@@ -187,13 +189,13 @@ def best_that_passes(
 
     def finish(candidate: Candidate) -> None:
         try:
-            grid = improve_last(candidate.relief, candidate.front, sites, constraints, candidate.settings)
-            candidate.grid = certified(grid.replace(settings=settings), sites, boundary, settings)
+            grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
+            candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
         except FrontError as error:
             candidate.fault = error
 
     passed: list[Candidate] = []
-    size = FINALISTS[settings.effort]
+    size = FULLY_IMPROVED[settings.effort]
     for begin in range(0, min(len(candidates), BATCHES * size), size):
         batch = candidates[begin : begin + size]
         _side_by_side(finish, batch, _part(progress, "optimize", 0.5, 1.0))
@@ -211,7 +213,7 @@ def best_that_passes(
 
 def optimize_fronts(
     fronts: Sequence[Grid],
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
@@ -219,8 +221,8 @@ def optimize_fronts(
     progress: Progress | None = None,
 ) -> Grid:
     """Return the best grid that comes of some fronts and passes the checks, with its certificate (Sec. 4)."""
-    improved = improve_fronts(fronts, sites, boundary, constraints, settings, progress=progress)
-    return best_that_passes(improved, sites, boundary, constraints, settings, progress=progress)
+    improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)
+    return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
 
 
 def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:

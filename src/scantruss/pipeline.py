@@ -115,13 +115,13 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
         No grid of this attempt passes the checks.
     """
     settings = attempt.settings
-    sites = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
-    sites, boundary = find_boundary(sites, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
-    boundary, constraints = find_constraints(sites, boundary, settings)  # Sec. 4.2, lines, ridges
-    fields = orientation_fields(sites, boundary, settings, attempt.ways)  # Jakob et al. 2015
-    fronts = advance_fronts(sites, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
-    improved = improve_fronts(fronts, sites, boundary, constraints, settings, progress=progress)  # Sec. 4.1
-    return best_that_passes(improved, sites, boundary, constraints, settings, progress=progress)  # certificate
+    samples = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
+    samples, boundary = find_boundary(samples, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
+    boundary, constraints = find_constraints(samples, boundary, settings)  # Sec. 4.2, lines, ridges
+    fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
+    fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
+    improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
+    return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)  # certificate
 
 
 class Stopwatch:

@@ -14,7 +14,10 @@ from typing import Any
 from .errors import InputError
 from .selection import FORMS, RETURNS, Selection
 
-SITE, SMOOTH_SITE = 0.2, 0.3  # distance of the sites of any scan, and of a dense and smooth one, in lengths
+SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING = (
+    0.2,
+    0.3,
+)  # distance of the sites of any scan, and of a dense and smooth one, in lengths
 HOLE = 4.0  # members around the smallest hole worth framing; the front runs over smaller ones
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
@@ -138,8 +141,8 @@ class Settings:
     )
     box_size: float | None = _setting(
         None,
-        f"distance of the sites to which the scan is thinned, in lengths; none: {SITE:g}, where it is dense and smooth"
-        f" {SMOOTH_SITE:g}; search boxes are larger",
+        f"distance of the sites to which the scan is thinned, in lengths; none: {SAMPLE_SPACING:g}, where it is dense and smooth"
+        f" {SMOOTH_SAMPLE_SPACING:g}; search boxes are larger",
         source="Eq. 1",
     )
     thin_spacing: float | None = _setting(
@@ -154,7 +157,7 @@ class Settings:
     drop_repeated: bool = _setting(
         True, "points that repeat another one are left out, where a hundredth of the points or more do", source="Sec. 2"
     )
-    stray_distance: float = _setting(
+    outlier_distance: float = _setting(
         3.0, "points so many times farther from others than their neighbours are left out; 0 keeps all", source="Sec. 2"
     )
     boundary_radius: float = _setting(
@@ -195,7 +198,7 @@ class Settings:
         for name, low, high in (
             ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
             ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
-            ("stray_distance", 0, math.inf),
+            ("outlier_distance", 0, math.inf),
             ("boundary_radius", 0.1, 1), ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
             ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
         ):  # fmt: skip
@@ -233,14 +236,14 @@ class Settings:
         return Selection(**{name: getattr(self, name) for name in names})
 
     @property
-    def closed_rim(self) -> float:
+    def closed_boundary_length(self) -> float:
         """Holes with a rim shorter than this are closed [scan unit]."""
         return HOLE * self.length if self.fill_holes is None else self.fill_holes
 
     @property
-    def bridged_rim(self) -> float:
+    def bridged_boundary_length(self) -> float:
         """Of these, the front just runs over those with a rim shorter than this; the others are filled [scan unit]."""
-        return min(HOLE * self.length, self.closed_rim)
+        return min(HOLE * self.length, self.closed_boundary_length)
 
     def replace(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""

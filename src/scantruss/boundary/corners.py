@@ -8,13 +8,15 @@ import numpy as np
 
 from ..settings import Settings
 
-STEP = 0.05  # distance of the points of a boundary curve, in member lengths
-ROUND = 0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
+CURVE_STEP = 0.05  # distance of the points of a boundary curve, in member lengths
+ROUNDED_OFF = (
+    0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
+)
 CUT = 0.4  # the same where the disc has cut off a sharp re-entrant corner
-REACH = 2.0  # part of the curve at each side that tells the place of a corner, in member lengths
+CORNER_REACH = 2.0  # part of the curve at each side that tells the place of a corner, in member lengths
 SHORTEST = 0.6  # the same where another corner is near
 SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
-APART = 0.5  # corners nearer to each other are one, in member lengths
+CORNER_SPACING = 0.5  # corners nearer to each other are one, in member lengths
 STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
 BENT = 1.3  # a corner turns at most so many times more between the sides as they seem than between quadratics
 SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
@@ -31,7 +33,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
 
     Parameters
     ----------
-    curve : (M, 3) closed curve of steps `STEP * length`
+    curve : (M, 3) closed curve of steps `CURVE_STEP * length`
     settings : Settings
         `corner_angle`, `length`.
     coarser : float
@@ -42,7 +44,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     at : (C,) int64 points of the curve next to the corners
     places : (C, 3) the corners
     """
-    step = STEP / coarser
+    step = CURVE_STEP / coarser
     if len(curve) < 2 * round(SIGHT[1] / step) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
     turn = _turns(curve, step)
@@ -51,17 +53,17 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     found: list[tuple[float, int, np.ndarray]] = []
     peaks = _peaks(turn, enough)
     for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve), step), strict=True):
-        for rounded in (ROUND, CUT) if turn[i] > SHARP else (ROUND,):
+        for rounded in (ROUNDED_OFF, CUT) if turn[i] > SHARP else (ROUNDED_OFF,):
             place, angle = _corner(curve, i, reaches, round(rounded / step))
-            if angle > enough and np.linalg.norm(place - curve[i]) < APART * settings.length:
+            if angle > enough and np.linalg.norm(place - curve[i]) < CORNER_SPACING * settings.length:
                 found.append((angle, i, place))
                 break
-    return _apart(found, APART * settings.length)
+    return _apart(found, CORNER_SPACING * settings.length)
 
 
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
-    """Places (P,) of a closed curve that turn most within `APART` to both sides, and by more than enough."""
-    half = round(APART / STEP)
+    """Places (P,) of a closed curve that turn most within `CORNER_SPACING` to both sides, and by more than enough."""
+    half = round(CORNER_SPACING / CURVE_STEP)
     around = np.concatenate([turn[-half:], turn, turn[:half]])
     highest = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1).max(axis=1)
     peaks = np.flatnonzero((turn >= highest) & (turn > enough))
@@ -80,7 +82,7 @@ def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]
 
 def _reach(room: int, count: int, step: float) -> int:
     """Steps of one side with so much room to the next corner, on a curve of so many steps."""
-    return min(max(room - round(ROUND / step), round(SHORTEST / step)), round(REACH / step), count // 2)
+    return min(max(room - round(ROUNDED_OFF / step), round(SHORTEST / step)), round(CORNER_REACH / step), count // 2)
 
 
 def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -112,7 +114,7 @@ def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) 
 
     Both come from lines where a side is straight; the angle is at most `BENT` times that between quadratics, which tell a bend.
     """
-    half = round(APART / STEP)
+    half = round(CORNER_SPACING / CURVE_STEP)
     centre = at
     for _ in range(3):
         sides = [
@@ -173,7 +175,7 @@ def _meeting(before: np.ndarray, after: np.ndarray) -> np.ndarray:
             change = (bb * ag - ab * bg) / room, (aa * bg - ab * ag) / room
         else:  # parallel: half the way each
             change = 0.5 * ag / max(aa, 1e-300), 0.5 * bg / max(bb, 1e-300)
-        s, t = (min(max(p + c, -0.6 / STEP), 0.6 / STEP) for p, c in zip((s, t), change, strict=True))
+        s, t = (min(max(p + c, -0.6 / CURVE_STEP), 0.6 / CURVE_STEP) for p, c in zip((s, t), change, strict=True))
         if max(map(abs, change)) < 1e-9:
             break
     middle: np.ndarray = 0.5 * (

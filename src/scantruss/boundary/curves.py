@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..kernels.boundary import loops as kernels
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
 
@@ -72,7 +72,7 @@ def _outward(surface: Surface, turns: np.ndarray, ahead: np.ndarray) -> np.ndarr
 def _normals_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
     """Normals of the scan along a closed polyline (M, 3)."""
     normals = np.empty_like(turns)
-    kernels.normals_along(surface, turns, nearest_site(surface, *turns[0].tolist()), normals)
+    kernels.normals_along(surface, turns, nearest_sample(surface, *turns[0].tolist()), normals)
     return normals
 
 

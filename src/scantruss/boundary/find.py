@@ -9,19 +9,19 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels.boundary import loops as kernels
-from ..kernels.boundary.curves import Rim
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.boundary.curves import Curves
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface, walk
 from ..kernels.surface.size_field import lengths_along
 from ..runtime.parallel import in_parts
 from ..scan.normals import check_two_sided
 from ..settings import Settings
-from ..surface.samples import Sites, broad_normals, is_graded, sites_with, with_whole_rim
+from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with, with_whole_boundary
 from ..surface.scratch import with_own_scratch
-from .corners import STEP
+from .corners import CURVE_STEP
 from .curves import cut_spikes, length_around, resample, smooth_turns
 from .holes import fill_holes
-from .offset import ON_THE_EDGE, Chance, chance_of, curve_of_edge
+from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
 
 Progress = Callable[[str, float], None]
@@ -30,7 +30,7 @@ SPIKES = (0.6, 0.3, 0.16)  # tongues and bays narrower than this are cut off, in
 OPEN = 0.6  # share of a loop beside which there must be room for a disc
 NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
 BACK = 16  # steps within which a boundary point that is touched again was never left
-PART = 500  # fewest places of a loop for a thread of their own
+PLACES_PER_THREAD = 500  # fewest places of a loop for a thread of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +85,13 @@ class Boundary:
         return np.concatenate([np.zeros((0, 3)), *(loop.points[loop.stop_at] for loop in self.loops)])
 
     @property
-    def rim(self) -> Rim:
+    def curves(self) -> Curves:
         """The curves of all loops as arrays for the kernels."""
         points = [loop.points for loop in self.loops]
         steps = [np.linalg.norm(np.roll(p, -1, axis=0) - p, axis=1) for p in points]
         arcs = [np.concatenate([[0.0], np.cumsum(s)[:-1]]) for s in steps]
         start = np.cumsum([0, *(len(p) for p in points)]).astype(np.int64)
-        return Rim(
+        return Curves(
             np.concatenate([np.zeros((0, 3)), *points]),
             np.concatenate([np.zeros(0), *arcs]),
             start,
@@ -99,12 +99,14 @@ class Boundary:
         )
 
 
-def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None = None) -> tuple[Sites, Boundary]:
+def find_boundary(
+    samples: SurfaceSamples, settings: Settings, *, progress: Progress | None = None
+) -> tuple[SurfaceSamples, Boundary]:
     """Return the ordered boundary loops of a scan (Sec. 3.3), and its samples with small holes closed (Sec. 3.6).
 
     Parameters
     ----------
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan.
     settings : Settings
         `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`.
@@ -113,7 +115,7 @@ def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None
 
     Returns
     -------
-    sites : Sites
+    samples : SurfaceSamples
         Those given, with made-up ones over the holes that are closed.
     boundary : Boundary
         External loops first, each piece's longest loop being external; empty for a closed surface.
@@ -123,60 +125,60 @@ def find_boundary(sites: Sites, settings: Settings, *, progress: Progress | None
     InputError
         The scan falls apart into pieces that are all smaller than a member.
     """
-    if sites.area == 0.0:
+    if samples.area == 0.0:
         raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
-    check_two_sided(sites.surface, sites.thickness)
+    check_two_sided(samples.surface, samples.thickness)
     if progress:
         progress("boundary", 0.4)
-    loops = _external_first(_find_loops(sites, settings))
-    holes = [loop for loop in loops if loop.length < settings.closed_rim and _is_hole(loop, sites)]
+    loops = _external_first(_find_loops(samples, settings))
+    holes = [loop for loop in loops if loop.length < settings.closed_boundary_length and _is_hole(loop, samples)]
     if holes:
-        made_up = fill_holes(sites, [loop.points for loop in holes])
-        sites = sites_with(sites, made_up, settings)
-        loops = _external_first([loop for loop in _find_loops(sites, settings) if not _over_filling(loop, sites)])
+        made_up = fill_holes(samples, [loop.points for loop in holes])
+        samples = samples_with(samples, made_up, settings)
+        loops = _external_first([loop for loop in _find_loops(samples, settings) if not _over_filling(loop, samples)])
     if progress:
         progress("boundary", 1.0)
-    return sites, Boundary(loops)
+    return samples, Boundary(loops)
 
 
-def _find_loops(sites: Sites, settings: Settings) -> list[Loop]:
+def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
     """All loops but those of small holes, none of them external yet."""
     length = settings.length
-    radius = max(settings.boundary_radius * length, 1.3 * sites.surface.radius, 1.9 * sites.spacing)
-    found: list[tuple[np.ndarray, int, Chance]] = []
-    surface = sites.surface._replace(normals=broad_normals(sites.surface))
-    rolled = boundary_loops(surface, sites.piece, radius, 0.8 * settings.bridged_rim)
-    loops = [(loop, piece) for loop, piece in rolled if piece in sites.pieces]
-    disc = max(0.5 * radius, 2.5 * sites.spacing)
-    slid = boundary_points(sites, surface, [loop for loop, _ in loops], disc, STEP * length)
+    radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
+    found: list[tuple[np.ndarray, int, SamplingBias]] = []
+    surface = samples.surface._replace(normals=broad_normals(samples.surface))
+    rolled = boundary_loops(surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length)
+    loops = [(loop, piece) for loop, piece in rolled if piece in samples.pieces]
+    disc = max(0.5 * radius, 2.5 * samples.spacing)
+    slid = boundary_points(samples, surface, [loop for loop, _ in loops], disc, CURVE_STEP * length)
     for points, (loop, piece) in zip(slid, loops, strict=True):
         if len(points) < 3:
             continue
-        if kernels.open_share(surface, sites.boxes, points, loop[0], radius) < OPEN:
+        if kernels.open_share(surface, samples.boxes, points, loop[0], radius) < OPEN:
             continue
-        curve = resample(points, STEP * length)
+        curve = resample(points, CURVE_STEP * length)
         for width in SPIKES:
-            curve = cut_spikes(surface, curve, width * length, STEP * length)
+            curve = cut_spikes(surface, curve, width * length, CURVE_STEP * length)
         if len(curve) >= 8:
             paper = settings.method == "paper"
-            chance = ON_THE_EDGE if paper else chance_of(surface, points, sites.density, disc)
-            found.append((curve, piece, chance))
+            bias = NO_BIAS if paper else sampling_bias_of(surface, points, samples.density, disc)
+            found.append((curve, piece, bias))
     return [kept for each in found if (kept := smooth_loop(*each, settings, surface)) is not None]
 
 
-def _is_hole(loop: Loop, sites: Sites) -> bool:
+def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
     """Whether a loop bounds a hole: any but the outer rim of a piece, and that too where the piece is nearly closed."""
-    share = float((sites.piece == loop.piece).mean())
-    return not loop.external or share * sites.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
+    share = float((samples.piece == loop.piece).mean())
+    return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
 
-def _over_filling(loop: Loop, sites: Sites) -> bool:
+def _over_filling(loop: Loop, samples: SurfaceSamples) -> bool:
     """Whether a loop runs over what has been made up."""
-    surface, over = sites.surface, 0
-    site = nearest_site(surface, *loop.points[0].tolist())
+    surface, over = samples.surface, 0
+    sample = nearest_sample(surface, *loop.points[0].tolist())
     for place in loop.points:
-        site = walk(surface, site, tuple(place))
-        over += site >= sites.measured
+        sample = walk(surface, sample, tuple(place))
+        over += sample >= samples.measured
     return over > 0.5 * len(loop.points)
 
 
@@ -200,19 +202,19 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
 
 
 def boundary_points(
-    sites: Sites, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
+    samples: SurfaceSamples, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
 ) -> list[np.ndarray]:
     """Return the boundary points (M, 3) along each loop of sites: what a disc slid from outside touches, in order.
 
     Where the surface has only some of the points, the disc slides once more, against all points beside what it touched at first.
     """
     along = [_places_along(surface, loop, step) for loop in loops]
-    if sites.smooth:
+    if samples.smooth:
         # a loop of larger sites cuts re-entrant corners; on a rough scan its own sites are the ones to trust
         for places, near in along:
             kernels.come_nearer(surface, places, near)
     touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
-    dense = with_whole_rim(sites, surface, np.concatenate(touched)) if touched else surface
+    dense = with_whole_boundary(samples, surface, np.concatenate(touched)) if touched else surface
     if dense is not surface:
         touched = [_touch_points(dense, places, near, radius, 8) for places, near in along]
     touched = [
@@ -246,7 +248,7 @@ def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius
         own = surface if part == 0 else with_own_scratch(surface)
         kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
 
-    in_parts(len(places), PART, touch)
+    in_parts(len(places), PLACES_PER_THREAD, touch)
     return touched
 
 
@@ -263,12 +265,12 @@ def _onwards(touched: np.ndarray) -> list[int]:
     return kept
 
 
-def smooth_loop(curve: np.ndarray, piece: int, chance: Chance, settings: Settings, surface: Surface) -> Loop | None:
+def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface) -> Loop | None:
     """Make a loop of a closed curve of equal steps through boundary points; None where it is too short to keep."""
-    smoothed, corner_at = curve_of_edge(curve, chance, settings, surface)
+    smoothed, corner_at = offset_curve(curve, bias, settings, surface)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
-    if (in_lengths if settings.fill_holes is None else length) < settings.bridged_rim:
+    if (in_lengths if settings.fill_holes is None else length) < settings.bridged_boundary_length:
         return None
     return Loop(smoothed, corner_at, False, length, piece, field)
 

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
-from ..surface.samples import Sites
+from ..surface.samples import SurfaceSamples
 
-APART = 0.1  # made-up points lie so far apart, in member lengths
-RIM = 60  # places along a rim from which the surroundings are looked at
-STEP = 0.3  # of these looks, away from the hole, in member lengths
+FILLING_SPACING = 0.1  # made-up points lie so far apart, in member lengths
+PLACES_AROUND_HOLE = 60  # places along a rim from which the surroundings are looked at
+LOOK_STEP = 0.3  # of these looks, away from the hole, in member lengths
 SIGHT = (1.5, 0.25)  # how far they go, in member lengths and in diameters of the hole; the larger counts
 LOST = 0.6  # member lengths from the nearest site at which a look has left the scan
 STEEP = 0.35  # cosine between the surroundings and the loop's own plane under which that plane does not show the hole
-FEW = 12  # places around a hole from which on a plate can be laid through them
+FEWEST_PLACES_FOR_PLATE = 12  # places around a hole from which on a plate can be laid through them
 SMOOTHING = 1e-6  # of the plate against the places it is fitted to, in squared diameters
 
 
-def fill_holes(sites: Sites, curves: list[np.ndarray]) -> np.ndarray:
+def fill_holes(samples: SurfaceSamples, curves: list[np.ndarray]) -> np.ndarray:
     """Return points (F, 3) that continue the surface over holes [scan unit].
 
     Parameters
     ----------
-    sites : Sites
+    samples : SurfaceSamples
     curves : list of (M, 3)
         The closed boundary curve of each hole, of equal steps, the surface to its left.
     """
-    parts = [_fill_hole(sites.surface, curve) for curve in curves]
+    parts = [_fill_hole(samples.surface, curve) for curve in curves]
     return np.concatenate([np.zeros((0, 3)), *parts])
 
 
@@ -40,20 +40,20 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
     length = surface.length
     around = float(np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1).sum())
     start, away, places, normals = _look_around(surface, curve, max(SIGHT[0] * length, SIGHT[1] * around / np.pi))
-    if len(places) < FEW:
+    if len(places) < FEWEST_PLACES_FOR_PLATE:
         return np.zeros((0, 3))
     axis = _axis(curve)
     least = float((normals @ axis).min())
     if least > STEEP:
         frame = _frame(axis)
-        flat, rim = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
+        flat, hole_boundary = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
         fine = min(1.0, 1.5 * least)
     else:  # the hole reaches around a bend: its rim is drawn as a circle, what surrounds it as rings
         radius, turn = around / (2 * np.pi), -2 * np.pi * np.arange(len(curve)) / len(curve)
-        rim = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        flat = rim[start] * (1 + away / radius)[:, None]
+        hole_boundary = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        flat = hole_boundary[start] * (1 + away / radius)[:, None]
         fine = 0.7
-    inside = _lattice(rim, APART * fine * length)
+    inside = _lattice(hole_boundary, FILLING_SPACING * fine * length)
     return _thin_plate(flat, places, inside, SMOOTHING * (around / np.pi) ** 2)
 
 
@@ -70,22 +70,22 @@ def _look_around(
     """
     length, patch = surface.length, np.zeros(PATCH)
     found: list[tuple[int, float, np.ndarray, np.ndarray]] = []
-    site = nearest_site(surface, *curve[0].tolist())
-    for i in range(0, len(curve), max(1, len(curve) // RIM)):
+    sample = nearest_sample(surface, *curve[0].tolist())
+    for i in range(0, len(curve), max(1, len(curve) // PLACES_AROUND_HOLE)):
         ahead = curve[(i + 3) % len(curve)] - curve[i - 3]
-        site = at = walk(surface, site, tuple(curve[i]))
-        place, normal = curve[i], surface.normals[site]
+        sample = at = walk(surface, sample, tuple(curve[i]))
+        place, normal = curve[i], surface.normals[sample]
         out = np.cross(normal, ahead)
-        for k in range(1, int(sight / (STEP * length)) + 1):
+        for k in range(1, int(sight / (LOOK_STEP * length)) + 1):
             out = out - normal * (out @ normal)
-            place = place + STEP * length * out / max(float(np.linalg.norm(out)), 1e-300)
+            place = place + LOOK_STEP * length * out / max(float(np.linalg.norm(out)), 1e-300)
             at = walk(surface, at, tuple(place))
             if np.linalg.norm(surface.mean[at] - place) > LOST * length:
                 break
             fit_patch(surface, patch, at, tuple(place))
             place = np.array(onto_patch(patch, tuple(place)))
             normal = np.array(patch_normal(patch, tuple(place)))
-            found.append((i, k * STEP * length, place, normal))
+            found.append((i, k * LOOK_STEP * length, place, normal))
     start, away = [i for i, _, _, _ in found], [far for _, far, _, _ in found]
     places, normals = ([look[k] for look in found] for k in (2, 3))
     return np.array(start, np.int64), np.array(away), np.array(places), np.array(normals)
@@ -106,15 +106,15 @@ def _frame(axis: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(axis, first)])
 
 
-def _lattice(rim: np.ndarray, step: float) -> np.ndarray:
+def _lattice(hole_boundary: np.ndarray, step: float) -> np.ndarray:
     """Places (F, 2) of a triangular pattern inside a closed polyline (M, 2), half a step from it."""
-    low, high = rim.min(axis=0), rim.max(axis=0)
+    low, high = hole_boundary.min(axis=0), hole_boundary.max(axis=0)
     rows, columns = np.arange(low[1], high[1], step * np.sqrt(0.75)), np.arange(low[0], high[0], step)
     x = columns + 0.5 * step * (np.arange(len(rows)) % 2)[:, None]
     places = np.column_stack([x.ravel(), np.repeat(rows, len(columns))])
-    start, end = rim, np.roll(rim, -1, axis=0)
+    start, end = hole_boundary, np.roll(hole_boundary, -1, axis=0)
     kept = np.zeros(len(places), np.bool_)
-    for part in np.array_split(np.arange(len(places)), 1 + len(places) * len(rim) // 1_000_000):
+    for part in np.array_split(np.arange(len(places)), 1 + len(places) * len(hole_boundary) // 1_000_000):
         p = places[part, None]
         crosses = (start[:, 1] <= p[..., 1]) != (end[:, 1] <= p[..., 1])
         rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])

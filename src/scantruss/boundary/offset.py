@@ -9,52 +9,54 @@ import numpy as np
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
 from ..settings import Settings
-from .corners import STEP, find_corners
+from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, room_across, runs_around, smooth_between
 
 WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
 WIDER = (1.0, 2.0, 3.0)  # the same where that moves the curve no farther than chance did,
-ROUND = 6  # but not wider than a circle with the length of the curve,
-MOVED = 2.0  # inwards about so far at most, in `Chance.beyond`,
+CURVE_PARTS = 6  # but not wider than a circle with the length of the curve,
+MOVED = 2.0  # inwards about so far at most, in `SamplingBias.beyond`,
 BAY = 4.0  # and outwards over bays in which there would be so many points, by half over those with a half more
 ACROSS = 0.6  # where another part of the curve is nearer, in member lengths,
 SIDE = 0.25  # it moves outwards at most by this share of the distance
 EMPTY = 6.0  # a corner in a bay in which there would be no more points is none;
-BESIDE = 1.5  # the bay is that under a line from so far before to so far behind, in member lengths
+BAY_REACH = 1.5  # the bay is that under a line from so far before to so far behind, in member lengths
 FLAT = 0.7  # cosine between the way into a bay and the surface
-BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `chance_of` says
+BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `sampling_bias_of` says
 EXACT = 0.1  # in that distance, how far boundary points that were put on the edge lie over their neighbours at most,
-BY_CHANCE = 0.4  # and those that lie by chance at least
+RANDOM_POINTS = 0.4  # and those that lie by chance at least
 OUT = 0.6  # share of that distance by which the curve moves out: more would put nodes off the surface
-FINE = 0.07  # up to this distance corners show as `corners` says, in member lengths; farther away in proportion,
+CORNERS_SHOW_TO = (
+    0.07  # up to this distance corners show as `corners` says, in member lengths; farther away in proportion,
+)
 COARSEST = 2.0  # at most so many times
 
 
 @dataclass(frozen=True)
-class Chance:
+class SamplingBias:
     """How unevenly the points near the edge lie."""
 
     beyond: float  #: how far the surface goes on beyond the boundary points in the mean [scan unit]
     density: float  #: points to an area
 
 
-ON_THE_EDGE = Chance(0.0, np.inf)
+NO_BIAS = SamplingBias(0.0, np.inf)
 
 
-def chance_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> Chance:
+def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:
     """Return how far the surface goes on beyond its boundary points (M, 3), those that a disc slid from outside touches.
 
     Where points lie by chance, rho to an area, it is `BEYOND` rho^(-2/3) r^(-1/3) in the mean: the disc comes in until there is about
     one point in the segment that it has entered, and that has an area of (4/3) (2 r)^(1/2) h^(3/2). Points that were put on the edge,
     as those of a mesh are, lie on one curve, hardly over the lines through their neighbours: then it is 0.
     """
-    by_chance = BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
-    uneven = float(np.median(np.abs(heights_along(surface, points)))) / by_chance
-    return Chance(by_chance * min(max((uneven - EXACT) / (BY_CHANCE - EXACT), 0.0), 1.0), density)
+    of_random_points = BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
+    uneven = float(np.median(np.abs(heights_along(surface, points)))) / of_random_points
+    return SamplingBias(of_random_points * min(max((uneven - EXACT) / (RANDOM_POINTS - EXACT), 0.0), 1.0), density)
 
 
-def curve_of_edge(
-    curve: np.ndarray, chance: Chance, settings: Settings, surface: Surface
+def offset_curve(
+    curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a closed curve (M, 3) of equal steps through boundary points, the surface to its left, as the surface ends there.
 
@@ -66,40 +68,42 @@ def curve_of_edge(
     smoothed : (K, 3)
     corner_at : (C,) int64, points of it that are corners
     """
-    if chance.beyond == 0.0:
-        (narrow,), corner_at = smooth_between(curve, *find_corners(curve, settings), [round(WINDOW / STEP)])
+    if bias.beyond == 0.0:
+        (narrow,), corner_at = smooth_between(curve, *find_corners(curve, settings), [round(WINDOW / CURVE_STEP)])
         return narrow, corner_at
-    beyond, step = chance.beyond, STEP * settings.length
+    beyond, step = bias.beyond, CURVE_STEP * settings.length
     room = SIDE * room_across(curve, ACROSS * settings.length, step)
     curve = curve + np.minimum(OUT * beyond, room)[:, None] * outward(surface, curve)
-    at, places = _corners(curve, chance, settings, surface)
-    halves = [round(WINDOW / STEP), *(min(round(wide / STEP), len(curve) // ROUND) for wide in WIDER)]
+    at, places = _corners(curve, bias, settings, surface)
+    halves = [round(WINDOW / CURVE_STEP), *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER)]
     (narrow, *wider), corner_at = smooth_between(curve, at, places, halves)
     smoothed, out = narrow, outward(surface, wider[-1])
     room = SIDE * room_across(narrow, ACROSS * settings.length, step)
     for one in wider:
-        share = explained(one - narrow, out, room, chance.density * step, MOVED * beyond)
+        share = explained(one - narrow, out, room, bias.density * step, MOVED * beyond)
         smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
 
 
-def _corners(curve: np.ndarray, chance: Chance, settings: Settings, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def _corners(
+    curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
+) -> tuple[np.ndarray, np.ndarray]:
     """Return where a curve along points that lie by chance has corners, and their places; those in bays that chance explains are none."""
-    coarser = min(max(chance.beyond / (FINE * settings.length), 1.0), COARSEST)
+    coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST)
     at, places = find_corners(curve, settings, coarser)
     if len(at) == 0:
         return at, places
-    kept = bays_at(curve, at, outward(surface, curve)) * chance.density > EMPTY
+    kept = bays_at(curve, at, outward(surface, curve)) * bias.density > EMPTY
     return at[kept], places[kept]
 
 
 def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
     """Return the areas (C,) of the bays that a closed curve (M, 3) of equal steps makes around some of its places (C,).
 
-    They lie between the curve and the straight line over `BESIDE` to both sides; infinite where that is no bay: where the line is not
+    They lie between the curve and the straight line over `BAY_REACH` to both sides; infinite where that is no bay: where the line is not
     outside of the curve but inside, or over it. out : (M, 3) directions outwards.
     """
-    half = round(BESIDE / STEP)
+    half = round(BAY_REACH / CURVE_STEP)
     around = (at[:, None] + np.arange(-half, half + 1)) % len(curve)
     part, outwards = curve[around] - curve[around[:, :1]], out[around].mean(axis=1)
     chord, share = part[:, -1], np.linspace(0.0, 1.0, 2 * half + 1)[:, None]

@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.boundary import loops as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
-from ..scan.normals import SITES
+from ..scan.normals import SAMPLES_PER_THREAD
 from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
@@ -28,24 +28,24 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
         own = surface if part == 0 else with_own_scratch(surface)
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
-    in_parts(len(free), SITES, look)
-    rolls = _Rolls(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
+    in_parts(len(free), SAMPLES_PER_THREAD, look)
+    rolling = _RollingDisc(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
     loops = []
-    for site in np.flatnonzero(free < 9.0).tolist():
-        if rolls.following[site] >= 0:
+    for sample in np.flatnonzero(free < 9.0).tolist():
+        if rolling.following[sample] >= 0:
             continue
-        loop = rolls.loop_at(site, free[site], radius)
+        loop = rolling.loop_at(sample, free[sample], radius)
         if len(loop) < 3 or length_around(surface.mean[loop]) <= least:
             continue  # a small gap is closed over
         loop = np.roll(loop, -int(loop.argmin()))  # wherever the disc began
-        fresh = rolls.following[loop] < 0
-        rolls.following[loop], rolls.preceding[loop] = np.roll(loop, -1), np.roll(loop, 1)
+        fresh = rolling.following[loop] < 0
+        rolling.following[loop], rolling.preceding[loop] = np.roll(loop, -1), np.roll(loop, 1)
         if fresh.mean() > 0.5:
             loops.append((loop, int(piece[loop[0]])))
     return loops
 
 
-class _Rolls:
+class _RollingDisc:
     """The disc rolled from one site after the other, and what it has touched."""
 
     def __init__(self, surface: Surface, radii: np.ndarray, room: int) -> None:
@@ -56,38 +56,38 @@ class _Rolls:
         self.following, self.preceding, self.visit = (np.full(count, -1, np.int64) for _ in range(3))
         self.banned = np.zeros(count, np.bool_)
 
-    def loop_at(self, site: int, direction: float, radius: float) -> np.ndarray:
+    def loop_at(self, sample: int, direction: float, radius: float) -> np.ndarray:
         """Sites of the loop that comes back to its start, empty where there is none.
 
         A disc that crosses from sheet to sheet may be caught in another loop. Rolled the other way round it seldom crosses at the
         same place, so that way is tried next; then the sites that have caught it are left out.
         """
-        centre = kernels.site_disc(self.surface, site, direction, self.radii[site])
+        centre = kernels.sample_disc(self.surface, sample, direction, self.radii[sample])
         means = self.surface.mean
         for _ in range(TRIES):
-            ahead = self._roll(self.surface, site, centre, self.following)
-            if self._is_near(ahead, site, radius):
+            ahead = self._roll(self.surface, sample, centre, self.following)
+            if self._is_near(ahead, sample, radius):
                 return ahead
             touched = np.flatnonzero(self.following >= 0)
-            if len(ahead) == 0 and self._is_near(touched, site, radius):
+            if len(ahead) == 0 and self._is_near(touched, sample, radius):
                 break
-            back = self._roll(self.mirrored, site, centre, self.preceding)[::-1]
-            if self._is_near(back, site, radius):
+            back = self._roll(self.mirrored, sample, centre, self.preceding)[::-1]
+            if self._is_near(back, sample, radius):
                 return back
             if len(ahead) == 0 or length_around(means[ahead]) > TRAP * radius:
                 return ahead
-            self.banned[ahead[ahead != site]] = True
+            self.banned[ahead[ahead != sample]] = True
         return np.zeros(0, np.int64)
 
-    def _roll(self, surface: Surface, site: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
+    def _roll(self, surface: Surface, sample: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
         """Sites of the loop that the disc comes into, empty where it falls off or comes to an earlier loop."""
-        first, last = kernels.roll_disc(surface, site, centre, self.radii, self.path, seen, self.visit, self.banned)
+        first, last = kernels.roll_disc(surface, sample, centre, self.radii, self.path, seen, self.visit, self.banned)
         return self.path[first:last].copy()
 
-    def _is_near(self, sites: np.ndarray, site: int, radius: float) -> bool:
+    def _is_near(self, samples: np.ndarray, sample: int, radius: float) -> bool:
         """Whether any of the sites lies within two radii of a site."""
-        away = self.surface.mean[sites] - self.surface.mean[site]
-        return len(sites) > 0 and float(np.linalg.norm(away, axis=1).min()) < 2.0 * radius
+        away = self.surface.mean[samples] - self.surface.mean[sample]
+        return len(samples) > 0 and float(np.linalg.norm(away, axis=1).min()) < 2.0 * radius
 
 
 def disc_radii(surface: Surface, radius: float) -> np.ndarray:

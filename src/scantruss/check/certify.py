@@ -18,26 +18,28 @@ from .coverage import distances_to_grid, distances_to_scan, places_to_reach
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .irregular import count_irregular
-from .sheets import faults_on_sheets, nodes_of_sites
+from .sheets import faults_on_sheets, nodes_of_samples
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
     from ..kernels.geometry.boxes import SearchBoxes
     from ..settings import Settings
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
 
-REACH = 0.5  #: members from the nearest triangle, or part of the scan, up to which one lies within reach of the other
+COVER_REACH = (
+    0.5  #: members from the nearest triangle, or part of the scan, up to which one lies within reach of the other
+)
 
 
-def certify(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Certificate:
+def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
     """Return the certificate of a grid.
 
     Parameters
     ----------
     grid : Grid
         Of the same origin as the scan.
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan.
     boundary : Boundary
         Boundary loops of the scan.
@@ -52,25 +54,25 @@ def certify(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) ->
     empty = "has no triangles" if len(grid.triangles) == 0 else ""
     if empty or not np.isfinite(grid.nodes).all():
         fault = Fault("empty", empty or "has nodes that are nowhere")
-        return replace(_topology(grid, sites, boundary, settings), faults=(fault,))
+        return replace(_topology(grid, samples, boundary, settings), faults=(fault,))
     length = settings.length
-    places, boxes = places_to_reach(sites, length)
-    nearest, left, told = side_by_side(
-        lambda: nodes_of_sites(grid, sites, length),
+    places, boxes = places_to_reach(samples, length)
+    nearest, left, certificate = side_by_side(
+        lambda: nodes_of_samples(grid, samples, length),
         lambda: distances_to_grid(places, boxes, grid, length),
-        lambda: replace(_topology(grid, sites, boundary, settings), **_extremes(grid, settings)),
+        lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
     )
     cuts = find_crossings(grid.nodes, grid.triangles)
-    told = replace(told, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
-    on_sheets = faults_on_sheets(grid, sites, nearest)
-    told = replace(told, **_from_grid(grid, sites, length, places, left))
-    faults = [*faults_of_topology(grid, told, boundary), *faults_in_space(grid, told, cuts, settings)]
+    certificate = replace(certificate, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
+    on_sheets = faults_on_sheets(grid, samples, nearest)
+    certificate = replace(certificate, **_from_grid(grid, samples, length, places, left))
+    faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     known = {fault.kind for fault in faults}
     faults += [fault for fault in on_sheets if fault.kind not in known]
-    return replace(told, faults=tuple(faults))
+    return replace(certificate, faults=tuple(faults))
 
 
-def certified(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Grid:
+def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
     """Return the grid with its certificate: rather no result than a wrong one that looks right.
 
     Raises
@@ -78,7 +80,7 @@ def certified(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) 
     CertificateError
         The grid does not pass. Names the first place of a fault.
     """
-    certificate = certify(grid, sites, boundary, settings)
+    certificate = certify(grid, samples, boundary, settings)
     grid = grid.replace(certificate=certificate)
     if certificate.passed:
         return grid
@@ -88,17 +90,17 @@ def certified(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) 
     raise CertificateError(f"the grid {words}; {advice}", grid, where)
 
 
-def _topology(grid: Grid, sites: Sites, boundary: Boundary, settings: Settings) -> Certificate:
+def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
     """Return what a grid is and what its scan is, apart from where they lie."""
     found = grid.topology
     closed = found.manifold and found.orientable
     return Certificate(
         unit=grid.unit,
-        reach=REACH * settings.length,
+        reach=COVER_REACH * settings.length,
         manifold=found.manifold,
         orientable=found.orientable,
         pieces=found.components,
-        scan_pieces=len(sites.pieces),
+        scan_pieces=len(samples.pieces),
         boundary_loops=found.boundary_loops,
         scan_loops=len(boundary.loops),
         euler=found.euler,
@@ -112,21 +114,23 @@ def _from_scan(grid: Grid, length: float, places: np.ndarray, boxes: SearchBoxes
     members = np.full(len(middles), length) if grid.desired is None else grid.desired[grid.triangles].mean(axis=1)
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
-    astray, off = away[: len(middles)], away[len(middles) :]
+    off_surface, off = away[: len(middles)], away[len(middles) :]
     if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
         off = np.where(np.isnan(grid.deviation), np.nan, np.fmin(off, grid.deviation))  # not over closed holes
     return {
-        "grid_within_reach": float((astray <= REACH * members).mean()),
-        "farthest_triangle": _worst(astray, middles, grid, length / members),
+        "grid_within_reach": float((off_surface <= COVER_REACH * members).mean()),
+        "farthest_triangle": _worst(off_surface, middles, grid, length / members),
         "node_deviation": _worst(off, grid.nodes, grid, length / at_nodes),
     }
 
 
-def _from_grid(grid: Grid, sites: Sites, length: float, places: np.ndarray, left: np.ndarray) -> dict[str, Any]:
+def _from_grid(
+    grid: Grid, samples: SurfaceSamples, length: float, places: np.ndarray, left: np.ndarray
+) -> dict[str, Any]:
     """Return how far the scan lies from the grid; `left` (P,) is the distance of places (P, 3) of the scan from it."""
-    local = length * sites.surface.field[sites.kept]
+    local = length * samples.surface.field[samples.kept]
     return {
-        "scan_within_reach": float((left <= REACH * local).mean()),
+        "scan_within_reach": float((left <= COVER_REACH * local).mean()),
         "farthest_scan": _worst(left, places, grid, length / local),
     }
 

@@ -11,14 +11,14 @@ from ..kernels.mesh.coverage import lower_distances, nearest_distances, put_plac
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
 
-NEAR = 0.1  #: the first reach of a search, in lengths; most of a scan lies nearer to its grid
+FIRST_REACH = 0.1  #: the first reach of a search, in lengths; most of a scan lies nearer to its grid
 
 
-def places_to_reach(sites: Sites, length: float) -> tuple[np.ndarray, SearchBoxes]:
+def places_to_reach(samples: SurfaceSamples, length: float) -> tuple[np.ndarray, SearchBoxes]:
     """Return the parts of the scan that a grid must reach, (P, 3) [scan unit], and these by box: all pieces that are no debris."""
-    places = np.ascontiguousarray(sites.surface.mean[sites.kept])
+    places = np.ascontiguousarray(samples.surface.mean[samples.kept])
     return places, boxes_of(places, 0.5 * length)
 
 
@@ -34,7 +34,7 @@ def distances_to_grid(places: np.ndarray, boxes: SearchBoxes, grid: Grid, length
 
     Far places are looked for again with ever more reach, so the distances are those to the nearest of all triangles.
     """
-    distance, reach = np.full(len(places), np.inf), NEAR * length
+    distance, reach = np.full(len(places), np.inf), FIRST_REACH * length
     lower_distances(places, boxes, grid.nodes, grid.triangles, reach, distance)
     waiting = np.flatnonzero(np.isinf(distance))
     while len(waiting):

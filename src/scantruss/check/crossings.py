@@ -15,14 +15,14 @@ import numpy as np
 from ..kernels.geometry.boxes import new_boxes
 from ..kernels.mesh.crossings import doubtful_pairs
 
-ENOUGH = 100  #: pairs that cut each other after which no more are looked for
+MOST_CROSSINGS = 100  #: pairs that cut each other after which no more are looked for
 ROOM = 1024  #: pairs that the first search has room for
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
 
 def find_crossings(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return pairs of triangles that have more in common than their shared nodes and members, (P, 2), at most `ENOUGH`.
+    """Return pairs of triangles that have more in common than their shared nodes and members, (P, 2), at most `MOST_CROSSINGS`.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def find_crossings(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     for t, u in whole[_doubtful(nodes, np.ascontiguousarray(triangles[whole]))].tolist():
         if triangles_meet(nodes, triangles[t], triangles[u]):
             found.append((t, u))
-            if len(found) == ENOUGH:
+            if len(found) == MOST_CROSSINGS:
                 break
     return np.array(found, np.int64).reshape(-1, 2)
 

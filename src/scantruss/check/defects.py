@@ -9,7 +9,7 @@ import numpy as np
 
 from ..grid.certificate import Certificate, Fault, Place, place_of
 from ..grid.quality import labels, pinched_nodes
-from .crossings import ENOUGH
+from .crossings import MOST_CROSSINGS
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -17,10 +17,12 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 LEFT_OUT = 0.2  #: share of the scan that a grid may leave out of reach
-ASTRAY = 0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
-UNEVEN = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
+OFF_SURFACE = (
+    0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
+)
+UNEVEN_LENGTHS = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
 FOLDED = 10.0  #: angle between neighbouring triangles below which one lies on the other [degree]
-OFF = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
+FIXED_TOLERANCE = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
 
 
 def faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> list[Fault]:
@@ -79,25 +81,25 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
     faults = []
     if len(crossings):
         pairs = "a pair" if len(crossings) == 1 else f"{len(crossings)} pairs"
-        more = " or more" if len(crossings) == ENOUGH else ""
+        more = " or more" if len(crossings) == MOST_CROSSINGS else ""
         where = place_of(grid.nodes[grid.triangles[crossings[0]]].mean(axis=(0, 1)) + grid.origin)
         faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
     if found.sharpest_fold and found.sharpest_fold.value < FOLDED:
         faults.append(Fault("folded", "is folded over onto itself", found.sharpest_fold.where))
     quality = grid.quality
     uneven = quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
-    if uneven > UNEVEN and found.longest_member:
+    if uneven > UNEVEN_LENGTHS and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
     if 1.0 - found.scan_within_reach > LEFT_OUT and found.farthest_scan:
         faults.append(
             Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
         )
-    gone = ASTRAY + settings.bridged_rim / (2 * math.pi * settings.length)
+    gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     for worst in (found.farthest_triangle, found.node_deviation):
         if worst and worst.value > gone * _length_at(grid, worst.where, settings):
             faults.append(Fault("astray", "covers what the scan does not", worst.where))
             break
-    if found.fixed_error and not found.fixed_error.value <= OFF * settings.length:
+    if found.fixed_error and not found.fixed_error.value <= FIXED_TOLERANCE * settings.length:
         faults.append(Fault("fixed", "has no node at a fixed position", found.fixed_error.where))
     return faults

@@ -29,9 +29,9 @@ def count_irregular(grid: Grid) -> tuple[int, int]:
     members = np.bincount(edges.ravel(), minlength=count)
     angle = np.bincount(grid.triangles.ravel(), grid.angles.ravel(), minlength=count)
     room = np.maximum(np.floor(angle / 60.0 + 0.5), 1.0).astype(np.int64)
-    rim = np.zeros(count, bool)
-    rim[edges[uses != 2].ravel()] = True
-    charge = np.where(rim, room + 1, 6) - members
+    on_boundary = np.zeros(count, bool)
+    on_boundary[edges[uses != 2].ravel()] = True
+    charge = np.where(on_boundary, room + 1, 6) - members
     charge[members == 0] = 0
     piece = labels(count, edges[:, 0], edges[:, 1])
     forced = np.bincount(piece, charge)

@@ -7,55 +7,55 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
-from ..kernels.mesh.sheets import first_torn, nearest_nodes
+from ..kernels.mesh.sheets import first_disconnected, nearest_nodes
 from ..surface.scratch import with_own_scratch
 from .defects import LEFT_OUT
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
 
 COVER = 1.2  #: members from the nearest node on its sheet at which a part of the scan counts as left out
-TORN = 4  #: members from node to node at which their parts of the scan, side by side, count as torn apart
-LINKS = 3  #: so many links between such parts are no chance
+DISCONNECTED = 4  #: members from node to node at which their parts of the scan, side by side, count as torn apart
+FEWEST_LINKS = 3  #: so many links between such parts are no chance
 
 
-def nodes_of_sites(grid: Grid, sites: Sites, length: float) -> np.ndarray:
+def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.ndarray:
     """Return the node nearest to each site on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
-    surface = with_own_scratch(sites.surface)  # grids are certified side by side
-    nearest = np.empty(len(sites.piece), np.int64)
-    nearest_nodes(surface, sites.boxes, grid.nodes, COVER * length, nearest)
+    surface = with_own_scratch(samples.surface)  # grids are certified side by side
+    nearest = np.empty(len(samples.piece), np.int64)
+    nearest_nodes(surface, samples.boxes, grid.nodes, COVER * length, nearest)
     return nearest
 
 
-def faults_on_sheets(grid: Grid, sites: Sites, nearest: np.ndarray) -> list[Fault]:
-    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_sites`."""
-    left = np.flatnonzero((nearest < 0) & sites.kept)
-    share = len(left) / max(int(sites.kept.sum()), 1)
+def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> list[Fault]:
+    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_samples`."""
+    left = np.flatnonzero((nearest < 0) & samples.kept)
+    share = len(left) / max(int(samples.kept.sum()), 1)
     faults = []
     if share > LEFT_OUT:
-        where = place_of(sites.surface.mean[left[0]] + grid.origin)
+        where = place_of(samples.surface.mean[left[0]] + grid.origin)
         faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
-    torn = torn_place(grid, sites, nearest)
-    if torn is not None:
+    disconnected = disconnected_place(grid, samples, nearest)
+    if disconnected is not None:
         words = "is torn where the scan is whole, as at a handle thinner than its members"
-        faults.append(Fault("torn", words, place_of(torn + grid.origin)))
+        faults.append(Fault("torn", words, place_of(disconnected + grid.origin)))
     return faults
 
 
-def torn_place(grid: Grid, sites: Sites, nearest: np.ndarray) -> np.ndarray | None:
+def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> np.ndarray | None:
     """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
 
     Each node has a part of the scan, the sites nearest to it. Where two parts meet, their nodes must be near each other in the grid:
-    joined by fewer than `TORN` members one after the other.
+    joined by fewer than `DISCONNECTED` members one after the other.
 
     Parameters
     ----------
     nearest : (S,) int64
-        Node of each site, as `nodes_of_sites`.
+        Node of each site, as `nodes_of_samples`.
     """
     pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
     ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
-    site = first_torn(sites.surface.neighbors, nearest, first, ends, TORN - 1, LINKS)
-    return sites.surface.mean[site] if site >= 0 else None
+    sample = first_disconnected(samples.surface.neighbors, nearest, first, ends, DISCONNECTED - 1, FEWEST_LINKS)
+    return samples.surface.mean[sample] if sample >= 0 else None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .outputs import claim, cloud_output, inputs_of
-from .shared import note_compiling, read_scan, said_of_cloud_file
+from .shared import cloud_file_notes, note_compiling, read_scan
 
 if TYPE_CHECKING:
     from ..scan.clean.steps import CleanCloud
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
-    "stray-distance": (
+    "outlier-distance": (
         "NUMBER",
         3.0,
         "points so many times farther from others than their neighbours are left out; 0: none",
@@ -30,7 +30,7 @@ SHARES = {  # option, step that it steers, metavar, default, what it is
 }
 KEEP = {
     "duplicates": ("keep-duplicates", "leave repeated points as they are"),
-    "stray-distance": ("keep-strays", "leave stray points as they are"),
+    "outlier-distance": ("keep-outliers", "leave stray points as they are"),
     "loose-pieces": ("keep-pieces", "leave loose small pieces as they are"),
     "layer-distance": ("keep-layers", "leave doubled layers as they are"),
 }
@@ -91,7 +91,7 @@ def clean(values: Namespace) -> None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [str(out), *([str(report)] if report else [])]
-    said = said_of_cloud_file(out, result.unit)
+    said = cloud_file_notes(out, result.unit)
     print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
 
 

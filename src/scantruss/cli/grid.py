@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError
 from .outputs import claim, inputs_of
-from .shared import SCAN, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
+from .shared import SCAN, add_memory, note_compiling, note_outliers, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -115,7 +115,7 @@ def make_grid(
         )
     if grid.settings is not None and grid.settings.method != settings.method:
         bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
-    note_strays(bars, cloud, settings)
+    note_outliers(bars, cloud, settings)
     return grid
 
 

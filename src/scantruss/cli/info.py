@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .shared import SCAN, add_memory, note_compiling, note_strays, read_scan, thin_to_fit
+from .shared import SCAN, add_memory, note_compiling, note_outliers, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -47,9 +47,9 @@ def info(values: Namespace) -> None:
             from ..boundary.find import find_boundary
             from ..surface.samples import sample_surface
 
-            sites, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
-        note_strays(bars, cloud, settings, "scantruss grid")
-    field = sites.surface.field
+            samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
+        note_outliers(bars, cloud, settings, "scantruss grid")
+    field = samples.surface.field
     longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:

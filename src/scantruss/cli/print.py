@@ -51,10 +51,10 @@ def print_solid(values: Namespace) -> None:
         )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
-    print_lines([*solid.notes, *said_of_model(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+    print_lines([*solid.notes, *model_note(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
 
 
-def said_of_model(out: Path, unit: str) -> list[str]:
+def model_note(out: Path, unit: str) -> list[str]:
     """What to say of the unit that a printer will take a model for."""
     if out.suffix.lower() == ".stl" and unit != "mm":
         return [

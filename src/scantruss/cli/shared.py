@@ -39,11 +39,11 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     else:
         cloud = read_points(path, unit=settings.unit, selection=settings.selection)
     bars("read", 1.0)
-    say_of_cloud(bars, cloud)
+    report_cloud(bars, cloud)
     return cloud
 
 
-def say_of_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
+def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
     """Say what was left out of a cloud or converted in it, with its name where it is one of several."""
     said = list(cloud.notes)
     if cloud.dropped:
@@ -52,7 +52,7 @@ def say_of_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> Non
         bars.note(note if name in note else f"{name}: {note}")
 
 
-def said_of_cloud_file(out: Path, unit: str, *, selects: bool = True) -> list[str]:
+def cloud_file_notes(out: Path, unit: str, *, selects: bool = True) -> list[str]:
     """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes.
 
     `selects`: the command has options for taking points by class and return.
@@ -90,17 +90,17 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
+def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
     """Say so where points of the scan were left out, and the option that keeps them, of another command where this one has none."""
     from ..surface.samples import sample_surface
 
-    sites = sample_surface(cloud, settings)
+    samples = sample_surface(cloud, settings)
     say = f"{command} " if command else ""
-    if sites.repeated:
-        bars.note(f"{sites.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")
-    if sites.strays:
-        bars.note(f"{sites.strays:,} stray points are left out; {say}--stray-distance 0 keeps them")
-    pieces, share = sites.left_out
+    if samples.repeated:
+        bars.note(f"{samples.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")
+    if samples.outliers:
+        bars.note(f"{samples.outliers:,} stray points are left out; {say}--outlier-distance 0 keeps them")
+    pieces, share = samples.left_out
     if pieces:
         bars.note(
             f"{pieces:,} of the pieces, {100 * share:.2g} % of the scanned surface, are left out:"
@@ -111,8 +111,8 @@ def note_strays(bars: Bars, cloud: PointCloud, settings: Settings, command: str 
 @contextmanager
 def note_compiling(bars: Bars) -> Iterator[None]:
     """Say so, once a run, when kernels are compiled, which takes long."""
-    from ..runtime.jit import FOLDER, tell_of_compiling
+    from ..runtime.jit import FOLDER, report_compiling
 
     words = "compiling kernels, once on this machine" if FOLDER else "compiling kernels"
-    with tell_of_compiling(lambda: bars.note_once(words)):
+    with report_compiling(lambda: bars.note_once(words)):
         yield

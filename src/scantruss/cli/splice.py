@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..settings import UNITS
 from .outputs import claim, cloud_output, inputs_of
-from .shared import note_compiling, said_of_cloud_file, say_of_cloud
+from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
     from ..report.terminal import Bars
@@ -114,7 +114,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     for place, (file, name) in enumerate(zip(files, names, strict=True)):
         bars("read", place / len(files))
         cloud = read_points(file, unit=values.unit)
-        say_of_cloud(bars, cloud, name)
+        report_cloud(bars, cloud, name)
         clouds.append(cloud)
     with note_compiling(bars):
         result = splice_scans(clouds, names, poses=poses, use_poses=values.use_poses, progress=bars)
@@ -153,11 +153,11 @@ def show_splice(result: Splice, written: list[Path]) -> None:
     ]
     print_table(("pair", "overlap", "agreement", "residual", "in spacings"), rows)
     count, frame = len(result.poses), result.frame or "the poses given"
-    told = f"{count} of {count + len(result.left_out)} scans in the frame of {frame}"
+    line = f"{count} of {count + len(result.left_out)} scans in the frame of {frame}"
     print_lines(
         [
-            f"{told}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
+            f"{line}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
-            *said_of_cloud_file(written[0], result.unit, selects=False),
+            *cloud_file_notes(written[0], result.unit, selects=False),
         ]
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import FormatError, InputError
 from .outputs import Taken, claim, inputs_of, result_folder
 from .shared import add_memory, note_compiling, read_scan, thin_to_fit
-from .thin import _add_workers, _workers
+from .thin import add_workers, workers_of
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -36,7 +36,7 @@ def sweep_parser() -> Parser:
     parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
     parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
     add_memory(parser)
-    _add_workers(parser)
+    add_workers(parser)
     add_settings(parser)
     for action in parser._actions:
         if action.dest not in ("help", "scan", "out", "settings", *ONE) and action.type is not None:
@@ -85,7 +85,7 @@ def sweep(values: Namespace) -> None:
         if fitting.thin_spacing:
             trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
         said = note_compiling(bars)
-        with said, _workers(values, bars, None if len(trials) > 1 else 1) as workers:
+        with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):

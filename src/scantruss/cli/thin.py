@@ -6,13 +6,13 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from .outputs import claim, cloud_output, inputs_of
-from .shared import note_compiling, said_of_cloud_file, say_of_cloud
+from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
     from ..report.terminal import Bars
     from ..runtime.cluster import Workers
     from .options import Parser
-MANY = 20_000_000  # points of which several workers thin a scan by default
+POINTS_FOR_WORKERS = 20_000_000  # points of which several workers thin a scan by default
 
 
 def thin_parser() -> Parser:
@@ -30,13 +30,14 @@ def thin_parser() -> Parser:
     parser.add_argument(
         "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
     )
-    parser.add_argument("--rim", action="store_true", help="also keep the outermost points along the rim")
-    _add_workers(parser)
+    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points along the rim")
+    add_workers(parser)
     add_reading(parser)
     return parser
 
 
-def _add_workers(parser: Parser) -> None:
+def add_workers(parser: Parser) -> None:
+    """Add the options for workers."""
     from .options import whole_number
 
     parser.add_argument(
@@ -60,25 +61,25 @@ def thin(values: Namespace) -> None:
     claim(out, "thinned scan", inputs_of(values))
     scan = open_scan(values.scans, getattr(values, "unit", ""), selection_of(values))
     sources = scan.sources
-    few = sum(source.points for source in sources) < MANY
-    with Bars() as bars, _workers(values, bars, 1 if few else None) as workers:
+    few = sum(source.points for source in sources) < POINTS_FOR_WORKERS
+    with Bars() as bars, workers_of(values, bars, 1 if few else None) as workers:
         for source in sources:
-            if source.whole and source.points > MANY:
+            if source.whole and source.points > POINTS_FOR_WORKERS:
                 bars.note(f"{source.path} cannot be read in parts, so it is read whole")
         with note_compiling(bars):
             result = thin_open_scan(
-                scan, values.spacing, keep=values.keep, rim=values.rim, workers=workers, progress=bars
+                scan, values.spacing, keep=values.keep, boundary=values.boundary, workers=workers, progress=bars
             )
-        say_of_cloud(bars, result)
+        report_cloud(bars, result)
         bars("write", 0.0)
         with SaveTogether() as save:
             write_points(save.beside(out), result.points, unit=result.unit)
-    rim = f", {result.rim:,} of them along the rim" if values.rim else ""
-    told = f"{result.read:,} points thinned to {len(result.points):,}{rim}; wrote {out}"
-    print_lines([told, *said_of_cloud_file(out, result.unit)])
+    boundary = f", {result.boundary:,} of them along the rim" if values.boundary else ""
+    line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {out}"
+    print_lines([line, *cloud_file_notes(out, result.unit)])
 
 
-def _workers(values: Namespace, bars: Bars, count: int | None) -> Workers:
+def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:
     """Return the workers of the command line, and say who they are where they are several."""
     from ..runtime.cluster import NEEDS_DASK, Processes, open_workers
 

@@ -15,7 +15,7 @@ from .ridges import add_ridges, find_ridges
 
 if TYPE_CHECKING:
     from ..settings import Settings
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +26,12 @@ class Constraints:
     lines: Lines = NO_LINES  #: fixed lines and ridges
 
 
-def find_constraints(sites: Sites, boundary: Boundary, settings: Settings) -> tuple[Boundary, Constraints]:
+def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> tuple[Boundary, Constraints]:
     """Return what the grid must keep: fixed nodes, fixed lines and the ridges of the scan; and the boundary with the ends of lines.
 
     Parameters
     ----------
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan.
     boundary : Boundary
     settings : Settings
@@ -49,19 +49,19 @@ def find_constraints(sites: Sites, boundary: Boundary, settings: Settings) -> tu
         A fixed position is farther than half a member from the scan or nearer than that to another; a fixed line is too short or
         leaves the scan.
     """
-    positions = check_positions(settings.fixed, sites, settings.length)
-    lines = find_lines(sites, boundary, settings)
+    positions = check_positions(settings.fixed, samples, settings.length)
+    lines = find_lines(samples, boundary, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
     return Boundary(ended), Constraints(positions, lines)
 
 
-def find_lines(sites: Sites, boundary: Boundary, settings: Settings) -> Lines:
+def find_lines(samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Lines:
     """Return the fixed lines and the ridges of a scan, each a curve that becomes a chain of members."""
-    wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not sites.smooth
-    ridges = find_ridges(sites, settings) if wanted else []
+    wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
+    ridges = find_ridges(samples, settings) if wanted else []
     if not settings.fixed_lines and not ridges:
         return NO_LINES
     network = Network([(loop.points, loop.corner_at) for loop in boundary.loops], settings.length)
-    add_polylines(network, sites, settings)
+    add_polylines(network, samples, settings)
     add_ridges(network, ridges)
     return network.lines()

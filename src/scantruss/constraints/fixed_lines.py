@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, walk
-from ..surface.samples import Sites, distance_from_scan, narrow_surface
+from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
 
 if TYPE_CHECKING:
     from ..settings import Settings
     from .network import Network
 
-STEP = 0.05  # distance of the points of a line, in member lengths
-FINE = 0.005  # what a polyline zigzags by less is straightened before all else, in lengths
+LINE_STEP = 0.05  # distance of the points of a line, in member lengths
+ZIGZAG = 0.005  # what a polyline zigzags by less is straightened before all else, in lengths
 COARSE = 0.03  # ... and before its corners are looked for
 FIT = 120.0  # points of the scan that a patch below a line is fitted to
 RETURN = 1.5  # a line that comes near to itself after so much of it meets itself, in lengths
@@ -26,7 +26,7 @@ SHORTEST = 0.5  # of an open line, in lengths
 SHORTEST_RING = 2.0
 
 
-def add_polylines(network: Network, sites: Sites, settings: Settings) -> None:
+def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings) -> None:
     """Add the user's lines to a network.
 
     Raises
@@ -34,15 +34,17 @@ def add_polylines(network: Network, sites: Sites, settings: Settings) -> None:
     InputError
         A line is too short for the member, or leaves the scan by more than half a member; names the line and the place.
     """
-    patches = narrow_surface(sites, FIT)
+    patches = narrow_surface(samples, FIT)
     for number, line in enumerate(settings.fixed_lines, 1):
-        given = np.array(line, float) - sites.origin
-        _check_on_scan(given, line, number, sites, settings.length)
+        given = np.array(line, float) - samples.origin
+        _check_on_scan(given, line, number, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
-        _check_length(given, closed, number, sites.unit, settings.length)
-        points, vertices = divide(simplify(given, FINE * settings.length, closed), closed, STEP * settings.length)
+        _check_length(given, closed, number, samples.unit, settings.length)
+        points, vertices = divide(
+            simplify(given, ZIGZAG * settings.length, closed), closed, LINE_STEP * settings.length
+        )
         corners = find_corners(points, vertices, closed, settings)
-        points = _onto_scan(points, number, sites, patches, settings.length)
+        points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
             network.add(part, ring, own)
 
@@ -56,12 +58,12 @@ def _text(place: Sequence[float] | np.ndarray) -> str:
 
 
 def _check_on_scan(
-    given: np.ndarray, line: Sequence[Sequence[float]], number: int, sites: Sites, length: float
+    given: np.ndarray, line: Sequence[Sequence[float]], number: int, samples: SurfaceSamples, length: float
 ) -> None:
     """Refuse a line with a point farther than half a member from the scan."""
-    unit = _unit(sites.unit)
+    unit = _unit(samples.unit)
     for k, place in enumerate(given):
-        distance = distance_from_scan(sites.surface, place)
+        distance = distance_from_scan(samples.surface, place)
         if distance > 0.5 * length:
             raise InputError(
                 f"fixed line {number}, point {k + 1} {_text(line[k])} is {distance:.4g}{unit} away from the scan;"
@@ -141,22 +143,22 @@ def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, setting
     return [int(vertices[((places - coarse[k + 1]) ** 2).sum(axis=1).argmin()]) for k in sharp]
 
 
-def _onto_scan(points: np.ndarray, number: int, sites: Sites, surface: Surface, length: float) -> np.ndarray:
+def _onto_scan(points: np.ndarray, number: int, samples: SurfaceSamples, surface: Surface, length: float) -> np.ndarray:
     """Bring the points (M, 3) of a line down onto the scan; refuse a line that leaves it between its own points."""
-    patch, feet, site = np.zeros(PATCH), np.empty_like(points), -1
+    patch, feet, sample = np.zeros(PATCH), np.empty_like(points), -1
     for k, place in enumerate(points.tolist()):
         at = (place[0], place[1], place[2])
-        site = walk(surface, site, at) if site >= 0 else nearest_site(surface, *at)
-        if np.linalg.norm(surface.mean[site] - points[k]) > 0.5 * length:
-            site = nearest_site(surface, *at)
-        fit_patch(surface, patch, site, at)
+        sample = walk(surface, sample, at) if sample >= 0 else nearest_sample(surface, *at)
+        if np.linalg.norm(surface.mean[sample] - points[k]) > 0.5 * length:
+            sample = nearest_sample(surface, *at)
+        fit_patch(surface, patch, sample, at)
         feet[k] = onto_patch(patch, at)
         gap = float(np.linalg.norm(feet[k] - points[k]))
-        beside = float(np.linalg.norm(surface.mean[site] - points[k])) - 2.0 * surface.radius
+        beside = float(np.linalg.norm(surface.mean[sample] - points[k])) - 2.0 * surface.radius
         if (gap := max(gap, beside)) > 0.5 * length:
-            unit = _unit(sites.unit)
+            unit = _unit(samples.unit)
             raise InputError(
-                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + sites.origin)};"
+                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + samples.origin)};"
                 f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
             )
     return feet

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError
-from ..surface.samples import Sites, distance_from_scan, local_field
+from ..surface.samples import SurfaceSamples, distance_from_scan, local_field
 
 
-def check_positions(fixed: Sequence[Sequence[float]] | np.ndarray, sites: Sites, length: float) -> np.ndarray:
+def check_positions(
+    fixed: Sequence[Sequence[float]] | np.ndarray, samples: SurfaceSamples, length: float
+) -> np.ndarray:
     """Return fixed positions relative to the cloud's origin, (K, 3) [scan unit].
 
     Raises
@@ -19,11 +21,11 @@ def check_positions(fixed: Sequence[Sequence[float]] | np.ndarray, sites: Sites,
         A position is farther than length / 2 from the scan, or closer than that to another.
     """
     places = np.array(fixed, float).reshape(-1, 3)
-    unit = f" {sites.unit}" if sites.unit else ""
-    relative = places - sites.origin
+    unit = f" {samples.unit}" if samples.unit else ""
+    relative = places - samples.origin
     for k, place in enumerate(relative):
-        distance = distance_from_scan(sites.surface, place)
-        local = length * local_field(sites.surface, place)
+        distance = distance_from_scan(samples.surface, place)
+        local = length * local_field(samples.surface, place)
         if distance > 0.5 * local:
             raise InputError(
                 f"fixed position {place_text(places[k])} is {distance:.4g}{unit} away from the scan;"

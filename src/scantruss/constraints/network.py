@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..kernels.boundary.curves import Rim, at_arc, nearest_on_rim
+from ..kernels.boundary.curves import Curves, at_arc, nearest_on_curves
 
-NEAR = 0.3  # a line that comes as near as this to the rim or another line meets it, in lengths
+MEETING_DISTANCE = 0.3  # a line that comes as near as this to the rim or another line meets it, in lengths
 AT_END = 0.5  # the same at its ends; and ends that stand out farther over a meeting are more than stubs, in lengths
 ALONGSIDE = 1.2  # where it stays near for longer it runs along: that part is left out, in lengths
-SAME = 0.5  # corners and meetings nearer to each other are one, in lengths
+ONE_STOP = 0.5  # corners and meetings nearer to each other are one, in lengths
 FADE = 0.6  # how far from a meeting a line is bent to it, in lengths
 
 
@@ -30,9 +30,9 @@ class Lines:
     along: tuple[np.ndarray, ...] = ()  #: (K, 3) each, parts of lines that run along the boundary or another line
 
     @cached_property
-    def rim(self) -> Rim:
+    def arrays(self) -> Curves:
         """The curves as arrays for the kernels; all are open but rings without stops."""
-        return rim_of(self.curves, [bool(first < 0) for first, _ in self.ends])
+        return curves_of(self.curves, [bool(first < 0) for first, _ in self.ends])
 
     def stops_on(self, loop: int) -> np.ndarray:
         """Stops (K, 3) on a boundary loop."""
@@ -43,11 +43,11 @@ class Lines:
 NO_LINES = Lines(np.zeros((0, 3)), np.zeros(0, np.int64), (), np.zeros((0, 2), np.int64), np.zeros(0, np.bool_))
 
 
-def rim_of(curves: Sequence[np.ndarray], closed: Sequence[bool]) -> Rim:
-    """Return polylines as arrays for the kernels; see `kernels.boundary.curves.Rim`."""
+def curves_of(curves: Sequence[np.ndarray], closed: Sequence[bool]) -> Curves:
+    """Return polylines as arrays for the kernels; see `kernels.boundary.curves.Curves`."""
     arcs = [np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(c, axis=0), axis=1))]) for c in curves]
     back = [float(np.linalg.norm(c[0] - c[-1])) if ring else 0.0 for c, ring in zip(curves, closed, strict=True)]
-    return Rim(
+    return Curves(
         np.ascontiguousarray(np.concatenate([np.zeros((0, 3)), *curves])),
         np.concatenate([np.zeros(0), *arcs]),
         np.cumsum([0, *(len(c) for c in curves)]).astype(np.int64),
@@ -67,12 +67,12 @@ class Track:
 
     def __post_init__(self) -> None:
         """Prepare the look-up of the nearest place."""
-        self.rim = rim_of([self.points], [self.closed])
-        self.total = float(self.rim.total[0])
+        self.arrays = curves_of([self.points], [self.closed])
+        self.total = float(self.arrays.total[0])
 
     def nearest(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance (M,) of places from the track and the arc length (M,) there."""
-        found = [nearest_on_rim(self.rim, *place) for place in places.tolist()]
+        found = [nearest_on_curves(self.arrays, *place) for place in places.tolist()]
         return np.array([f[2] for f in found]), np.array([f[1] for f in found])
 
     def gap(self, a: float, b: float) -> float:
@@ -93,7 +93,7 @@ class Network:
         for number, (points, corners) in enumerate(loops):
             track = Track(points, True, number)
             for i in corners.tolist():
-                track.stops.append((float(track.rim.arc[i]), self._new_stop(points[i])))
+                track.stops.append((float(track.arrays.arc[i]), self._new_stop(points[i])))
             self.tracks.append(track)
 
     def add(self, points: np.ndarray, closed: bool, corners: Sequence[int], *, sharp: bool = False) -> None:
@@ -118,7 +118,7 @@ class Network:
             order = [(i - far) % len(points) for i in order]
         joints, dropped = self._joints(points, near)
         if closed and not joints:
-            if not near or min(float(distance.max()) for distance, _ in near) > NEAR * self.length:
+            if not near or min(float(distance.max()) for distance, _ in near) > MEETING_DISTANCE * self.length:
                 self._add_track(points, True, order, [], sharp)
             return
         for begin, end in self._pieces(points, closed, joints):
@@ -157,9 +157,9 @@ class Network:
     def _stop_on(self, track: Track, arc: float) -> int:
         """The stop at an arc length of a track: one that is there already, or a new one."""
         gaps = [(track.gap(arc, at), stop) for at, stop in track.stops]
-        if gaps and min(gaps)[0] < SAME * self.length:
+        if gaps and min(gaps)[0] < ONE_STOP * self.length:
             return min(gaps)[1]
-        arc, *place = at_arc(track.rim, 0, float(arc))
+        arc, *place = at_arc(track.arrays, 0, float(arc))
         track.stops.append((arc, self._new_stop(np.array(place))))
         return track.stops[-1][1]
 
@@ -171,8 +171,8 @@ class Network:
             for track in self.tracks:
                 distance, arc = track.nearest(points[at][None])
                 if distance[0] < best:
-                    best, foot = float(distance[0]), np.array(at_arc(track.rim, 0, float(arc[0]))[1:])
-            if NEAR * self.length <= best <= AT_END * self.length:
+                    best, foot = float(distance[0]), np.array(at_arc(track.arrays, 0, float(arc[0]))[1:])
+            if MEETING_DISTANCE * self.length <= best <= AT_END * self.length:
                 points = np.concatenate([foot[None], points] if at == 0 else [points, foot[None]])
                 shift += at == 0
         return points, shift
@@ -185,7 +185,7 @@ class Network:
         found: list[tuple[float, int, int]] = []
         dropped = set()
         for track, (distance, foot) in zip(self.tracks, near, strict=True):
-            for begin, end in _runs(distance < NEAR * self.length):
+            for begin, end in _runs(distance < MEETING_DISTANCE * self.length):
                 if arc[end - 1] - arc[begin] <= ALONGSIDE * self.length:
                     at = begin + int(distance[begin:end].argmin())
                     found.append((float(distance[at]), at, self._stop_on(track, foot[at])))
@@ -197,7 +197,7 @@ class Network:
         kept: list[tuple[int, int]] = []
         for _, at, stop in sorted(found):
             if all(
-                abs(arc[at] - arc[other]) > (1.0 if stop == taken else 0.5 * SAME) * self.length
+                abs(arc[at] - arc[other]) > (1.0 if stop == taken else 0.5 * ONE_STOP) * self.length
                 for other, taken in kept
             ):
                 kept.append((at, stop))
@@ -242,8 +242,8 @@ class Network:
         track = Track(points, closed, sharp=sharp)
         track.stops = list(zip((0.0, track.total), ends, strict=False))
         for i in corners:
-            arc = float(track.rim.arc[i])
-            if all(track.gap(arc, at) >= SAME * self.length for at, _ in track.stops):
+            arc = float(track.arrays.arc[i])
+            if all(track.gap(arc, at) >= ONE_STOP * self.length for at, _ in track.stops):
                 track.stops.append((arc, self._new_stop(points[i])))
         self.tracks.append(track)
 
@@ -255,7 +255,7 @@ class Network:
         pairs = list(pairwise(stops))
         if track.closed:
             pairs.append((stops[-1], (stops[0][0] + track.total, stops[0][1])))
-        arcs = track.rim.arc
+        arcs = track.arrays.arc
         found = []
         for (low, first), (high, last) in pairs:
             inner = np.flatnonzero((arcs > low + 1e-9 * track.total) & (arcs < high - 1e-9 * track.total))

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..kernels.geometry.quadric import COLUMNS
 from ..kernels.surface.local_surface import walk
-from ..kernels.surface.ridges import FOUND, bends_of_sites, fit_fold, keep_folded
+from ..kernels.surface.ridges import FOUND, bends_of_samples, fit_fold, keep_folded
 from ..surface.samples import ALL
-from .fixed_lines import STEP, divide
+from .fixed_lines import LINE_STEP, divide
 
 if TYPE_CHECKING:
     from ..settings import Settings
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
     from .network import Network
 
 RADIUS = 0.8  # points around a place that a folded surface is fitted to, in lengths
@@ -25,7 +25,7 @@ SHARPEST = 125.0  # what bends by more is not folded but turns back: two sheets 
 FADED = 0.2  # a ridge ends where its angle has fallen to this share of that asked for
 GAIN = 10.0  # a fold must fit so much better than a smooth surface (F statistic)
 ROUGHEST = 0.12  # points farther from the fold than this follow neither side, in lengths
-APART = 0.33  # places nearer to each other are not looked at twice, in lengths
+LOOK_SPACING = 0.33  # places nearer to each other are not looked at twice, in lengths
 LONG = 3.0  # a ridge is at least so long,
 FULL = 1.5  # and so long with its full angle, in lengths
 BRIDGE = 4.0  # ends of ridges that face each other are joined over a gap of so many lengths,
@@ -36,32 +36,32 @@ CLEAR = 3  # from so many places before, which are clear of the third side
 EVEN = 2.4  # direction and half the angle of an even ridge change by less from place to place [degree]
 UNSURE = (1.0, 0.45)  # ... or by so many times what the noise explains, angle and direction,
 WIGGLE = 3.5  # if the direction changes by less than this [degree]
-MOST = 4000  # sites that are looked at, the sharpest first
+MOST_SAMPLES = 4000  # sites that are looked at, the sharpest first
 PATIENCE = 40  # places that look folded and are no ridge before no more are looked at: a rough scan
 ROUGH = 0.02  # where the points lie farther from their planes all of them count, in lengths
 MISSED = 2  # places in a row at which a ridge is not seen, and still goes on
 TURNED = 0.94  # cosine of the angle by which a ridge turns at most from place to place
 FARTHEST = 20_000  # most places along a ridge
-OFF = 0.3  # a place farther from the scan than this has left it, in lengths
+OFF_SCAN = 0.3  # a place farther from the scan than this has left it, in lengths
 
 
 class Tracer:
     """Fits folds to a scan and goes along ridges."""
 
-    def __init__(self, sites: Sites, settings: Settings) -> None:
-        rough = np.median(sites.thickness) > ROUGH * settings.length
-        self.surface = sites.surface._replace(patch_points=ALL) if rough else sites.surface
+    def __init__(self, samples: SurfaceSamples, settings: Settings) -> None:
+        rough = np.median(samples.thickness) > ROUGH * settings.length
+        self.surface = samples.surface._replace(patch_points=ALL) if rough else samples.surface
         self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
-        self.radius = max(RADIUS * settings.length, 2.6 * sites.spacing)
+        self.radius = max(RADIUS * settings.length, 2.6 * samples.spacing)
         self.buffer = np.empty((6000, COLUMNS))
 
-    def fold_at(self, site: int, place: np.ndarray, towards: np.ndarray) -> np.ndarray | None:
+    def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray) -> np.ndarray | None:
         """The fold around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits."""
         found = np.zeros(FOUND)
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
-        if not fit_fold(self.surface, site, (x, y, z), (a, b, c), self.radius, self.buffer, found):
+        if not fit_fold(self.surface, sample, (x, y, z), (a, b, c), self.radius, self.buffer, found):
             return None
         if found[7] < GAIN or found[8] > ROUGHEST * self.length:
             return None
@@ -70,13 +70,13 @@ class Tracer:
     def seeds(self) -> np.ndarray:
         """Sites (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
         bends = np.empty(len(self.surface.mean))
-        bends_of_sites(self.surface, bends)
+        bends_of_samples(self.surface, bends)
         likely = np.flatnonzero(bends < np.cos(BEND * self.angle))
-        likely = likely[np.argsort(bends[likely], kind="stable")[:MOST]]
+        likely = likely[np.argsort(bends[likely], kind="stable")[:MOST_SAMPLES]]
         if not len(likely):
             return likely
         note = np.zeros(len(likely), np.int64)
-        least, apart = LIKELY * self.angle, APART * self.length
+        least, apart = LIKELY * self.angle, LOOK_SPACING * self.length
         return likely[: keep_folded(self.surface, likely, self.radius, least, apart, self.buffer, note)]
 
     def trace(self) -> list[np.ndarray]:
@@ -86,27 +86,27 @@ class Tracer:
         places = self.surface.mean[seeds]
         ridges: list[np.ndarray] = []
         misses = 0
-        for k, site in enumerate(seeds.tolist()):
+        for k, sample in enumerate(seeds.tolist()):
             if not fresh[k]:
                 continue
-            fold = self.fold_at(site, places[k], np.zeros(3))
+            fold = self.fold_at(sample, places[k], np.zeros(3))
             misses += 1
             if misses > PATIENCE:
                 break
             if fold is not None and fold[6] > self.angle and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length:
-                folds = self._follow(site, fold, [ridge[:, :3] for ridge in ridges])
+                folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
                 if is_ridge(folds, self.angle):
                     ridges.append(folds)
                     misses = 0
                 for place in folds[:, :3]:
-                    fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * APART * self.length) ** 2
+                    fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
         return ridges
 
-    def _follow(self, site: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+    def _follow(self, sample: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
         """Go along a ridge to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
         sides = []
         for sign in (1.0, -1.0):
-            steps, ring = self._march(site, fold, sign, others)
+            steps, ring = self._march(sample, fold, sign, others)
             sides.append(steps)
             if ring:
                 break
@@ -119,7 +119,7 @@ class Tracer:
         return folds
 
     def _march(
-        self, site: int, fold: np.ndarray, sign: float, others: list[np.ndarray]
+        self, sample: int, fold: np.ndarray, sign: float, others: list[np.ndarray]
     ) -> tuple[list[np.ndarray], bool]:
         """Folds stride by stride to one side of a first one; whether they came back to it."""
         start, ahead, at = fold[:3], sign * fold[3:6], fold
@@ -129,10 +129,10 @@ class Tracer:
         while len(steps) < FARTHEST and missed <= MISSED:
             place = at[:3] + (1 + missed) * STRIDE * self.length * ahead
             x, y, z = place.tolist()
-            site = walk(self.surface, site, (x, y, z))
-            if np.linalg.norm(self.surface.mean[site] - place) > OFF * self.length:
+            sample = walk(self.surface, sample, (x, y, z))
+            if np.linalg.norm(self.surface.mean[sample] - place) > OFF_SCAN * self.length:
                 break
-            after = self.fold_at(site, place, ahead)
+            after = self.fold_at(sample, place, ahead)
             if after is None or not self._goes_on(after, place, ahead):
                 missed += 1
                 continue
@@ -185,9 +185,9 @@ def _smoothed(places: np.ndarray) -> np.ndarray:
     return smooth
 
 
-def find_ridges(sites: Sites, settings: Settings) -> list[tuple[np.ndarray, bool]]:
+def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[tuple[np.ndarray, bool]]:
     """Return the ridges of a scan: places (K, 3) along each, and whether it is a ring; the longest first, rings last."""
-    found = [folds[:, :3] for folds in Tracer(sites, settings).trace()]
+    found = [folds[:, :3] for folds in Tracer(samples, settings).trace()]
     rings = [len(r) > 8 and bool((r[0] == r[-1]).all()) for r in found]
     opened = join_ends([r for r, ring in zip(found, rings, strict=True) if not ring], settings.length)
     opened.sort(key=len, reverse=True)
@@ -197,7 +197,7 @@ def find_ridges(sites: Sites, settings: Settings) -> list[tuple[np.ndarray, bool
 def add_ridges(network: Network, ridges: list[tuple[np.ndarray, bool]]) -> None:
     """Add ridges to a network of lines."""
     for places, ring in ridges:
-        step = STEP * network.length
+        step = LINE_STEP * network.length
         points, _ = divide(np.concatenate([places, places[:1]]) if ring else places, ring, step)
         network.add(points, ring, [], sharp=True)
 

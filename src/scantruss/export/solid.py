@@ -15,7 +15,7 @@ from ..runtime.files import check_place, write_files
 from .solid_files import encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
-BLOCK = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
+PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,10 @@ def _unite(parts: list[Any]) -> Any:
     from manifold3d import Manifold, OpType
 
     while len(parts) > 1:
-        parts = [Manifold.batch_boolean(parts[k : k + BLOCK], OpType.Add) for k in range(0, len(parts), BLOCK)]
+        parts = [
+            Manifold.batch_boolean(parts[k : k + PARTS_PER_UNION], OpType.Add)
+            for k in range(0, len(parts), PARTS_PER_UNION)
+        ]
     return parts[0]
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: 3MF's words for our units; millimeter where it is not known
 UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
-ROUNDS = 32  #: of moving apart
+MOST_ROUNDS = 32  #: of moving apart
 
 CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -63,7 +63,7 @@ def lattice_step(vertices: np.ndarray) -> float:
     return max(size * 2.0**-22, min(2.0**-25, size * 2.0**-16))
 
 
-def put_on_lattice(solid: Solid, rounds: int = ROUNDS) -> tuple[np.ndarray, int]:
+def put_on_lattice(solid: Solid, rounds: int = MOST_ROUNDS) -> tuple[np.ndarray, int]:
     """Return the vertices on the lattice, each at a place of its own, and how many are still at another's place.
 
     Parameters

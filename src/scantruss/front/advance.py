@@ -23,14 +23,14 @@ from ..grid.grid import Grid
 from ..kernels.front import advance as kernels
 from ..kernels.front import front as lists
 from ..kernels.front import gaps
-from ..kernels.front.candidate_nodes import RowNodes, add_still_nodes, offer_nodes
+from ..kernels.front.candidate_nodes import CandidateNodes, add_candidate_nodes, add_still_nodes
 from ..kernels.geometry import boxes as boxing
 from ..kernels.geometry.boxes import new_boxes
 from ..kernels.geometry.triangles import quality
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..settings import Settings
-from ..surface.samples import Sites, local_field
+from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
 Progress = Callable[[str, float], None]
@@ -44,11 +44,11 @@ BUDGET = 500  # segments advanced between two calls of `progress`
 
 
 def advance_front(
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
-    rows: RowNodes | None = None,
+    candidates: CandidateNodes | None = None,
     *,
     progress: Progress | None = None,
 ) -> Grid:
@@ -56,27 +56,27 @@ def advance_front(
 
     Parameters
     ----------
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan.
     boundary : Boundary
     constraints : Constraints
         Fixed nodes, fixed lines and ridges. Method "paper" makes the fixed nodes later.
     settings : Settings
-    rows : RowNodes, optional
+    candidates : CandidateNodes, optional
         Nodes of rows for the front to come to; left out, it makes all nodes itself.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
-    front = start_front(new_front(sites, settings), sites, boundary, constraints, settings, rows)
+    front = start_front(new_front(samples, settings), samples, boundary, constraints, settings, candidates)
     members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
     rules = lists.Rules(
         length=settings.length,
         desired=settings.length,
-        graded=sites.graded,
+        graded=samples.graded,
         length_weight=settings.length_weight,
         shape_weight=settings.shape_weight,
         size_weight=settings.size_weight,
-        search_range=settings.search_range * sites.spacing,
+        search_range=settings.search_range * samples.spacing,
         nearness=settings.nearness,
         merge_angle=float(np.radians(settings.merge_angle)),
         quadrangle=settings.case3 == "quadrangle",
@@ -89,29 +89,29 @@ def advance_front(
         by_cases = settings.method == "paper" and strict == STRICTNESS[0]
         front = run(
             front,
-            sites,
+            samples,
             rules._replace(strict=strict),
             progress,
             kernels.advance_by_cases if by_cases else kernels.advance,
         )
-    close_gaps(front, sites, settings)
+    close_gaps(front, samples, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     check_kept(members, triangles, front.nodes)
     used, numbered = np.unique(triangles, return_inverse=True)
-    desired = settings.length * sites.surface.field[front.site[used]] if sites.graded else None
+    desired = settings.length * samples.surface.field[front.sample[used]] if samples.graded else None
     return Grid(
         front.nodes[used],
         numbered.reshape(-1, 3).astype(np.int64),
         np.zeros(len(used), np.bool_),
-        sites.origin,
-        sites.unit,
+        samples.origin,
+        samples.unit,
         desired=desired,
         lines=np.searchsorted(used, members),
         settings=settings,
     )
 
 
-def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
+def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) -> None:
     """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
 
     Loops of the boundary of which the front has reached no segment are left out. Each turn takes the segments of one loop off the
@@ -122,16 +122,16 @@ def close_gaps(front: lists.Front, sites: Sites, settings: Settings) -> None:
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()
-            length = settings.length * float(sites.surface.field[front.site[front.tail[segments]]].mean())
+            length = settings.length * float(samples.surface.field[front.sample[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
             if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
                 gaps.cut_out(front, segments)
 
 
-def new_front(sites: Sites, settings: Settings) -> lists.Front:
+def new_front(samples: SurfaceSamples, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = sites.surface.mean, int(2.0 * sites.graded_area / (0.433 * settings.length**2)) + 2000
-    usual = settings.length * float(np.sqrt(sites.area / sites.graded_area))
+    mean, room = samples.surface.mean, int(2.0 * samples.graded_area / (0.433 * settings.length**2)) + 2000
+    usual = settings.length * float(np.sqrt(samples.area / samples.graded_area))
     boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), BOX * usual, room, room)
     return _blank(room, boxes)
 
@@ -161,48 +161,48 @@ def grown(front: lists.Front) -> lists.Front:
     larger.count[:] = front.count
     larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
     for n in range(int(front.count[lists.NODES])):
-        if front.site[n] >= 0:  # the others were merged away
+        if front.sample[n] >= 0:  # the others were merged away
             boxing.put(boxes, n, *larger.nodes[n])
     return larger
 
 
 def start_front(
     front: lists.Front,
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
-    rows: RowNodes | None = None,
+    candidates: CandidateNodes | None = None,
 ) -> lists.Front:
     """Put the initial front into the lists: boundary loops, lines, nodes that it may come to, a seed triangle on closed pieces."""
-    surface = sites.surface
+    surface = samples.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
         nodes, _ = characteristic_points(loop, settings.length)
-        rim = np.array(add_nodes(front, surface, nodes), np.int64)
-        lists.add_chain(front, rim, lists.ACTIVE if active else lists.INACTIVE)
+        curves = np.array(add_nodes(front, surface, nodes), np.int64)
+        lists.add_chain(front, curves, lists.ACTIVE if active else lists.INACTIVE)
     add_lines(front, surface, constraints.lines, settings)
     for place in constraints.positions if settings.method != "paper" else ():
         length = settings.length * local_field(surface, place)
-        front = offer(front, surface, nodes_at(place[None], surface, length), NEARER * length)
-    if rows is not None:
-        front = offer(front, surface, rows, CLEAR * settings.length)
+        front = add_candidates(front, surface, nodes_at(place[None], surface, length), NEARER * length)
+    if candidates is not None:
+        front = add_candidates(front, surface, candidates, CLEAR * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
-    bounded |= {int(sites.piece[nearest_site(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
-    for number in sites.pieces:
+    bounded |= {int(samples.piece[nearest_sample(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
+    for number in samples.pieces:
         if number not in bounded:
-            site = int(np.flatnonzero(sites.piece == number)[0])
-            length = settings.length * local_field(surface, surface.mean[site])
-            ids = seed_of_rows(front, surface, site, length)
-            add_seed(front, ids or new_seed(front, surface, site, length))
+            sample = int(np.flatnonzero(samples.piece == number)[0])
+            length = settings.length * local_field(surface, surface.mean[sample])
+            ids = seed_of_candidates(front, surface, sample, length)
+            add_seed(front, ids or new_seed(front, surface, sample, length))
     return front
 
 
-def offer(front: lists.Front, surface: Surface, nodes: RowNodes, clear: float) -> lists.Front:
+def add_candidates(front: lists.Front, surface: Surface, nodes: CandidateNodes, clear: float) -> lists.Front:
     """Offer nodes to a front, which grows until there is room for them."""
     while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
         front = grown(front)
-    offer_nodes(front, surface, nodes, clear)
+    add_candidate_nodes(front, surface, nodes, clear)
     return front
 
 
@@ -219,8 +219,8 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
             at_stop[stop] = add_nodes(front, surface, place[None])[0]
     node_stop = {node: stop for stop, node in at_stop.items()}
     heads = front.head[: front.count[lists.SEGMENTS]].tolist()
-    rim = zip(front.tail[: len(heads)].tolist(), heads, strict=True)
-    beside = ((node_stop[a], node_stop[b]) for a, b in rim if a in node_stop and b in node_stop)
+    curves = zip(front.tail[: len(heads)].tolist(), heads, strict=True)
+    beside = ((node_stop[a], node_stop[b]) for a, b in curves if a in node_stop and b in node_stop)
     taken = {(min(pair), max(pair)) for pair in beside}
     chains = []
     divided = chain_places(lines, surface, settings.length, taken)
@@ -246,30 +246,30 @@ def add_seed(front: lists.Front, ids: list[int]) -> None:
     lists.add_chain(front, np.array([ids[1], ids[0], ids[2]]), lists.ACTIVE)
 
 
-def seed_of_rows(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
     """Return three nodes of the rows near a site that make a good triangle; none where the rows do not offer them."""
     count = int(front.count[lists.NODES])
     free = np.flatnonzero(front.out[:count] < 0)
-    away = np.linalg.norm(front.nodes[free] - surface.mean[site], axis=1)
+    away = np.linalg.norm(front.nodes[free] - surface.mean[sample], axis=1)
     near = free[np.argsort(away, kind="stable")[:12]]
-    near = near[(front.normals[near] @ surface.normals[site] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
+    near = near[(front.normals[near] @ surface.normals[sample] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
     best, ids = 0.8, []
     for a, b, c in combinations(near.tolist(), 3):
         pa, pb, pc = (tuple(front.nodes[q].tolist()) for q in (a, b, c))
         value = quality(pa, pb, pc, length, 0.5, 0.5)
         if value > best:
-            turned = np.dot(np.cross(np.subtract(pb, pa), np.subtract(pc, pa)), surface.normals[site]) < 0
+            turned = np.dot(np.cross(np.subtract(pb, pa), np.subtract(pc, pa)), surface.normals[sample]) < 0
             best, ids = value, [a, c, b] if turned else [a, b, c]
     return ids
 
 
-def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> list[int]:
+def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
     """Add three nodes of a regular triangle around a site."""
     patch = np.zeros(PATCH)
-    centre = surface.mean[site]
-    fit_patch(surface, patch, site, tuple(centre))
+    centre = surface.mean[sample]
+    fit_patch(surface, patch, sample, tuple(centre))
     normal = patch[3:6].copy()
-    towards = surface.mean[surface.neighbors[site, 0]] - centre
+    towards = surface.mean[surface.neighbors[sample, 0]] - centre
     u = towards - normal * (towards @ normal)
     u /= np.linalg.norm(u)
     v = np.cross(normal, u)
@@ -277,7 +277,7 @@ def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
     for angle in np.radians([0.0, 120.0, 240.0]):
         place = centre + length / np.sqrt(3.0) * (np.cos(angle) * u + np.sin(angle) * v)
         own = np.zeros(PATCH)
-        fit_patch(surface, own, site, tuple(place))
+        fit_patch(surface, own, sample, tuple(place))
         foot = onto_patch(own, tuple(place))
         near = walk(surface, int(own[15]), foot)
         ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
@@ -286,12 +286,12 @@ def new_seed(front: lists.Front, surface: Surface, site: int, length: float) -> 
 
 
 def run(
-    front: lists.Front, sites: Sites, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
+    front: lists.Front, samples: SurfaceSamples, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = sites.graded_area / (0.433 * rules.desired**2)
+    expected = samples.graded_area / (0.433 * rules.desired**2)
     while True:
-        status = step(sites.surface, front, rules, BUDGET)
+        status = step(samples.surface, front, rules, BUDGET)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:

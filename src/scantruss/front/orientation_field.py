@@ -10,29 +10,29 @@ from typing import NamedTuple
 import numpy as np
 
 from ..boundary.find import Boundary, Loop, characteristic_points
-from ..kernels.front.candidate_nodes import RowNodes
+from ..kernels.front.candidate_nodes import CandidateNodes
 from ..kernels.geometry.vectors import Vector
 from ..kernels.surface import orientation_field as kernels
 from ..kernels.surface.local_surface import Surface
-from ..kernels.surface.orientation_field import Posts
+from ..kernels.surface.orientation_field import Level
 from ..runtime.parallel import side_by_side, two_at_once
 from ..scan.vectors import dots
 from ..settings import Settings
-from ..surface.samples import Sites
+from ..surface.samples import SurfaceSamples
 
-APART = 0.55  # distance of the posts, in member lengths
+LEVEL_SPACING = 0.55  # distance of the posts, in member lengths
 COARSER = 2.0  # how much farther apart the posts of the next level are
-FEWEST = 12  # posts of the coarsest level
-LINKS = 12  # links of a post
+FEWEST_SAMPLES_OF_A_LEVEL = 12  # posts of the coarsest level
+LINKS_OF_A_SAMPLE = 12  # links of a post
 PASSES = 3  # of smoothing, on each level,
-MANY = 5000  # whose posts are divided where there are so many
+SAMPLES_FOR_THREADS = 5000  # whose posts are divided where there are so many
 WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
 CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
-DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
+CANDIDATE_DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
 
 
 @dataclass(frozen=True)
-class Rows:
+class FieldStart:
     """How the nodes of one front are laid out."""
 
     turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
@@ -41,9 +41,9 @@ class Rows:
 
 
 TURNS = {  # directions of the rows of several fronts
-    "quick": (Rows(),),
-    "normal": tuple(Rows(10.0 * turn) for turn in range(6)),
-    "best": tuple(Rows(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
+    "quick": (FieldStart(),),
+    "normal": tuple(FieldStart(10.0 * turn) for turn in range(6)),
+    "best": tuple(FieldStart(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
 SCALES = {  # lengths of the fronts instead, where the desired length differs from place to place: no rows can be laid
     "quick": (1.0,),
@@ -56,16 +56,16 @@ SMALL = 600.0  # area up to which `normal` tries all its directions, in squares 
 class Field(NamedTuple):
     """What one front comes to."""
 
-    way: Rows
-    nodes: RowNodes | None  #: of its rows; None where the front makes all of its nodes itself
+    start: FieldStart
+    nodes: CandidateNodes | None  #: of its rows; None where the front makes all of its nodes itself
 
 
 class Hierarchy(NamedTuple):
     """The multiresolution hierarchy of a scan, from fine to coarse; see `make_levels`."""
 
-    levels: list[Posts]
+    levels: list[Level]
     owners: list[np.ndarray]  #: for each level the post of each place of the level below (sites at first)
-    shares: list[tuple[np.ndarray, ...]]  #: posts of each level that are smoothed at once
+    independent_sets: list[tuple[np.ndarray, ...]]  #: posts of each level that are smoothed at once
 
     def copy(self) -> Hierarchy:
         """Return it with directions and lattices of its own."""
@@ -73,18 +73,18 @@ class Hierarchy(NamedTuple):
         return self._replace(levels=own)
 
 
-def usual_ways(sites: Sites, settings: Settings) -> tuple[Rows, ...]:
+def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStart, ...]:
     """Return how the fronts are laid out that the effort allows."""
     if settings.method == "paper":
-        return (Rows(laid=False),)
-    if sites.graded:
-        return tuple(Rows(scale=scale, laid=False) for scale in SCALES[settings.effort])
-    large = sites.graded_area > SMALL * settings.length**2
+        return (FieldStart(laid=False),)
+    if samples.graded:
+        return tuple(FieldStart(scale=scale, laid=False) for scale in SCALES[settings.effort])
+    large = samples.graded_area > SMALL * settings.length**2
     return TURNS[settings.effort][: 1 if settings.effort == "normal" and large else None]
 
 
 def orientation_fields(
-    sites: Sites, boundary: Boundary, settings: Settings, ways: Sequence[Rows] | None = None
+    samples: SurfaceSamples, boundary: Boundary, settings: Settings, starts: Sequence[FieldStart] | None = None
 ) -> list[Field]:
     """Return for each front the nodes of rows that it may come to: an orientation and a position field (Jakob et al. 2015).
 
@@ -92,32 +92,34 @@ def orientation_fields(
 
     Parameters
     ----------
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan.
     boundary : Boundary
     settings : Settings
         `length`; `effort` decides how many fields there are.
-    ways : sequence of Rows, optional
+    starts : sequence of FieldStart, optional
         How they are laid out; left out, as the effort allows.
     """
-    ways = usual_ways(sites, settings) if ways is None else ways
+    starts = usual_starts(samples, settings) if starts is None else starts
     closed = 1.0 if boundary.loops else CLOSED
-    scales = {way.scale for way in ways if way.laid}
-    hierarchies = {scale: make_levels(sites.surface, closed * scale * settings.length) for scale in scales}
+    scales = {start.scale for start in starts if start.laid}
+    hierarchies = {scale: make_levels(samples.surface, closed * scale * settings.length) for scale in scales}
 
-    def field_of(way: Rows) -> Field:
-        if not way.laid:
-            return Field(way, None)
-        length = closed * way.scale * settings.length
-        return Field(way, lay_rows(hierarchies[way.scale].copy(), sites, boundary, length, way.turn))
+    def field_of(start: FieldStart) -> Field:
+        if not start.laid:
+            return Field(start, None)
+        length = closed * start.scale * settings.length
+        return Field(start, orientation_field(hierarchies[start.scale].copy(), samples, boundary, length, start.turn))
 
-    return list(side_by_side(*(partial(field_of, way) for way in ways)))
+    return list(side_by_side(*(partial(field_of, start) for start in starts)))
 
 
-def lay_rows(hierarchy: Hierarchy, sites: Sites, boundary: Boundary, length: float, turn: float) -> RowNodes:
+def orientation_field(
+    hierarchy: Hierarchy, samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
+) -> CandidateNodes:
     """Return the nodes of rows of a length [scan unit] that start at an angle [degree] to the longest side of the boundary."""
-    levels, owners, shares = hierarchy
-    start, direction, node = first_row(sites, boundary, length, turn)
+    levels, owners, independent_sets = hierarchy
+    start, direction, node = lattice_start(samples, boundary, length, turn)
     for owner in owners:
         start = int(owner[start])
     kernels.lay_first(levels[-1], start, direction, node, length, np.empty(len(levels[-1].mean), np.int64))
@@ -126,74 +128,76 @@ def lay_rows(hierarchy: Hierarchy, sites: Sites, boundary: Boundary, length: flo
             if k < len(levels) - 1:
                 kernels.hand_down(levels[k + 1], owners[k + 1], levels[k], length)
             for _ in range(PASSES):
-                two_at_once(partial(smooth, levels[k], length), shares[k])
+                two_at_once(partial(smooth, levels[k], length), independent_sets[k])
     return _chosen(levels[0], owners[0], length)
 
 
-def _smooth_directions(posts: Posts, _: float, some: np.ndarray) -> None:
-    kernels.smooth_directions(posts, some)
+def _smooth_directions(level: Level, _: float, some: np.ndarray) -> None:
+    kernels.smooth_directions(level, some)
 
 
-def _chosen(posts: Posts, owner: np.ndarray, length: float) -> RowNodes:
+def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
     """Nodes of the finest posts, each once: those nearest to their posts first."""
-    away = ((posts.node - posts.mean) ** 2).sum(axis=1)
+    away = ((level.node - level.mean) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")
     order = order[away[order] < (WITHIN * length) ** 2]
     chosen, scratch = np.empty(len(away), np.int64), np.full((3, len(away)), -1, np.int64)
     scratch[0] = 0
-    chosen = chosen[: kernels.list_nodes(posts, order, length, DISTANCE * length, chosen, scratch)]
+    chosen = chosen[: kernels.list_nodes(level, order, length, CANDIDATE_DISTANCE * length, chosen, scratch)]
     first = np.empty(len(away), np.int64)
     first[owner[::-1]] = np.arange(len(owner) - 1, -1, -1)
-    return RowNodes(posts.node[chosen], posts.normals[chosen], first[chosen], length)
+    return CandidateNodes(level.node[chosen], level.normals[chosen], first[chosen], length)
 
 
 def make_levels(surface: Surface, length: float) -> Hierarchy:
     """Return the posts of a surface for members of a length [scan unit], level by level from fine to coarse."""
     mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
-    levels: list[Posts] = []
+    levels: list[Level] = []
     owners: list[np.ndarray] = []
-    radius = APART * length
+    radius = LEVEL_SPACING * length
     while True:
         owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
-        count = kernels.choose_posts(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
-        if levels and (count < FEWEST or count > 0.8 * len(mean)):
-            return Hierarchy(levels, owners, [_shares(posts) for posts in levels])
-        posts = Posts(
-            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS), -1, np.int64),
+        count = kernels.choose_level(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
+        if levels and (count < FEWEST_SAMPLES_OF_A_LEVEL or count > 0.8 * len(mean)):
+            return Hierarchy(levels, owners, [_independent_sets(level) for level in levels])
+        level = Level(
+            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS_OF_A_SAMPLE), -1, np.int64),
             np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
         )  # fmt: skip
-        kernels.link_posts(mean, normals, neighbors, owner, posts)
-        levels.append(posts)
+        kernels.link_level(mean, normals, neighbors, owner, level)
+        levels.append(level)
         owners.append(owner)
-        mean, normals, neighbors = posts.mean, posts.normals, posts.neighbors
+        mean, normals, neighbors = level.mean, level.normals, level.neighbors
         radius *= COARSER
 
 
-def _shares(posts: Posts) -> tuple[np.ndarray, ...]:
+def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
     """Posts that two threads may smooth at once, and those between, which depend on both; few posts are not divided."""
-    count = len(posts.mean)
-    if count < MANY:
+    count = len(level.mean)
+    if count < SAMPLES_FOR_THREADS:
         return (np.arange(count),)
     away, queue = np.empty((2, count), np.int64), np.empty(count, np.int64)
-    end = kernels.links_away(posts.neighbors, 0, away[0], queue)  # of the links, not of where the scan lies
-    kernels.links_away(posts.neighbors, kernels.links_away(posts.neighbors, end, away[0], queue), away[1], queue)
+    end = kernels.links_away(level.neighbors, 0, away[0], queue)  # of the links, not of where the scan lies
+    kernels.links_away(level.neighbors, kernels.links_away(level.neighbors, end, away[0], queue), away[1], queue)
     ahead = away[0] - away[1]
     late = ahead > np.median(ahead)
-    across = (posts.neighbors >= 0) & (late[posts.neighbors] != late[:, None])
+    across = (level.neighbors >= 0) & (late[level.neighbors] != late[:, None])
     between = across.any(axis=1)
-    between[posts.neighbors[across]] = True
+    between[level.neighbors[across]] = True
     return np.flatnonzero(~late & ~between), np.flatnonzero(late & ~between), np.flatnonzero(between)
 
 
-def first_row(sites: Sites, boundary: Boundary, length: float, turn: float) -> tuple[int, Vector, Vector]:
+def lattice_start(
+    samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
+) -> tuple[int, Vector, Vector]:
     """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
 
     On a closed surface they start anywhere.
     """
-    surface = sites.surface
+    surface = samples.surface
     if not boundary.loops:
-        site = int(np.flatnonzero(sites.piece == sites.pieces[0])[0])
-        ahead, place = surface.mean[max(surface.neighbors[site, 0], 0)] - surface.mean[site], surface.mean[site]
+        sample = int(np.flatnonzero(samples.piece == samples.pieces[0])[0])
+        ahead, place = surface.mean[max(surface.neighbors[sample, 0], 0)] - surface.mean[sample], surface.mean[sample]
     else:
         loop, at = longest_side(boundary.loops)
         count = len(loop.points)
@@ -203,12 +207,12 @@ def first_row(sites: Sites, boundary: Boundary, length: float, turn: float) -> t
         half = min(round(length / np.linalg.norm(loop.points[(at + 1) % count] - middle)), count // 4)
         ahead = loop.points[(at + half) % count] - loop.points[at - half]
         arm = surface.mean - place
-        site = int(dots(arm, arm).argmin())
-    normal = surface.normals[site]
+        sample = int(dots(arm, arm).argmin())
+    normal = surface.normals[sample]
     ahead = ahead - normal * (ahead @ normal)
     angle = np.radians(turn)
     ahead = np.cos(angle) * ahead + np.sin(angle) * np.cross(normal, ahead)
-    return site, (*ahead.tolist(),), (*place.tolist(),)
+    return sample, (*ahead.tolist(),), (*place.tolist(),)
 
 
 def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
@@ -224,8 +228,8 @@ def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
     return found
 
 
-def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> RowNodes:
+def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> CandidateNodes:
     """Return nodes at appointed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
-    sites = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
-    near = np.linalg.norm(surface.mean[sites] - positions, axis=1) < length
-    return RowNodes(np.ascontiguousarray(positions[near]), surface.normals[sites[near]], sites[near], length)
+    samples = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
+    near = np.linalg.norm(surface.mean[samples] - positions, axis=1) < length
+    return CandidateNodes(np.ascontiguousarray(positions[near]), surface.normals[samples[near]], samples[near], length)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .quality import GridQuality, Topology
 
 
-TOLD = {"settings", "before", "certificate", "seconds"}  # fields that no figure of a grid depends on
+PROVENANCE = {"settings", "before", "certificate", "seconds"}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
 }  # fmt: skip
@@ -50,7 +50,7 @@ class Grid:
             changes = {"certificate": None, **changes}
         copy = replace(self, **changes)
         known = {name: value for name, value in vars(self).items() if name not in vars(copy)}
-        if changes.keys() <= TOLD:
+        if changes.keys() <= PROVENANCE:
             vars(copy).update(known)
         elif "triangles" not in changes and len(copy.nodes) == len(self.nodes):
             vars(copy).update({name: known[name] for name in OF_TRIANGLES & known.keys()})

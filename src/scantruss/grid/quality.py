@@ -185,10 +185,10 @@ def measure_topology(grid: Grid) -> Topology:
         return Topology(components=0, boundary_loops=0, euler=0, manifold=True, orientable=True)
     node = labels(len(grid.nodes), edges[:, 0], edges[:, 1])
     used = np.unique(triangles)
-    rim = edges[uses == 1]
-    rim_label = labels(len(grid.nodes), rim[:, 0], rim[:, 1])
-    passages = np.bincount(rim.ravel(), minlength=len(grid.nodes)) // 2
-    loops = len(np.unique(rim_label[rim[:, 0]])) + int(np.maximum(passages - 1, 0).sum())
+    boundary_edges = edges[uses == 1]
+    boundary_label = labels(len(grid.nodes), boundary_edges[:, 0], boundary_edges[:, 1])
+    passages = np.bincount(boundary_edges.ravel(), minlength=len(grid.nodes)) // 2
+    loops = len(np.unique(boundary_label[boundary_edges[:, 0]])) + int(np.maximum(passages - 1, 0).sum())
     a, b, c = np.sort(triangles, axis=1).T
     order = np.lexsort((c, b, a))
     twice = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)

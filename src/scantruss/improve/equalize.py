@@ -23,31 +23,31 @@ from ..kernels.mesh.partition import BETWEEN
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..runtime.parallel import two_at_once
 from .flips import flip_by_angle
-from .partition import Halves
-from .working_mesh import NEAR, Relief
+from .partition import Partition
+from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
 WEIGHT = 1.0  # of the members beside the triangles
 EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
 LAST_SWEEPS = (12, 6)  # most of these, each time with new patches,
 LAST_STRIDE = 1.75  # and their steps: what is uneven in the large goes slowly (successive over-relaxation)
 PRICE = 24.0  # of a mean length that is not the desired one
-SHARE = 0.1  # most energy that a node may have anyway
+USUAL_ENERGY = 0.1  # most energy that a node may have anyway
 SEARCHES = 6  # rounds over all nodes that ask for a move
-MANY = 2500  # nodes from which on halves settle side by side (of fewer, threads would wait for each other as long as they gain),
+MANY_NODES = 2500  # nodes from which on halves settle side by side (of fewer, threads would wait for each other as long as they gain),
 AT_ONCE = 2  # so many sweeps until those between follow
 ASKING = 200  # nodes asking for a move from which on halves of the grid are searched side by side
-FAR = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
+FARTHEST_ON_THE_WAY = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
 
 
-def new_scratch(relief: Relief) -> Scratch:
+def new_scratch(mesh: WorkingMesh) -> Scratch:
     """Return room for the trials of the search, with the numbers of neighbours that suit the nodes."""
-    suit_nodes(relief.net)
-    return blank_scratch(relief)
+    suit_nodes(mesh.net)
+    return blank_scratch(mesh)
 
 
-def blank_scratch(relief: Relief) -> Scratch:
+def blank_scratch(mesh: WorkingMesh) -> Scratch:
     """Return room for the trials of the search."""
-    capacity, width = relief.net.ring.shape
+    capacity, width = mesh.net.ring.shape
     return Scratch(
         held=np.zeros(capacity, np.int64),
         tried=np.zeros(capacity, np.int64),
@@ -64,77 +64,77 @@ def blank_scratch(relief: Relief) -> Scratch:
     )
 
 
-def shares_of(net: Net) -> list[np.ndarray]:
+def independent_sets_of(net: Net) -> list[np.ndarray]:
     """Return the nodes of a net to settle: those of both halves, which may move at once, and those between; all of a small one."""
     live = net.degree > 0
     every = np.flatnonzero(live)
-    if len(every) < MANY:
+    if len(every) < MANY_NODES:
         return [every]
-    label = Halves(net, live).label[every]
+    label = Partition(net, live).label[every]
     return [every[label == part] for part in (0, 1, BETWEEN)]
 
 
 def settle(
-    relief: Relief,
+    mesh: WorkingMesh,
     weight: float,
     enough: float,
     sweeps: int,
     stride: float = STRIDE,
-    shares: list[np.ndarray] | None = None,
+    independent_sets: list[np.ndarray] | None = None,
 ) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made.
 
-    Halves of the net, or the `shares` that it has had since its members last changed, move side by side, a few sweeps at once.
+    Halves of the net, or the `independent_sets` that it has had since its members last changed, move side by side, a few sweeps at once.
     """
-    shares = shares_of(relief.net) if shares is None else shares
-    awake, count = np.ones(len(relief.net.degree), np.int64), sum(map(len, shares))
-    at_once = sweeps if len(shares) == 1 else AT_ONCE
+    independent_sets = independent_sets_of(mesh.net) if independent_sets is None else independent_sets
+    awake, count = np.ones(len(mesh.net.degree), np.int64), sum(map(len, independent_sets))
+    at_once = sweeps if len(independent_sets) == 1 else AT_ONCE
 
     def move(some: np.ndarray) -> tuple[float, int]:
-        of_grid = relief.net, relief.patches, relief.rim, awake, some, relief.length
+        of_grid = mesh.net, mesh.patches, mesh.curves, awake, some, mesh.length
         return settle_some(*of_grid, weight, enough, at_once, stride)
 
     for made in range(0, sweeps, at_once):
-        gains, done = zip(*two_at_once(move, shares), strict=True)
+        gains, done = zip(*two_at_once(move, independent_sets), strict=True)
         if sum(gains) < enough * count:
             return made + max(done)
     return sweeps
 
 
-def settle_again(relief: Relief) -> None:
+def settle_again(mesh: WorkingMesh) -> None:
     """Settle after a round of moves: the nodes have left the middles of their patches."""
-    relief.renew(FAR)
-    settle(relief, WEIGHT, 1e-4, 8)
+    mesh.renew(FARTHEST_ON_THE_WAY)
+    settle(mesh, WEIGHT, 1e-4, 8)
 
 
-def search_once(relief: Relief, scratch: Scratch) -> int:
+def search_once(mesh: WorkingMesh, scratch: Scratch) -> int:
     """Try flips, collapses and splits where nodes ask for them; returns how many were kept.
 
     Where many ask, those of two halves of the grid are tried side by side, then those between.
     """
-    net, kept = relief.net, 0
+    net, kept = mesh.net, 0
     asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.tried[:] == 0)
     if asking.sum() >= ASKING:
-        kept = _search_halves(relief, Halves(net, asking), scratch)
-    terms = terms_of(relief, scratch)
-    return kept + _search(relief, net, scratch, terms)
+        kept = _search_partition(mesh, Partition(net, asking), scratch)
+    terms = terms_of(mesh, scratch)
+    return kept + _search(mesh, net, scratch, terms)
 
 
-def _search_halves(relief: Relief, halves: Halves, scratch: Scratch) -> int:
+def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch) -> int:
     """Search in both halves at once, each with half of the nodes that bring the mean length to the desired one."""
-    terms = terms_of(relief, scratch)
+    terms = terms_of(mesh, scratch)
     terms = terms._replace(nodes=terms.nodes // 2)
-    own = [blank_scratch(relief), blank_scratch(relief)]
+    own = [blank_scratch(mesh), blank_scratch(mesh)]
     for side in (0, 1):
-        own[side].out[:] = halves.label != side
-    halves.run(lambda side: _search(relief, halves.nets[side], own[side], terms))
+        own[side].out[:] = partition.label != side
+    partition.run(lambda side: _search(mesh, partition.nets[side], own[side], terms))
     for side in (0, 1):
-        scratch.tried[halves.label == side] = own[side].tried[halves.label == side]
+        scratch.tried[partition.label == side] = own[side].tried[partition.label == side]
     return sum(int(room.paid[0]) for room in own)
 
 
-def _search(relief: Relief, net: Net, scratch: Scratch, terms: Terms) -> int:
-    of_grid = relief.patches, relief.rim, scratch, relief.length
+def _search(mesh: WorkingMesh, net: Net, scratch: Scratch, terms: Terms) -> int:
+    of_grid = mesh.patches, mesh.curves, scratch, mesh.length
     return search(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes)
 
 
@@ -146,10 +146,10 @@ class Terms(NamedTuple):
     nodes: int  #: how many there are
 
 
-def terms_of(relief: Relief, scratch: Scratch) -> Terms:
+def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     """Return the terms of a whole grid as it is now."""
-    energy, mean, count = total_energy(relief.net, scratch, relief.length, WEIGHT)
-    return Terms(mean / relief.length - 1.0, min(energy / max(count, 1), SHARE), max(count, 1))
+    energy, mean, count = total_energy(mesh.net, scratch, mesh.length, WEIGHT)
+    return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), USUAL_ENERGY), max(count, 1))
 
 
 def grid_energy(grid: Grid, length: float) -> float:
@@ -160,29 +160,29 @@ def grid_energy(grid: Grid, length: float) -> float:
     return WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
 
 
-def energy_of_node(relief: Relief) -> float:
+def energy_of_node(mesh: WorkingMesh) -> float:
     """The energy that falls, of an opened grid, for one node: grids of other numbers of nodes can be compared."""
-    energy, mean, count = total_energy(relief.net, new_scratch(relief), relief.length, WEIGHT)
-    return energy / max(count, 1) + PRICE * (mean / relief.length - 1.0) ** 2
+    energy, mean, count = total_energy(mesh.net, new_scratch(mesh), mesh.length, WEIGHT)
+    return energy / max(count, 1) + PRICE * (mean / mesh.length - 1.0) ** 2
 
 
-def equalize(relief: Relief, progress: Callable[[float], None] | None = None) -> None:
+def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle, and search while it pays: the default way to improve a grid."""
-    flip_by_angle(relief.net)
-    settle(relief, WEIGHT, 1e-3, 60)
-    scratch = new_scratch(relief)
+    flip_by_angle(mesh.net)
+    settle(mesh, WEIGHT, 1e-3, 60)
+    scratch = new_scratch(mesh)
     for done in range(SEARCHES):
         if progress:
             progress(0.2 + 0.4 * done / SEARCHES)
-        if search_once(relief, scratch) == 0:
+        if search_once(mesh, scratch) == 0:
             break
-        settle_again(relief)
+        settle_again(mesh)
 
 
-def finish(relief: Relief, prefer: str = "balance") -> None:
+def finish(mesh: WorkingMesh, prefer: str = "balance") -> None:
     """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
-    shares = shares_of(relief.net)
+    independent_sets = independent_sets_of(mesh.net)
     for sweeps in LAST_SWEEPS:
-        relief.renew(NEAR)
-        settle(relief, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE, shares)
-    relief.return_to_scan(NEAR)
+        mesh.renew(NEAR_IN_THE_END)
+        settle(mesh, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE, independent_sets)
+    mesh.return_to_scan(NEAR_IN_THE_END)

@@ -6,35 +6,35 @@ import numpy as np
 
 from ..constraints.fixed_nodes import place_text
 from ..errors import InputError
-from ..kernels.boundary.curves import nearest_on_rim
-from ..kernels.mesh.grid import REST, RIM, may_split, split
-from ..kernels.mesh.point_location import nearest_site
+from ..kernels.boundary.curves import nearest_on_curves
+from ..kernels.mesh.grid import ON_CURVE, REST, may_split, split
+from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..surface.samples import local_field
-from .equalize import FAR, WEIGHT, new_scratch, search_once, settle
-from .working_mesh import Relief
+from .equalize import FARTHEST_ON_THE_WAY, WEIGHT, new_scratch, search_once, settle
+from .working_mesh import WorkingMesh
 
-AT_RIM = 0.33  # a position this near to the boundary becomes a boundary node, in lengths
-SAME = 1e-6  # a node this near already stands there, in lengths
+AT_BOUNDARY = 0.33  # a position this near to the boundary becomes a boundary node, in lengths
+SAME_PLACE = 1e-6  # a node this near already stands there, in lengths
 CHOICES = 3  # nodes, and edges, that are tried
 
 
-def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
+def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
     """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary or line that it is at.
 
     A place nearer to a corner than that is the corner: between two nodes so near to each other no triangle is sound.
     """
-    net = relief.net
+    net = mesh.net
     free = (net.degree > 0) & (net.kind < REST)
-    corners = np.flatnonzero((net.degree > 0) & (net.kind == REST) & ~relief.fixed)
+    corners = np.flatnonzero((net.degree > 0) & (net.kind == REST) & ~mesh.fixed)
     away = np.linalg.norm(net.nodes[corners] - place, axis=1)
-    if len(away) and away.min() < AT_RIM * relief.length:
+    if len(away) and away.min() < AT_BOUNDARY * mesh.length:
         return corners[[away.argmin()]]
-    curve, _, distance = nearest_on_rim(relief.rim, *place.tolist())
-    local = relief.length * local_field(relief.surface, place)
-    on_line = (net.kind == RIM) & (net.is_open == 0)
-    near = (net.kind == RIM) & (~on_line | (net.curve == curve))
-    if curve >= 0 and distance <= AT_RIM * local and np.any(free & near):
+    curve, _, distance = nearest_on_curves(mesh.curves, *place.tolist())
+    local = mesh.length * local_field(mesh.surface, place)
+    on_line = (net.kind == ON_CURVE) & (net.is_open == 0)
+    near = (net.kind == ON_CURVE) & (~on_line | (net.curve == curve))
+    if curve >= 0 and distance <= AT_BOUNDARY * local and np.any(free & near):
         free &= near
     else:
         free &= ~on_line  # a line is bent by no more than that
@@ -43,48 +43,48 @@ def _candidates(relief: Relief, place: np.ndarray) -> np.ndarray:
     return nodes[order]
 
 
-def _node_at(relief: Relief, place: np.ndarray) -> int:
+def _node_at(mesh: WorkingMesh, place: np.ndarray) -> int:
     """Node that stands at a place already, -1 where there is none."""
-    net = relief.net
+    net = mesh.net
     squares = np.where(net.degree > 0, ((net.nodes - place) ** 2).sum(axis=1), np.inf)
     v = int(squares.argmin())
-    return v if squares[v] <= (SAME * relief.length) ** 2 else -1
+    return v if squares[v] <= (SAME_PLACE * mesh.length) ** 2 else -1
 
 
-def _put_node(relief: Relief, v: int, place: np.ndarray) -> None:
+def _put_node(mesh: WorkingMesh, v: int, place: np.ndarray) -> None:
     """Move a node to an appointed position, where it rests from now on."""
-    net = relief.net
-    if net.kind[v] == RIM:
-        net.curve[v], net.arc[v], _ = nearest_on_rim(relief.rim, *place.tolist())
+    net = mesh.net
+    if net.kind[v] == ON_CURVE:
+        net.curve[v], net.arc[v], _ = nearest_on_curves(mesh.curves, *place.tolist())
     net.nodes[v] = place
     net.kind[v] = REST
-    relief.fixed[v] = True
+    mesh.fixed[v] = True
 
 
-def fix_nearest_nodes(relief: Relief, positions: np.ndarray) -> None:
+def fix_nearest_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
     """Move the node nearest to each position there, as the paper does (Sec. 4.2); all else is left to the smoothing."""
     for place in positions:
-        v = _node_at(relief, place)
-        nodes = _candidates(relief, place)
+        v = _node_at(mesh, place)
+        nodes = _candidates(mesh, place)
         if v < 0 and len(nodes):
             v = int(nodes[0])
         if v < 0:
             raise _no_node(place)
-        _put_node(relief, v, place)
+        _put_node(mesh, v, place)
 
 
 def _no_node(place: np.ndarray) -> InputError:
     return InputError(f"the grid has no node that could be moved to {place_text(place)}; use a smaller length")
 
 
-def hold_nodes(relief: Relief, positions: np.ndarray) -> None:
+def hold_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
     """Let nodes that stand at appointed positions already rest there: the front has come to them."""
     for place in positions:
-        if (v := _node_at(relief, place)) >= 0:
-            _put_node(relief, v, place)
+        if (v := _node_at(mesh, place)) >= 0:
+            _put_node(mesh, v, place)
 
 
-def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
+def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
     """Make a node at each position, by whatever disturbs the grid least.
 
     Moving one of the nearest nodes and splitting one of the nearest edges are tried in turn; after each the grid around is
@@ -92,66 +92,66 @@ def fix_nodes(relief: Relief, positions: np.ndarray) -> None:
     """
     if not len(positions):
         return
-    scratch = new_scratch(relief)
+    scratch = new_scratch(mesh)
     scratch.tried[:] = 1
     for place in positions:
-        if (v := _node_at(relief, place)) >= 0:
-            _put_node(relief, v, place)
+        if (v := _node_at(mesh, place)) >= 0:
+            _put_node(mesh, v, place)
             continue
-        start, best, least = _copy(relief), None, np.inf
-        for way in _ways(relief, place):
-            _restore(relief, start)
-            _take(relief, scratch, way, place)
-            energy = total_energy(relief.net, scratch, relief.length, WEIGHT)[0]
+        start, best, least = _copy(mesh), None, np.inf
+        for way in _ways(mesh, place):
+            _restore(mesh, start)
+            _take(mesh, scratch, way, place)
+            energy = total_energy(mesh.net, scratch, mesh.length, WEIGHT)[0]
             if energy < least:
-                best, least = _copy(relief), energy
+                best, least = _copy(mesh), energy
         if best is None:
             raise _no_node(place)
-        _restore(relief, best)
+        _restore(mesh, best)
 
 
-def _ways(relief: Relief, place: np.ndarray) -> list[tuple[int, int]]:
+def _ways(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
     """Ways to a node at a place: (node, -1) to be moved, (a, b) an edge to be split."""
-    net = relief.net
-    nodes = _candidates(relief, place)[:CHOICES].tolist()
+    net = mesh.net
+    nodes = _candidates(mesh, place)[:CHOICES].tolist()
     edges = []
     for a in nodes:
         for b in net.ring[a, : net.degree[a]].tolist():
             if may_split(net, a, b) and (b, a) not in edges:
                 edges.append((a, b))
-    on_rim = [net.kind[v] == RIM for v in nodes[:1]]
-    if on_rim == [True]:
+    on_boundary = [net.kind[v] == ON_CURVE for v in nodes[:1]]
+    if on_boundary == [True]:
         edges = [(a, b) for a, b in edges if net.curve[a] >= 0 and net.curve[a] == net.curve[b]]
     middle = [((0.5 * (net.nodes[a] + net.nodes[b]) - place) ** 2).sum() for a, b in edges]
     order = np.argsort(middle, kind="stable")[:CHOICES]
     return [(v, -1) for v in nodes] + [edges[i] for i in order]
 
 
-def _take(relief: Relief, scratch: Scratch, way: tuple[int, int], place: np.ndarray) -> None:
+def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.ndarray) -> None:
     """Make a node at a place in one way, and improve the grid around it."""
-    net = relief.net
+    net = mesh.net
     v, b = way
     if b >= 0:
         a, v = v, split(net, v, b)
-        relief.patches[v] = relief.patches[a]
-        relief.patches[v, 15] = nearest_site(relief.surface, *place.tolist())
+        mesh.patches[v] = mesh.patches[a]
+        mesh.patches[v, 15] = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
-    _put_node(relief, v, place)
+    _put_node(mesh, v, place)
     around = {v}
     for _ in range(2):
         around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
     scratch.tried[sorted(around)] = 0
     for _ in range(3):
-        relief.renew(FAR)
-        settle(relief, WEIGHT, 1e-3, 6)
-        if search_once(relief, scratch) == 0:
+        mesh.renew(FARTHEST_ON_THE_WAY)
+        settle(mesh, WEIGHT, 1e-3, 6)
+        if search_once(mesh, scratch) == 0:
             break
 
 
-def _copy(relief: Relief) -> tuple[np.ndarray, ...]:
-    return tuple(array.copy() for array in (*relief.net, relief.patches, relief.fixed))
+def _copy(mesh: WorkingMesh) -> tuple[np.ndarray, ...]:
+    return tuple(array.copy() for array in (*mesh.net, mesh.patches, mesh.fixed))
 
 
-def _restore(relief: Relief, kept: tuple[np.ndarray, ...]) -> None:
-    for array, value in zip((*relief.net, relief.patches, relief.fixed), kept, strict=True):
+def _restore(mesh: WorkingMesh, kept: tuple[np.ndarray, ...]) -> None:
+    for array, value in zip((*mesh.net, mesh.patches, mesh.fixed), kept, strict=True):
         array[:] = value

@@ -10,7 +10,7 @@ from ..kernels.mesh.grid import Net
 from .working_mesh import close_net, open_net
 
 FOLD = 0.0  # cosine: after a flip two triangles meet at 90 degrees or more, unless they were folded more before
-ROUNDS = 100  # rounds over all edges; a few are enough
+MOST_ROUNDS = 100  # rounds over all edges; a few are enough
 
 
 def flip_edges(grid: Grid) -> tuple[Grid, int]:
@@ -35,4 +35,4 @@ def flip_edges(grid: Grid) -> tuple[Grid, int]:
 
 def flip_by_angle(net: Net) -> int:
     """Flip the edges of an opened grid in place; returns the flips made."""
-    return int(kernels.flip_by_angle(net, FOLD, ROUNDS, np.full(len(net.arc), -1, np.int64)))
+    return int(kernels.flip_by_angle(net, FOLD, MOST_ROUNDS, np.full(len(net.arc), -1, np.int64)))

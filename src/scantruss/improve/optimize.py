@@ -15,15 +15,15 @@ from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_by_angle
 from .perturbation import search_widely
-from .sliding_nodes import with_rim_members
+from .sliding_nodes import with_boundary_members
 from .smoothing import smooth
-from .working_mesh import Relief
+from .working_mesh import WorkingMesh
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..constraints.find import Constraints
     from ..settings import Settings
-    from ..surface.samples import Sites
+    from ..surface.samples import SurfaceSamples
 
 Progress = Callable[[str, float], None]
 Report = Callable[[float], None]
@@ -31,7 +31,7 @@ Report = Callable[[float], None]
 
 def optimize_grid(
     grid: Grid,
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
@@ -44,7 +44,7 @@ def optimize_grid(
     ----------
     grid : Grid
         What the front has left.
-    sites : Sites
+    samples : SurfaceSamples
         The surface samples of the scan, of the same origin.
     boundary : Boundary
     constraints : Constraints
@@ -69,8 +69,8 @@ def optimize_grid(
     report = (lambda share: progress("optimize", share)) if progress else None
     if report:
         report(0.1)
-    relief = improve_first(grid, sites, boundary, constraints, settings, report)
-    better = improve_last(relief, grid, sites, constraints, settings, report)
+    mesh = improve_first(grid, samples, boundary, constraints, settings, report)
+    better = improve_last(mesh, grid, samples, constraints, settings, report)
     if report:
         report(1.0)
     return better
@@ -78,33 +78,33 @@ def optimize_grid(
 
 def improve_first(
     grid: Grid,
-    sites: Sites,
+    samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
     report: Report | None = None,
-) -> Relief:
+) -> WorkingMesh:
     """Open the grid that a front has left and improve it as far as all fronts are, to be compared.
 
     By the paper: Delaunay flips, then nodes moved to the fixed positions (Sec. 4.1, 4.2). By default: even members.
     """
-    surface = with_own_scratch(sites.surface)
-    relief = Relief.from_grid(grid, surface, boundary.rim, boundary.stops, settings.length, constraints.lines)
+    surface = with_own_scratch(samples.surface)
+    mesh = WorkingMesh.from_grid(grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines)
     if settings.method == "paper":
-        flip_by_angle(relief.net)
+        flip_by_angle(mesh.net)
         if len(constraints.positions):
-            fix_nearest_nodes(relief, constraints.positions)
-            flip_by_angle(relief.net)
+            fix_nearest_nodes(mesh, constraints.positions)
+            flip_by_angle(mesh.net)
     else:
-        hold_nodes(relief, constraints.positions)
-        equalize(relief, report)
-    return relief
+        hold_nodes(mesh, constraints.positions)
+        equalize(mesh, report)
+    return mesh
 
 
 def improve_last(
-    relief: Relief,
+    mesh: WorkingMesh,
     front: Grid,
-    sites: Sites,
+    samples: SurfaceSamples,
     constraints: Constraints,
     settings: Settings,
     report: Report | None = None,
@@ -115,22 +115,22 @@ def improve_last(
     missing, and a last settling.
     """
     if settings.method == "default":
-        search_widely(relief, settings.effort, report)
-        fix_nodes(relief, constraints.positions)
+        search_widely(mesh, settings.effort, report)
+        fix_nodes(mesh, constraints.positions)
 
     def come_to_rest() -> None:
         if settings.method == "paper":
-            smooth(relief, settings)
+            smooth(mesh, settings)
         else:
-            finish(relief, settings.prefer)
-        land(relief, sites)
+            finish(mesh, settings.prefer)
+        project_onto_scan(mesh, samples)
 
-    closed, before, _ = side_by_side(lambda: relief.close(front), lambda: front.quality, come_to_rest)
-    grid = with_rim_members(relief.to_grid(front, closed), constraints.lines, settings.length)
+    closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
+    grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
     return grid.replace(settings=settings, before=before)
 
 
-def land(relief: Relief, sites: Sites) -> None:
+def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples) -> None:
     """Let the nodes down on the scan by patches as narrow as it allows."""
-    relief.land(*(narrow_surface(sites, points) for points in (40.0, 120.0, np.inf)))
-    relief.tell_apart(sites.measured)
+    mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)))
+    mesh.name_distances(samples.measured)

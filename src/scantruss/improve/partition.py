@@ -11,7 +11,7 @@ from ..kernels.mesh.grid import Net
 from ..runtime.parallel import in_parts
 
 
-class Halves:
+class Partition:
     """The two halves of a net, each a net with free nodes of its own; the nodes between them stay as they are.
 
     Parameters
@@ -24,7 +24,7 @@ class Halves:
         self._net = net
         self.label = np.full(len(net.arc), kernels.BETWEEN, np.int64)  #: (C,) 0 or 1, or BETWEEN
         away, queue = np.empty((2, len(net.arc)), np.int64), np.empty(len(net.arc), np.int64)
-        if kernels.ways_from_ends(net, among, away, queue):
+        if kernels.paths_from_ends(net, among, away, queue):
             ahead = away[0] - away[1]
             kernels.part(net, (ahead > np.median(ahead[among])).astype(np.int64), self.label)
         self.nets = tuple(net._replace(**self._free(side)) for side in (0, 1))  #: the net of each half

@@ -7,93 +7,100 @@ from collections.abc import Callable
 import numpy as np
 
 from ..kernels.mesh.grid import Net
-from ..kernels.mesh.perturbation import HOPE, HOPELESS, KEPT, MOST, Area, kick_all
+from ..kernels.mesh.perturbation import ALLOWANCE_SEARCHED, ALLOWANCE_SETTLED, KEPT, MOST_NODES, Area, perturb_all
 from ..kernels.mesh.trial import Scratch
-from .equalize import FAR, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
-from .partition import Halves
-from .working_mesh import Relief
+from .equalize import FARTHEST_ON_THE_WAY, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
+from .partition import Partition
+from .working_mesh import WorkingMesh
 
-KICKS = {"quick": (0, 0.0), "normal": (6, 0.0), "best": (40, 0.2)}  # rounds of kicks, and what they may cost at first
-MANY = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
-HALVINGS, FEW = 2, 12  # times that it does so, as long as so many nodes wait
+PERTURBATIONS = {
+    "quick": (0, 0.0),
+    "normal": (6, 0.0),
+    "best": (40, 0.2),
+}  # rounds of kicks, and what they may cost at first
+NODES_OF_LARGE_GRID = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
+HALVINGS, FEW_NODES = 2, 12  # times that it does so, as long as so many nodes wait
 HOT = 0.8  # part of the rounds in which they may cost anything
 DARING = 5.0  # of what they may cost, how much more than usual is left to hope while it is hot
 
 
-def new_area(relief: Relief, number: int = 0) -> Area:
+def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
     """Return room for what a kick may change, and a source of chance of its own for each number."""
-    capacity, width = relief.net.ring.shape
+    capacity, width = mesh.net.ring.shape
     return Area(
         **{name: np.zeros(capacity, np.int64) for name in ("mark", "away", "out")},
         **{
-            name: np.zeros(MOST, np.int64) for name in ("around", "degree", "is_open", "kind", "curve", "ideal", "line")
+            name: np.zeros(MOST_NODES, np.int64)
+            for name in ("around", "degree", "is_open", "kind", "curve", "ideal", "line")
         },
-        nodes=np.zeros((MOST, 3)),
-        arc=np.zeros(MOST),
-        desired=np.zeros(MOST),
-        ring=np.zeros((MOST, width), np.int64),
-        patches=np.zeros((MOST, relief.patches.shape[1])),
+        nodes=np.zeros((MOST_NODES, 3)),
+        arc=np.zeros(MOST_NODES),
+        desired=np.zeros(MOST_NODES),
+        ring=np.zeros((MOST_NODES, width), np.int64),
+        patches=np.zeros((MOST_NODES, mesh.patches.shape[1])),
         free=np.zeros(KEPT, np.int64),
         **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
         seed=np.array([7919 * number]),
     )
 
 
-def search_widely(relief: Relief, effort: str, progress: Callable[[float], None] | None = None) -> None:
+def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], None] | None = None) -> None:
     """Kick the grid at its irregular nodes: what a search from there finds is kept if it has paid.
 
     For `best` it may cost a little at first and less and less later on (simulated annealing).
     """
-    rounds, heat = KICKS[effort]
+    rounds, temperature = PERTURBATIONS[effort]
     if not rounds:
         return
-    if effort == "normal" and relief.net.used > MANY:
-        kick_in_halves(relief)
+    if effort == "normal" and mesh.net.used > NODES_OF_LARGE_GRID:
+        perturb_in_parts(mesh)
     else:
-        room = new_scratch(relief), new_area(relief)
+        room = new_scratch(mesh), new_area(mesh)
         for done in range(rounds):
             if progress:
                 progress(0.6 + 0.2 * done / rounds)
-            cooled = heat * max(0.0, 1.0 - done / (HOT * rounds))
-            hope = HOPE + DARING * cooled if heat else HOPELESS
-            waiting = np.ones(len(relief.net.arc), np.bool_)
-            kick(relief, relief.net, room, waiting, terms_of(relief, room[0]), cooled, hope)
-            relief.renew(FAR)
-    settle_again(relief)
+            cooled = temperature * max(0.0, 1.0 - done / (HOT * rounds))
+            allowance = ALLOWANCE_SEARCHED + DARING * cooled if temperature else ALLOWANCE_SETTLED
+            waiting = np.ones(len(mesh.net.arc), np.bool_)
+            perturb(mesh, mesh.net, room, waiting, terms_of(mesh, room[0]), cooled, allowance)
+            mesh.renew(FARTHEST_ON_THE_WAY)
+    settle_again(mesh)
 
 
-def kick_in_halves(relief: Relief) -> None:
+def perturb_in_parts(mesh: WorkingMesh) -> None:
     """Kick a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
 
     What lies between the halves is kicked in other halves, and what is left then by itself.
     """
-    net, waiting = relief.net, np.ones(len(relief.net.arc), np.bool_)
-    rooms = [(new_scratch(relief), new_area(relief, number)) for number in range(3)]
+    net, waiting = mesh.net, np.ones(len(mesh.net.arc), np.bool_)
+    rooms = [(new_scratch(mesh), new_area(mesh, number)) for number in range(3)]
 
-    def kick_both(halves: Halves) -> None:
-        terms = terms_of(relief, rooms[2][0])
+    def perturb_both(partition: Partition) -> None:
+        terms = terms_of(mesh, rooms[2][0])
         terms = terms._replace(nodes=terms.nodes // 2)  # each half brings the mean length to the desired one by itself
         for side in (0, 1):
-            rooms[side][1].out[:] = halves.label != side
-        halves.run(lambda side: kick(relief, halves.nets[side], rooms[side], waiting, terms, 0.0, HOPE))
+            rooms[side][1].out[:] = partition.label != side
+        partition.run(
+            lambda side: perturb(mesh, partition.nets[side], rooms[side], waiting, terms, 0.0, ALLOWANCE_SEARCHED)
+        )
 
     for _ in range(HALVINGS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
-        if irregular.sum() >= FEW:
-            kick_both(Halves(net, irregular))
-    kick(relief, net, rooms[2], waiting, terms_of(relief, rooms[2][0]), 0.0, HOPE)
-    relief.renew(FAR)
+        if irregular.sum() >= FEW_NODES:
+            perturb_both(Partition(net, irregular))
+    perturb(mesh, net, rooms[2], waiting, terms_of(mesh, rooms[2][0]), 0.0, ALLOWANCE_SEARCHED)
+    mesh.renew(FARTHEST_ON_THE_WAY)
 
 
-def kick(
-    relief: Relief,
+def perturb(
+    mesh: WorkingMesh,
     net: Net,
     room: tuple[Scratch, Area],
     waiting: np.ndarray,
     terms: Terms,
-    heat: float,
-    hope: float,
+    temperature: float,
+    allowance: float,
 ) -> None:
-    """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.mesh.perturbation.kick_all`."""
-    of_grid = relief.patches, relief.rim, *room, waiting, relief.length
-    kick_all(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, heat, hope)
+    """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
+    of_grid = mesh.patches, mesh.curves, *room, waiting, mesh.length
+    perturb_all(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, temperature, allowance)

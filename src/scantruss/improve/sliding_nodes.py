@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..constraints.network import Lines, rim_of
+from ..constraints.network import Lines, curves_of
 from ..grid.grid import Grid
-from ..kernels.boundary.curves import Rim, nearest_on_rim
-from ..kernels.mesh.grid import LOCKED, RIM, Net
+from ..kernels.boundary.curves import Curves, nearest_on_curves
+from ..kernels.mesh.grid import LOCKED, ON_CURVE, Net
 
 SNAP = 0.4  # the end of a line is the node of a line nearest to it, within so many lengths
 
 
-def joined(first: Rim, second: Rim) -> Rim:
+def joined(first: Curves, second: Curves) -> Curves:
     """Return the curves of both, those of the second numbered after those of the first."""
-    return Rim(
+    return Curves(
         np.concatenate([first.points, second.points]),
         np.concatenate([first.arc, second.arc]),
         np.concatenate([first.start, second.start[1:] + first.start[-1]]),
@@ -28,15 +28,15 @@ def inner_lines(grid: Grid) -> np.ndarray:
     return kept
 
 
-def with_rim_members(grid: Grid, lines: Lines, length: float) -> Grid:
+def with_boundary_members(grid: Grid, lines: Lines, length: float) -> Grid:
     """Return the grid with the members of the boundary that lines run along among its lines."""
     if not lines.along:
         return grid
-    track = rim_of(lines.along, [False] * len(lines.along))
+    track = curves_of(lines.along, [False] * len(lines.along))
     ends = grid.edges[grid.edge_uses == 1]
 
     def is_near(place: np.ndarray) -> bool:
-        return nearest_on_rim(track, *place.tolist())[2] < SNAP * length
+        return nearest_on_curves(track, *place.tolist())[2] < SNAP * length
 
     near = [is_near(a) and is_near(b) and is_near(0.5 * (a + b)) for a, b in grid.nodes[ends]]
     return grid.replace(lines=np.unique(np.concatenate([grid.lines, ends[np.array(near, np.bool_)]]), axis=0))
@@ -55,11 +55,11 @@ def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length:
         squares = ((net.nodes[nodes] - place) ** 2).sum(axis=1)
         if squares.min() <= (SNAP * length) ** 2:
             at_stop.add(int(nodes[squares.argmin()]))
-    rim = lines.rim
+    curves = lines.arrays
     for v in inside.tolist():
         if v not in at_stop:
-            curve, arc, distance = nearest_on_rim(rim, *net.nodes[v].tolist())
+            curve, arc, distance = nearest_on_curves(curves, *net.nodes[v].tolist())
             if distance <= SNAP * length:
                 net.curve[v], net.arc[v] = first + curve, arc
                 if not fixed[v]:
-                    net.kind[v] = RIM
+                    net.kind[v] = ON_CURVE

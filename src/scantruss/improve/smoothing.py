@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kernels.mesh import smoothing as kernels
 from ..settings import Settings
-from .working_mesh import NEAR, Relief
+from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
 
 class State(NamedTuple):
@@ -46,13 +46,13 @@ def deviation_allowed(settings: Settings, local: float = 1.0) -> float:
     return local * settings.length / 4 if settings.max_deviation is None else settings.max_deviation
 
 
-def smooth(relief: Relief, settings: Settings) -> Smoothing:
+def smooth(mesh: WorkingMesh, settings: Settings) -> Smoothing:
     """Smooth a grid by passes of Taubin's two steps, each with a return to the scan, until one of the stops.
 
     A pass after which a stop holds is undone: the better state is kept. Corners and fixed nodes stay where they are, boundary
     nodes slide along their curve.
     """
-    net = relief.net
+    net = mesh.net
     start, before, spare = net.nodes.copy(), net.nodes.copy(), np.empty_like(net.nodes)
     arc = net.arc.copy()
     allowed = deviation_allowed(settings, float(net.desired[: net.used][net.degree[: net.used] > 0].mean()))
@@ -61,7 +61,7 @@ def smooth(relief: Relief, settings: Settings) -> Smoothing:
         before[:], arc[:] = net.nodes, net.arc
         kernels.move_to_middle(net, settings.smooth_forward, spare)
         kernels.move_to_middle(net, settings.smooth_backward, spare)
-        relief.return_to_scan(NEAR)
+        mesh.return_to_scan(NEAR_IN_THE_END)
         after = State(*kernels.state_of(net, start))
         stop = ""
         if moved_too_far(after, allowed):

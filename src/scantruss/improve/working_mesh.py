@@ -10,30 +10,30 @@ import numpy as np
 from ..constraints.network import NO_LINES, Lines
 from ..errors import FrontError
 from ..grid.grid import Grid
-from ..kernels.boundary.curves import Rim
+from ..kernels.boundary.curves import Curves
 from ..kernels.mesh import grid as kernels
 from ..kernels.mesh import point_location
-from ..kernels.mesh.grid import LOCKED, REST, RIM, Net
-from ..kernels.mesh.projection import land_nodes
+from ..kernels.mesh.grid import LOCKED, ON_CURVE, REST, Net
+from ..kernels.mesh.projection import project_nodes
 from ..kernels.surface.local_surface import PATCH, Surface
 from ..runtime.parallel import in_parts
 from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
 from .sliding_nodes import find_on_lines, inner_lines, joined
 
-NEAR = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
-PART = 300  # fewest nodes for a thread of their own
-LANDINGS = 3  # parts of the nodes that a thread lands: those of the rim take less time
+NEAR_IN_THE_END = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
+NODES_PER_THREAD = 300  # fewest nodes for a thread of their own
+PROJECTION_PARTS = 3  # parts of the nodes that a thread lands: those of the rim take less time
 WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
-MOST = 60  # neighbours a node may have where there are lines, whose members are bits of a number
+MOST_NEIGHBORS = 60  # neighbours a node may have where there are lines, whose members are bits of a number
 
 #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
 Closed = tuple[Grid, np.ndarray]
 
 
-def no_rim() -> Rim:
+def no_boundary() -> Curves:
     """Return the curves of a closed scan: none."""
-    return Rim(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
+    return Curves(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
 
 
 def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
@@ -64,7 +64,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         in_use=np.zeros(1, np.int64),
         desired=np.ones(capacity),
     )
-    if len(grid.lines) and net.ring.shape[1] > MOST:
+    if len(grid.lines) and net.ring.shape[1] > MOST_NEIGHBORS:
         raise FrontError(f"a node came out with {valence} members; use another length", grid)
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
@@ -120,7 +120,7 @@ def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Relief:
+class WorkingMesh:
     """What the improvement works on: the net, the scan below it, its boundary curves."""
 
     net: Net
@@ -128,15 +128,17 @@ class Relief:
     surface: Surface
     patches: np.ndarray  #: (C, PATCH) local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
-    rim: Rim
+    curves: Curves
     length: float  #: desired member length, that of the length field's 1 [scan unit]
-    landed: np.ndarray  #: (C,) distance from the scan after `land`, NaN before and over closed holes [scan unit]
+    projection_distance: (
+        np.ndarray
+    )  #: (C,) distance from the scan after `project_onto_scan`, NaN before and over closed holes [scan unit]
     sharp: np.ndarray  #: (N,) bool for each curve of the rim, whether it is a ridge, which the local surface rounds off
 
     @classmethod
     def from_grid(
-        cls, grid: Grid, surface: Surface, rim: Rim, corners: np.ndarray, length: float, lines: Lines = NO_LINES
-    ) -> Relief:
+        cls, grid: Grid, surface: Surface, curves: Curves, corners: np.ndarray, length: float, lines: Lines = NO_LINES
+    ) -> WorkingMesh:
         """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
 
         Boundary nodes and those of lines slide along the nearest curve; corners, ends and meetings of lines and nodes far from
@@ -146,40 +148,40 @@ class Relief:
         ----------
         grid : Grid
         surface : Surface
-        rim : Rim
+        curves : Curves
         corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
         lines : the lines that the grid was made with
         """
         net, source = open_net(grid)
-        rim = Rim(*(np.ascontiguousarray(array) for array in rim))
+        curves = Curves(*(np.ascontiguousarray(array) for array in curves))
         fixed = np.zeros(len(net.degree), np.bool_)
         fixed[: len(grid.fixed)] = grid.fixed
-        point_location.seat_on_rim(net, rim, np.ascontiguousarray(corners).reshape(-1, 3), fixed, length)
-        sharp = np.zeros(len(rim.total), np.bool_)
+        point_location.locate_on_boundary(net, curves, np.ascontiguousarray(corners).reshape(-1, 3), fixed, length)
+        sharp = np.zeros(len(curves.total), np.bool_)
         if len(lines.curves):
-            find_on_lines(net, lines, len(rim.total), fixed, length)
-            rim, sharp = joined(rim, lines.rim), np.concatenate([sharp, lines.sharp])
+            find_on_lines(net, lines, len(curves.total), fixed, length)
+            curves, sharp = joined(curves, lines.arrays), np.concatenate([sharp, lines.sharp])
         patches = np.zeros((len(net.degree), PATCH))
-        queue, seated = np.zeros((2, len(net.degree)), np.int64)
-        point_location.seat_nodes(net, surface, patches, length, queue, seated)
-        relief = cls(net, source, surface, patches, fixed, rim, length, np.full(len(patches), np.nan), sharp)
-        relief.renew(0.0)
-        return relief
+        queue, located = np.zeros((2, len(net.degree)), np.int64)
+        point_location.locate_nodes(net, surface, patches, length, queue, located)
+        mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp)
+        mesh.renew(0.0)
+        return mesh
 
-    def land(self, fine: Surface, middle: Surface, broad: Surface) -> None:
+    def project_onto_scan(self, fine: Surface, middle: Surface, broad: Surface) -> None:
         """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes and those of ridges stay."""
-        self.landed[:] = 0.0
+        self.projection_distance[:] = 0.0
         stay = self.fixed | self._on_ridge()
 
-        def land_part(part: int, begin: int, end: int) -> None:
+        def project_part(part: int, begin: int, end: int) -> None:
             own = self._scratch(part)
             narrow, wider, widest = (
                 each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle, broad)
             )
-            land_nodes(self.net, narrow, wider, widest, self.patches, stay, self.landed, begin, end)
+            project_nodes(self.net, narrow, wider, widest, self.patches, stay, self.projection_distance, begin, end)
 
-        in_parts(self.net.used, PART // LANDINGS, land_part, LANDINGS)
+        in_parts(self.net.used, NODES_PER_THREAD // PROJECTION_PARTS, project_part, PROJECTION_PARTS)
 
     @cached_property
     def graded(self) -> bool:
@@ -190,15 +192,15 @@ class Relief:
         """Which nodes slide on a ridge or stand at an end of one, (C,) bool."""
         net, stay = self.net, np.zeros(len(self.fixed), np.bool_)
         if self.sharp.any():
-            sliding = (net.degree > 0) & (net.line != 0) & (net.kind == RIM)
+            sliding = (net.degree > 0) & (net.line != 0) & (net.kind == ON_CURVE)
             stay[sliding] = self.sharp[net.curve[sliding]]
             for v in np.flatnonzero(stay).tolist():
                 stay[[u for u in net.ring[v, : net.degree[v]].tolist() if kernels.is_line(net, v, u)]] = True
         return stay
 
-    def tell_apart(self, measured: int) -> None:
+    def name_distances(self, measured: int) -> None:
         """Forget the distance from the scan of nodes over closed holes, whose site is none of the first `measured`."""
-        self.landed[self.patches[:, 15] >= measured] = np.nan
+        self.projection_distance[self.patches[:, 15] >= measured] = np.nan
 
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""
@@ -219,17 +221,17 @@ class Relief:
             if self.graded:
                 point_location.renew_lengths(self.net, surface, self.patches, begin, end)
 
-        in_parts(self.net.used, PART, renew_part)
+        in_parts(self.net.used, NODES_PER_THREAD, renew_part)
 
     def return_to_scan(self, near: float) -> None:
         """Bring the nodes back onto the scan and the boundary curves; patches no farther than `near` lengths."""
         self.renew(near)
-        point_location.return_to_scan(self.net, self.patches, self.rim, 0.5 * self.length)
+        point_location.return_to_scan(self.net, self.patches, self.curves, 0.5 * self.length)
 
     def deviation(self) -> np.ndarray:
         """Distance of each node of the net from the scan around it, (C,) [scan unit]."""
-        if not np.isnan(self.landed).all():
-            return self.landed
+        if not np.isnan(self.projection_distance).all():
+            return self.projection_distance
         values = np.zeros(len(self.net.degree))
         self.renew(0.05)
         point_location.distances_from_scan(self.net, self.patches, values)

@@ -78,5 +78,5 @@ def encode_page(
 def title_of(trial: Trial, outcome: Outcome) -> str:
     """Return two lines over a picture: what is varied, and the figures that tell most."""
     figures = dict(zip(FIGURES, outcome.figures, strict=True))
-    told = f"{figures['members']} members, std/mean {figures['length std/mean']}, shape {figures['shape']}"
-    return f"{trial.title}\n{told}"
+    line = f"{figures['members']} members, std/mean {figures['length std/mean']}, shape {figures['shape']}"
+    return f"{trial.title}\n{line}"

@@ -88,7 +88,7 @@ INSTALLED = _installed()
 
 
 @contextmanager
-def tell_of_compiling(tell: Callable[[], None]) -> Iterator[None]:
+def report_compiling(tell: Callable[[], None]) -> Iterator[None]:
     """Call `tell` once, before the first function that is compiled meanwhile; never where all are found on disk."""
 
     class FirstOnly(event.Listener):  # type: ignore[misc]

@@ -10,17 +10,17 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .invalid import CAUSE, check_sensible, find_wild, said_of_wild
+from .invalid import CAUSE, check_sensible, find_invalid, invalid_values_note
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
-LARGEST = 1e100  # coordinates beyond this overflow when squared
+LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
-SAMPLE = 600  # points at which the spacing is measured
+POINTS_FOR_SPACING = 600  # points at which the spacing is measured
 ROUGHLY = 60  # of them at which it is guessed first
-FEW = 200  # points at which the gap is measured
-PART = 50_000  # fewest points for a thread of their own
+POINTS_FOR_GAP = 200  # points at which the gap is measured
+POINTS_PER_THREAD = 50_000  # fewest points for a thread of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +83,9 @@ class PointCloud:
         array = _as_coordinates(points, said)
         clean, lower, upper = _drop_not_finite(array, said)
         dropped, notes = len(array) - len(clean), tuple[str, ...]()
-        if (wild := find_wild(clean, lower, upper, said)) is not None:
-            notes = (said_of_wild(clean[wild]),)
-            clean = clean[~wild]
+        if (invalid := find_invalid(clean, lower, upper, said)) is not None:
+            notes = (invalid_values_note(clean[invalid]),)
+            clean = clean[~invalid]
             lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
@@ -136,17 +136,17 @@ def bounds_of(array: np.ndarray) -> Bounds:
     array = np.ascontiguousarray(array)
     found = np.empty((processors(), 2, 3))
     found[:, 0], found[:, 1] = math.inf, -math.inf
-    in_parts(len(array), PART, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
+    in_parts(len(array), POINTS_PER_THREAD, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
     return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
 def _check_extent(lower: np.ndarray, upper: np.ndarray, said: str) -> float:
     """Return the longest side of the cloud; refuse points that coincide or overflow."""
     largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
-    if largest > LARGEST:
-        raise InputError(f"{said}coordinates must be smaller than {LARGEST:g}, got {largest:.3g}; {CAUSE}")
+    if largest > LARGEST_COORDINATE:
+        raise InputError(f"{said}coordinates must be smaller than {LARGEST_COORDINATE:g}, got {largest:.3g}; {CAUSE}")
     extent = float((upper - lower).max())
-    if extent <= max(4 * np.finfo(float).eps * largest, 1 / LARGEST):
+    if extent <= max(4 * np.finfo(float).eps * largest, 1 / LARGEST_COORDINATE):
         raise InputError(f"{said}all points are at the same place; a grid needs points spread over a surface")
     check_sensible(extent, said)
     return extent
@@ -167,11 +167,15 @@ def _local_origin(lower: np.ndarray, upper: np.ndarray, extent: float) -> np.nda
 
 def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the points from their own origin (N, 3), and the sums (9,) of their coordinates and of the products of these."""
-    from ..kernels.geometry.bounds import BLOCK, move_points
+    from ..kernels.geometry.bounds import POINTS_PER_BLOCK, move_points
 
-    blocks = -(-len(points) // BLOCK)
+    blocks = -(-len(points) // POINTS_PER_BLOCK)
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
-    in_parts(blocks, PART // BLOCK, lambda _, begin, end: move_points(points, origin, moved, sums, begin, end))
+    in_parts(
+        blocks,
+        POINTS_PER_THREAD // POINTS_PER_BLOCK,
+        lambda _, begin, end: move_points(points, origin, moved, sums, begin, end),
+    )
     return moved, sums.sum(axis=0)
 
 
@@ -207,7 +211,7 @@ def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
     points = np.ascontiguousarray(points, dtype=np.float64)
     if len(points) < 2:
         return 0.0
-    sample = points[np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)]
+    sample = points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_SPACING)).astype(np.int64)]
     lower, upper = bounds or bounds_of(points)
     same = 8 * np.finfo(float).eps * float(max(np.abs(lower).max(), np.abs(upper).max()))
     sample, place = np.unique(sample, axis=0, return_inverse=True)
@@ -236,7 +240,7 @@ def measure_gap(points: np.ndarray) -> float:
     """
     most = min(6 * COPIES, len(points) - 1)
     gaps = []
-    for place in points[np.linspace(0, len(points) - 1, min(len(points), FEW)).astype(np.int64)]:
+    for place in points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_GAP)).astype(np.int64)]:
         squared = np.zeros(len(points))
         for axis in range(3):
             squared += (points[:, axis] - place[axis]) ** 2
@@ -300,6 +304,6 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     def search_part(part: int, begin: int, end: int) -> None:
         nearby.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
 
-    in_parts(len(points), PART, search_part)
+    in_parts(len(points), POINTS_PER_THREAD, search_part)
     nearest: np.ndarray = np.sqrt(squares.min(axis=0))
     return nearest

@@ -5,16 +5,16 @@ from __future__ import annotations
 from .cloud import PointCloud
 from .extent import bulk_of
 
-SAMPLE = 10_000  # points that tell it
+POINTS_LOOKED_AT = 10_000  # points that tell it
 WIDEST = 1.0  # degrees that a scan spans at most
 STEEP = 50.0  # heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
 
 
-def said_of_degrees(cloud: PointCloud) -> tuple[str, ...]:
+def degrees_note(cloud: PointCloud) -> tuple[str, ...]:
     """Return what should be said of a cloud whose x and y look like degrees; nothing where its unit is known."""
     if cloud.unit:
         return ()
-    some = cloud.points[:: max(len(cloud.points) // SAMPLE, 1)]
+    some = cloud.points[:: max(len(cloud.points) // POINTS_LOOKED_AT, 1)]
     lower, upper = bulk_of(some) + cloud.origin
     x, y, z = upper - lower
     on_earth = max(-lower[0], upper[0]) <= 180.0 and max(-lower[1], upper[1]) <= 90.0

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
-SAMPLE = 10_000  # points that tell where a file lies
+POINTS_LOOKED_AT = 10_000  # points that tell where a file lies
 BULK = 100_000  # points that tell where most of them lie
-FAR = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is none of it
-STRAY = (2.0, 98.0)  # percentiles of each coordinate between which they do
+FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is none of it
+BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which they do
 
 
 def extent_of(points: np.ndarray) -> np.ndarray:
     """Return about the lowest and highest coordinates of points (N, 3), (2, 3); inf and -inf where there are none."""
-    some = points[:: max(len(points) // SAMPLE, 1)]
+    some = points[:: max(len(points) // POINTS_LOOKED_AT, 1)]
     some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # whole numbers have no inf
     return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
 
 
 def bulk_of(points: np.ndarray) -> np.ndarray:
     """Return the lowest and highest coordinates of points (N, 3) but for a few stray ones at each end, (2, 3)."""
-    return np.percentile(points[:: max(len(points) // BULK, 1)], STRAY, axis=0)
+    return np.percentile(points[:: max(len(points) // BULK, 1)], BULK_PERCENTILES, axis=0)
 
 
 def usual_extent(points: np.ndarray) -> np.ndarray:
@@ -33,7 +33,7 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
     some = points[:: max(len(points) // BULK, 1)]
     lower, upper = bulk_of(some)
     away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
-    near = some[away <= FAR * np.linalg.norm(upper - lower)]
+    near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
     return np.stack([near.min(axis=0), near.max(axis=0)])
 
 
@@ -42,7 +42,7 @@ def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.stack([np.minimum(one[0], other[0]), np.maximum(one[1], other[1])])
 
 
-def said_of_apart(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[str, ...]:
+def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[str, ...]:
     """Return what should be said of files that lie apart, by the extent (2, 3) of each.
 
     Two lie together where the gap between them is no longer than the longer of them, or where others lead from one to the other.

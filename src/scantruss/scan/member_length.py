@@ -15,7 +15,7 @@ SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than th
 GAPS = 2.2  #: ... and where points lie at random, this many distances to the sixth neighbour
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
-LARGEST = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+LARGEST_PER_EXTENT = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:
@@ -63,7 +63,7 @@ def _check_field(settings: Settings, extent: float, spacing: float) -> None:
 def length_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
     low = max(SPACINGS * cloud.spacing, GAPS * cloud.gap)
-    return round_length(low, "up"), round_length(_usual_extent(cloud) / LARGEST, "down")
+    return round_length(low, "up"), round_length(_usual_extent(cloud) / LARGEST_PER_EXTENT, "down")
 
 
 def _usual_extent(cloud: PointCloud) -> float:

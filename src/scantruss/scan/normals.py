@@ -11,19 +11,23 @@ from ..runtime.parallel import in_parts
 from .vectors import dots
 
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
-SITES = 1500  # samples that a thread takes at least
+SAMPLES_PER_THREAD = 1500  # samples that a thread takes at least
 STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
 
 
 def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Drop links (S, K) to sites that stand over a site rather than beside it."""
-    in_parts(len(mean), SITES, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j))
+    in_parts(
+        len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j)
+    )
 
 
 def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> np.ndarray:
     """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,)."""
     weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
-    in_parts(len(mean), SITES, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j))
+    in_parts(
+        len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j)
+    )
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
     kernels.orient_normals(mean, normals, neighbors, order, piece)
@@ -40,7 +44,11 @@ def _counted_off(piece: np.ndarray) -> np.ndarray:
 def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:
     """Return mean normals (S, 3) of sites and those linked to them whose normals have a cosine over `facing` with their own."""
     means = np.empty_like(normals)
-    in_parts(len(normals), SITES, lambda _, i, j: kernels.smooth_normals(normals, neighbors, facing, means, i, j))
+    in_parts(
+        len(normals),
+        SAMPLES_PER_THREAD,
+        lambda _, i, j: kernels.smooth_normals(normals, neighbors, facing, means, i, j),
+    )
     return means
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..settings import UNITS
 
-SAME = 1e-5  # US survey feet are feet, to two parts in a million
+SAME_UNIT = 1e-5  # US survey feet are feet, to two parts in a million
 _NAMES = "mm|cm|m|inch|inches|foot|feet|ft|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?"
 _INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # what follows tells it from the word: "the unit in this file is mm"
 _GAP = r"[^\w\r\n]"
@@ -67,6 +67,6 @@ def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, f
 def name_of(metres: float | None) -> str:
     """Return the name of a unit; "" where none of ours fits."""
     for name, size in UNITS.items():
-        if size and metres and math.isclose(size, metres, rel_tol=SAME):
+        if size and metres and math.isclose(size, metres, rel_tol=SAME_UNIT):
             return name
     return ""

@@ -15,15 +15,15 @@ from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
-from ..scan.clean.outliers import find_strays, has_strays
+from ..scan.clean.outliers import find_outliers, has_outliers
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from ..scan.vectors import dots
-from ..settings import SITE, SMOOTH_SITE, Settings
+from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .linked_samples import (
-    FINE,
     MANY_ROUGH,
-    PART,
+    PATCH_SPACING,
+    POINTS_PER_THREAD,
     ROUGH,
     SHEETS,
     Linked,
@@ -31,21 +31,21 @@ from .linked_samples import (
     is_rough,
     is_smooth,
     link_finer,
-    link_sites,
+    link_samples,
     settle_to_sheet,
     thin_dense,
 )
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
-BESIDE = 1.5  # how far all points are beside those that serve as well, in distances of these
+BESIDE_SAMPLES = 1.5  # how far all points are beside those that serve as well, in distances of these
 SPARSE = 0.08  # spacing of the points, in member lengths, from which on no larger sites are tried
-UNEVEN = 20.0  # as `_Asked.uneven`: a ridge that bends by twice as much would be seen
+UNEVEN_BEND = 20.0  # as `_Asked.uneven`: a ridge that bends by twice as much would be seen
 SOME, ALL = 8.0, 24.0  # most points of a usual site that a patch is fitted to, on the way and in the end
 
 
 @dataclass(frozen=True, eq=False)
-class Sites:
+class SurfaceSamples:
     """What all later steps look up in the scan."""
 
     surface: Surface
@@ -56,11 +56,11 @@ class Sites:
     area: float  #: rough area of the scanned surface [scan unit^2]
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
-    strays: int = 0  #: stray points that were left out
+    outliers: int = 0  #: stray points that were left out
     repeated: int = 0  #: points that were left out because they repeat another one
     measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
-    apart: float = 0.0  #: about so far apart [scan unit]
+    sample_spacing: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
@@ -73,9 +73,9 @@ class Sites:
     @property
     def left_out(self) -> tuple[int, float]:
         """How many pieces are too small for a grid, and the share of the sites, which lie evenly, that is theirs."""
-        sites = np.bincount(self.piece)
-        small = np.delete(sites, self.pieces)
-        return len(small), float(small.sum() / sites.sum())
+        samples = np.bincount(self.piece)
+        small = np.delete(samples, self.pieces)
+        return len(small), float(small.sum() / samples.sum())
 
     @property
     def density(self) -> float:
@@ -93,7 +93,7 @@ class _Asked(NamedTuple):
 
     length: float
     box_size: float | None
-    stray_distance: float
+    outlier_distance: float
     drop_repeated: bool
     uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
     wish: Wish | None
@@ -101,10 +101,10 @@ class _Asked(NamedTuple):
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
         """Return it for a cloud with this origin."""
-        strays = settings.stray_distance if settings.clean else 0.0
+        outliers = settings.outlier_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_repeated
-        uneven = min(UNEVEN, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN
-        return cls(settings.length, settings.box_size, strays, repeated, uneven, wish_of(settings, origin))
+        uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
+        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish_of(settings, origin))
 
 
 class _Chosen(NamedTuple):
@@ -114,21 +114,21 @@ class _Chosen(NamedTuple):
     radius: float  #: of a site
     points: np.ndarray  #: (N, 3) the points given to the sites
     whole: np.ndarray  #: (M, 3) all points of the scan
-    strays: int  #: points that were left out of it
+    outliers: int  #: points that were left out of it
     smooth: bool
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, Sites]] = weakref.WeakKeyDictionary()
+_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
 
 
-def sample_surface(cloud: PointCloud, settings: Settings) -> Sites:
+def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     """Return the sites of a cloud for a member length; kept as long as the cloud lives.
 
     Parameters
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `clean`, `stray_distance` and `drop_repeated` which points are left
+        `length` and `box_size` decide how far apart sites are, `clean`, `outlier_distance` and `drop_repeated` which points are left
         out, `length_field` where members are to be longer.
     """
     asked = _Asked.of(settings, cloud.origin)
@@ -150,48 +150,56 @@ def local_field(surface: Surface, place: np.ndarray) -> float:
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
-def sites_with(sites: Sites, added: np.ndarray, settings: Settings) -> Sites:
+def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings) -> SurfaceSamples:
     """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
-    points = sites.surface.points
+    points = samples.surface.points
     both = np.concatenate([points, added])
-    asked = _Asked.of(settings, sites.origin)._replace(stray_distance=0.0, drop_repeated=False)
-    if not sites.smooth:  # then it is not with more points either
-        asked = asked._replace(box_size=asked.box_size or SITE)
-    prepared = _prepare(both, bounds_of(both), sites.spacing, asked, len(points))
+    asked = _Asked.of(settings, samples.origin)._replace(outlier_distance=0.0, drop_repeated=False)
+    if not samples.smooth:  # then it is not with more points either
+        asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
+    prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
     return replace(
         prepared,
-        strays=sites.strays,
-        repeated=sites.repeated,
-        whole=sites.whole,
-        apart=sites.apart,
-        origin=sites.origin,
-        unit=sites.unit,
+        outliers=samples.outliers,
+        repeated=samples.repeated,
+        whole=samples.whole,
+        sample_spacing=samples.sample_spacing,
+        origin=samples.origin,
+        unit=samples.unit,
     )
 
 
-def narrow_surface(sites: Sites, points: float) -> Surface:
+def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
     """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
 
     More points of each site count than while nodes are still on their way.
     """
-    surface = sites.surface
-    radius = np.sqrt(points * sites.area / (np.pi * len(surface.points)))
+    surface = samples.surface
+    radius = np.sqrt(points * samples.area / (np.pi * len(surface.points)))
     surface = surface._replace(
         patch_radius=float(np.clip(radius, 0.1 * surface.length, surface.patch_radius)),
-        patch_points=ALL * (SMOOTH_SITE / SITE) ** 2 if sites.smooth else ALL,  # as many for an area
+        patch_points=ALL * (SMOOTH_SAMPLE_SPACING / SAMPLE_SPACING) ** 2
+        if samples.smooth
+        else ALL,  # as many for an area
     )
     if np.isfinite(points):  # so many points, whatever the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
     return surface
 
 
-def with_whole_rim(sites: Sites, surface: Surface, rim: np.ndarray) -> Surface:
+def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_points: np.ndarray) -> Surface:
     """Return the surface with all points near some of its points (R, 3), where it has only some: those of the rim tell where it is."""
-    if sites.whole is None:
+    if samples.whole is None:
         return surface
-    near = sites.whole.take(points_near(sites.whole, rim, BESIDE * sites.apart), axis=0)
+    near = samples.whole.take(
+        points_near(samples.whole, boundary_points, BESIDE_SAMPLES * samples.sample_spacing), axis=0
+    )
     owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
-    in_parts(len(near), PART, lambda _, begin, end: nearest_places(near, sites.boxes, means, far, owner, begin, end))
+    in_parts(
+        len(near),
+        POINTS_PER_THREAD,
+        lambda _, begin, end: nearest_places(near, samples.boxes, means, far, owner, begin, end),
+    )
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
     points = np.concatenate([surface.points, near[owner >= 0]])
     grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
@@ -203,8 +211,8 @@ def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
     squares = ((surface.mean - place) ** 2).sum(axis=1)
     reach = np.sqrt(squares.min()) + 2.0 * surface.radius
     best = np.inf
-    for site in np.flatnonzero(squares <= reach * reach):
-        points = surface.points[surface.start[site] : surface.start[site + 1]]
+    for sample in np.flatnonzero(squares <= reach * reach):
+        points = surface.points[surface.start[sample] : surface.start[sample + 1]]
         best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
     return float(np.sqrt(best))
 
@@ -223,7 +231,7 @@ def _prepare(
     spacing: float,
     asked: _Asked,
     measured: int | None = None,
-) -> Sites:
+) -> SurfaceSamples:
     """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
     if asked.drop_repeated and has_repeats(points):
@@ -232,16 +240,16 @@ def _prepare(
         points = np.ascontiguousarray(points[kept])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_sites(points, bounds, spacing, asked, thinned) or _usual_sites(
+    chosen = _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
         points, bounds, spacing, asked, thinned
     )
     found = chosen.found
     surface, piece = _faced_surface(found, chosen.radius, length, spacing)
     surface = surface._replace(field=length_field(surface, asked.wish))
     piece = _number(piece)
-    area = _site_areas(surface)
+    area = _sample_areas(surface)
     graded = area / surface.field**2
-    return Sites(
+    return SurfaceSamples(
         surface,
         found.boxes,
         piece,
@@ -250,53 +258,53 @@ def _prepare(
         float(area.sum()),
         float(graded.sum()),
         _large_pieces(piece, area, graded, length),
-        chosen.strays,
+        chosen.outliers,
         repeated,
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
-        FINE * chosen.radius,
+        PATCH_SPACING * chosen.radius,
         chosen.smooth,
     )
 
 
-def _smooth_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
+def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
     """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
-    length, radius = asked.length, SMOOTH_SITE * asked.length
+    length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
     if asked.box_size is not None or spacing > SPARSE * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_sites(some, radius, length, spacing)
-    if has_strays(found.neighbors) or not is_smooth(found, length, asked.uneven):
+    found = link_samples(some, radius, length, spacing)
+    if has_outliers(found.neighbors) or not is_smooth(found, length, asked.uneven):
         return None
     return _Chosen(found, radius, some, points, 0, True)
 
 
-def _usual_sites(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
+def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
     """Return the sites of any scan, without its strays; of a rough one moved to the middle of its sheets."""
-    length, strays = asked.length, 0
-    radius = max((asked.box_size or SITE) * length, 0.25 * spacing)
+    length, outliers = asked.length, 0
+    radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_sites(some, radius, length, spacing)
-    if asked.stray_distance and has_strays(found.neighbors):
-        stray = find_strays(points, asked.stray_distance, length)
-        strays = int(stray.sum())
-        if strays:
-            points = np.ascontiguousarray(points[~stray])
+    found = link_samples(some, radius, length, spacing)
+    if asked.outlier_distance and has_outliers(found.neighbors):
+        outlier = find_outliers(points, asked.outlier_distance, length)
+        outliers = int(outlier.sum())
+        if outliers:
+            points = np.ascontiguousarray(points[~outlier])
             some = thin_dense(points, bounds_of(points), radius, spacing)
-            found = link_sites(some, radius, length, spacing)
+            found = link_samples(some, radius, length, spacing)
     if is_rough(found, SHEETS * length):
         fine = link_finer(points, radius, length, spacing)
         if fine is not None:
             some, (found, radius) = points, fine
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
-    return _Chosen(found, radius, some, points, strays, False)
+    return _Chosen(found, radius, some, points, outliers, False)
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
     """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_sites(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
     normals = mean_normals(normals, neighbors, 0.7)
@@ -328,7 +336,7 @@ def _number(piece: np.ndarray) -> np.ndarray:
     return rank[piece]
 
 
-def _site_areas(surface: Surface) -> np.ndarray:
+def _sample_areas(surface: Surface) -> np.ndarray:
     """Rough area around each site (S,): that of a disc through its neighbours over their number [scan unit^2]."""
     linked = surface.neighbors >= 0
     count = linked.sum(axis=1)

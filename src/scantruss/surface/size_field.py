@@ -18,9 +18,9 @@ RATIO = 1.2  # of the lengths desired for two members that follow each other, at
 SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per way; ways over the links, and members, may be longer
 FLAT = 0.002  # a member of the longest length that bulges by less than this, in its length, is flat
 BENT = 0.95  # share of the scan that bends less than where the shortest length is desired
-DOUBT = 3.3  # standard deviations of a curvature that may be noise
-FAR = 1.0  # a given length may be so far from the scan, in that length
-PART = 200  # fewest sites for a thread of their own
+NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature that may be noise
+FARTHEST_FROM_SCAN = 1.0  # a given length may be so far from the scan, in that length
+SAMPLES_PER_THREAD = 200  # fewest sites for a thread of their own
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
 def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: float) -> None:
     """Refuse given lengths (K, 4) that stand away from the scan: they are of another part, frame or unit."""
     mean = surface.mean
-    allowed = FAR * scale * rows[:, 3] + 1.5 * surface.step
+    allowed = FARTHEST_FROM_SCAN * scale * rows[:, 3] + 1.5 * surface.step
     low, high = mean.min(axis=0), mean.max(axis=0)
     far = np.maximum(low - places, places - high).max(axis=1) > allowed
     inside = np.flatnonzero(~far)
@@ -113,32 +113,32 @@ def measured_bends(surface: Surface, most: float) -> np.ndarray:
     """
     chosen = np.zeros(len(surface.mean), np.bool_)
     kernels.choose_apart(surface.neighbors, chosen)
-    sites = np.flatnonzero(chosen)
-    low, high, best = np.zeros(len(sites)), np.full(len(sites), np.inf), np.zeros(len(sites))
+    samples = np.flatnonzero(chosen)
+    low, high, best = np.zeros(len(samples)), np.full(len(samples), np.inf), np.zeros(len(samples))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt = _bends(surface, sites, most**share).T
-        low, high = np.maximum(low, bend - DOUBT * doubt), np.minimum(high, bend + DOUBT * doubt)
-        best = np.where(low <= high, np.maximum(bend - DOUBT * doubt, 0.0), best)
+        bend, doubt = _bends(surface, samples, most**share).T
+        low, high = np.maximum(low, bend - NOISE_DEVIATIONS * doubt), np.minimum(high, bend + NOISE_DEVIATIONS * doubt)
+        best = np.where(low <= high, np.maximum(bend - NOISE_DEVIATIONS * doubt, 0.0), best)
     bends = np.zeros(len(chosen))
-    bends[sites] = best
+    bends[samples] = best
     bends = _spread(surface.neighbors, bends, chosen)
     everywhere = np.ones_like(chosen)
     return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one site alone is noise
 
 
-def _bends(surface: Surface, sites: np.ndarray, wider: float) -> np.ndarray:
+def _bends(surface: Surface, samples: np.ndarray, wider: float) -> np.ndarray:
     """Curvature and its doubt at some sites, (P, 2) [1 / scan unit], by patches so many times wider."""
     from .scratch import with_own_scratch
 
     scaled = surface._replace(
         patch_radius=surface.patch_radius * wider, patch_points=max(surface.patch_points / wider**2, 1.0)
     )
-    found = np.empty((len(sites), 2))
+    found = np.empty((len(samples), 2))
 
     def measure_part(part: int, begin: int, end: int) -> None:
-        kernels.measure_bends(with_own_scratch(scaled), sites, found, begin, end)
+        kernels.measure_bends(with_own_scratch(scaled), samples, found, begin, end)
 
-    in_parts(len(sites), PART, measure_part)
+    in_parts(len(samples), SAMPLES_PER_THREAD, measure_part)
     return found
 
 

@@ -15,7 +15,7 @@ from ..runtime.parallel import in_parts, processors
 from ..scan.cloud import Bounds
 
 DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
-PART = 200_000  # fewest points for a thread of their own
+POINTS_PER_THREAD = 200_000  # fewest points for a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
 MARKS = 1 << 20  # of boxes near a place: some thousands, which hardly ever share one with a box elsewhere
 ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
@@ -49,7 +49,7 @@ def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
         parts[part] = _First(points, lower, upper, size, room)
         parts[part].choose(ALL, begin, end)
 
-    in_parts(len(points), PART, choose)
+    in_parts(len(points), POINTS_PER_THREAD, choose)
     first, *others = (parts[part] for part in sorted(parts))
     for other in others:
         first.choose(other.chosen, 0, len(other.chosen))
@@ -106,5 +106,5 @@ def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndar
             nearby.list_marked(points, boxes, marked, begin, end, found)
         parts[part] = found[:count]
 
-    in_parts(len(points), PART, look)
+    in_parts(len(points), POINTS_PER_THREAD, look)
     return np.concatenate(parts)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
+EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Camera:
         """Return a camera that looks the same way at the middle of other points."""
         low, high = points.min(axis=0), points.max(axis=0)
         radius = float(np.linalg.norm(high - low)) / 2 or 1.0
-        return replace(self, middle=(low + high) / 2, distance=DISTANCE * radius, zoom=1.0, shift=(0.0, 0.0))
+        return replace(self, middle=(low + high) / 2, distance=EYE_DISTANCE * radius, zoom=1.0, shift=(0.0, 0.0))
 
     def framed(self, points: np.ndarray, box: tuple[float, float, float, float]) -> Camera:
         """Return the camera with zoom and shift such that the points fill a box (left, bottom, right, top) [pixel]."""

@@ -13,7 +13,7 @@ from .strokes import INK, PAPER
 PICTURE = (560, 391)  #: of one of them [pixel]
 TITLE = 60  # above each [pixel]
 SHOWN = 0.93  # of its height; the caption below is too small here
-MOST = 4  # in a row
+PICTURES_IN_A_ROW = 4  # in a row
 
 
 def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
@@ -22,7 +22,7 @@ def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    columns = min(MOST, max(len(pictures), 1))
+    columns = min(PICTURES_IN_A_ROW, max(len(pictures), 1))
     rows = -(-len(pictures) // columns)
     wide, tall = columns * PICTURE[0], rows * (PICTURE[1] + TITLE)
     figure = Figure(figsize=(wide / 100, tall / 100), dpi=100, facecolor=tuple(PAPER))

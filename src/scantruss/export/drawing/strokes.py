@@ -14,7 +14,7 @@ MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, ove
 PAPER = np.array([0.984, 0.980, 0.969])
 GROUND = np.array([0.925, 0.918, 0.898])
 INK = np.array([0.098, 0.180, 0.290])  # members
-RIM = np.array([0.047, 0.098, 0.176])  # members on a boundary
+BOUNDARY_COLOR = np.array([0.047, 0.098, 0.176])  # members on a boundary
 OUTSIDE = (np.array([0.345, 0.525, 0.620]), np.array([0.835, 0.925, 0.930]))  # triangles in the shade, in the light
 INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
 CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
@@ -170,7 +170,7 @@ def _member_strokes(grid: Grid, view: View) -> Strokes:
     width = float(np.clip(0.055 * np.quantile(length, 0.75), 0.4, 2.4))
     fade = view.fade(near[ends].mean(axis=1))
     bold = boundary | grid.edge_on_line
-    colour = np.where(bold[:, None], _hazy(RIM, fade, 0.45), _hazy(INK, fade, 0.60))
+    colour = np.where(bold[:, None], _hazy(BOUNDARY_COLOR, fade, 0.45), _hazy(INK, fade, 0.60))
     widths = np.where(bold, 1.9 * width, width)
     return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
 

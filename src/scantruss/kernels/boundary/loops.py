@@ -19,7 +19,7 @@ from ..surface.local_surface import Surface, flood, walk
 DIRECTIONS = 64
 BINS = 240
 OVER = 0.4  # sine of the angle over the mean plane of two places from which on they lie on two sheets
-APART = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
+ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
 FACING = 0.2  # sites whose normals have a smaller cosine are another sheet, or a plant
 
 
@@ -141,11 +141,11 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
 
 
 @kernel
-def site_disc(surface: Surface, site: int, direction: float, radius: float) -> Vector:
+def sample_disc(surface: Surface, sample: int, direction: float, radius: float) -> Vector:
     """Centre of the disc that touches a site from its free direction."""
-    normal = row(surface.normals, site)
+    normal = row(surface.normals, sample)
     u = across(normal)
-    place = along(row(surface.mean, site), radius * math.cos(direction), u)
+    place = along(row(surface.mean, sample), radius * math.cos(direction), u)
     return along(place, radius * math.sin(direction), cross(normal, u))
 
 
@@ -168,7 +168,7 @@ def _nearest_clear(cover: np.ndarray) -> int:
 @kernel
 def roll_disc(
     surface: Surface,
-    site: int,
+    sample: int,
     centre: Vector,
     radii: np.ndarray,
     path: np.ndarray,
@@ -190,18 +190,18 @@ def roll_disc(
     -------
     first, last : path[first:last] is the loop; first = last where the disc fell off, came to an earlier loop or path is too short
     """
-    path[0] = site
+    path[0] = sample
     count, came_from = 1, -1
     noise = 0.2 * surface.length
     step = 2.0 * math.pi / BINS
     cover = np.empty(BINS + 1, np.int64)
     while count < len(path):
-        normal, place, radius = row(surface.normals, site), row(surface.mean, site), radii[site]
+        normal, place, radius = row(surface.normals, sample), row(surface.mean, sample), radii[sample]
         u = across(normal)
         v = cross(normal, u)
         d = subtract(centre, place)
         phi = math.atan2(dot(d, v), dot(d, u))
-        found = flood(surface, site, place, 2.0 * radius)
+        found = flood(surface, sample, place, 2.0 * radius)
         cover[:] = 0
         for i in range(1, found):
             s = surface.queue[i]
@@ -235,24 +235,24 @@ def roll_disc(
         if to < 0:
             return 0, 0
         centre = along(along(place, radius * math.cos(to_angle), u), radius * math.sin(to_angle), v)
-        if seen[site] == to:
+        if seen[sample] == to:
             return 0, 0
-        i = visit[site]
-        if 0 <= i < count - 1 and path[i] == site and path[i + 1] == to:
+        i = visit[sample]
+        if 0 <= i < count - 1 and path[i] == sample and path[i + 1] == to:
             return i, count - 1
-        visit[site] = count - 1
-        came_from = site
-        site = to
-        path[count] = site
+        visit[sample] = count - 1
+        came_from = sample
+        sample = to
+        path[count] = sample
         count += 1
     return 0, 0
 
 
 @kernel
-def come_nearer(surface: Surface, places: np.ndarray, sites: np.ndarray) -> None:
+def come_nearer(surface: Surface, places: np.ndarray, samples: np.ndarray) -> None:
     """Go from the site near each place (M,) on to the nearest one."""
     for m in range(len(places)):
-        sites[m] = walk(surface, sites[m], row(places, m))
+        samples[m] = walk(surface, samples[m], row(places, m))
 
 
 @kernel
@@ -260,7 +260,7 @@ def touch_points(
     surface: Surface,
     places: np.ndarray,
     ahead: np.ndarray,
-    sites: np.ndarray,
+    samples: np.ndarray,
     radius: float,
     touched: np.ndarray,
     begin: int,
@@ -271,18 +271,18 @@ def touch_points(
     Parameters
     ----------
     places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
-    sites : (M,) site near each place
+    samples : (M,) site near each place
     touched : (M, 3) filled with the point that the disc touches first
     """
     noise = 0.35 * surface.length
     for m in range(begin, end):
-        site, place = sites[m], row(places, m)
-        normal = row(surface.normals, site)
+        sample, place = samples[m], row(places, m)
+        normal = row(surface.normals, sample)
         out = unit(cross(row(ahead, m), normal))
         side = cross(normal, out)
         touched[m, 0], touched[m, 1], touched[m, 2] = place
         best = -1e300
-        count = flood(surface, site, row(surface.mean, site), radius + 2.0 * surface.radius)
+        count = flood(surface, sample, row(surface.mean, sample), radius + 2.0 * surface.radius)
         for i in range(count):
             s = surface.queue[i]
             if dot(row(surface.normals, s), normal) < FACING:
@@ -299,11 +299,11 @@ def touch_points(
 
 
 @kernel
-def normals_along(surface: Surface, curve: np.ndarray, site: int, normals: np.ndarray) -> None:
-    """Normal of the scan at each place of a curve, from site to site on its sheet; `site` is near the first place."""
+def normals_along(surface: Surface, curve: np.ndarray, sample: int, normals: np.ndarray) -> None:
+    """Normal of the scan at each place of a curve, from site to site on its sheet; `sample` is near the first place."""
     for m in range(len(curve)):
-        site = walk(surface, site, row(curve, m))
-        normals[m, 0], normals[m, 1], normals[m, 2] = row(surface.normals, site)
+        sample = walk(surface, sample, row(curve, m))
+        normals[m, 0], normals[m, 1], normals[m, 2] = row(surface.normals, sample)
 
 
 @kernel
@@ -314,7 +314,7 @@ def _beside(d: Vector, a: Vector, b: Vector) -> bool:
     """
     rise = dot(d, a) + dot(d, b)
     facing = dot(a, b)
-    return facing > APART and rise * rise <= OVER * OVER * dot(d, d) * 2.0 * (1.0 + facing)
+    return facing > ONE_SHEET_COSINE and rise * rise <= OVER * OVER * dot(d, d) * 2.0 * (1.0 + facing)
 
 
 @kernel
@@ -368,7 +368,7 @@ def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
 
 
 @kernel
-def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, site: int, radius: float) -> float:
+def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, sample: int, radius: float) -> float:
     """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
 
     places : (M, 3) boundary points in order, the surface to their left. site : one near the first place.
@@ -377,9 +377,9 @@ def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, site: i
     free, count = 0, len(places)
     for m in range(count):
         place = row(places, m)
-        site = walk(surface, site, place)
+        sample = walk(surface, sample, place)
         ahead = subtract(row(places, (m + 3) % count), row(places, (m - 3) % count))
-        out = unit(cross(ahead, row(surface.normals, site)))
+        out = unit(cross(ahead, row(surface.normals, sample)))
         centre = along(place, radius, out)
         if search(boxes, surface.mean, centre[0], centre[1], centre[2], 0.6 * radius, found) == 0:
             free += 1

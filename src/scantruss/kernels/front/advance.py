@@ -20,7 +20,7 @@ from .front import (
     FULL,
     LAST,
     MORE,
-    NEAR,
+    MOST_NEAR_NODES,
     NODES,
     SEGMENTS,
     TRIANGLES,
@@ -33,7 +33,7 @@ from .front import (
     rules_at,
 )
 
-ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
+GOOD_ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
 
 
 @kernel
@@ -56,8 +56,8 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
 @kernel
 def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
     """Propose a node where a place falls onto the surface; False where the scan has no points there."""
-    site = front.site[front.tail[s]]
-    if fit_patch(surface, patch, site, place) < 3:
+    sample = front.sample[front.tail[s]]
+    if fit_patch(surface, patch, sample, place) < 3:
         return False
     foot = onto_patch(patch, place)
     near = walk(surface, int(patch[15]), foot)
@@ -100,7 +100,7 @@ def choose_by_quality(
                 score[i] = 0.9 * value
             elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
                 score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
-    enough = ENOUGH * (rules.shape_weight + rules.size_weight)
+    enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = False
     while True:
         best = -1
@@ -156,15 +156,15 @@ def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Ru
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
-    height = 0.4 * rules.desired * surface.field[front.site[a]]
+    height = 0.4 * rules.desired * surface.field[front.sample[a]]
     place = along(along(pa, 0.5, ab), height, turned(ab, row(front.normals, a), 0.5 * math.pi))
-    return rules_at(rules, rules.desired * length_at(surface, front.site[a], place))
+    return rules_at(rules, rules.desired * length_at(surface, front.sample[a], place))
 
 
 @kernel
 def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
-    found = np.empty(NEAR, np.int64)
+    found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):
         if not has_room(front):
@@ -181,7 +181,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 @kernel
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
-    found = np.empty(NEAR, np.int64)
+    found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):
         if not has_room(front):

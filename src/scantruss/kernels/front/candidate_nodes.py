@@ -10,17 +10,17 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import search
 from ..geometry.triangles import distance_to_segment
 from ..geometry.vectors import dot, norm, row, subtract
-from ..mesh.point_location import nearest_site
+from ..mesh.point_location import nearest_sample
 from ..surface.local_surface import PATCH, Surface, fit_patch, patch_normal, walk
-from .front import NEAR, NODES, Front, add_node, propose_node
+from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
-class RowNodes(NamedTuple):
+class CandidateNodes(NamedTuple):
     """Nodes of the rows that the scan is laid out in, for the front to come to."""
 
     places: np.ndarray  #: (K, 3)
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
-    sites: np.ndarray  #: (K,) int64 a site near each
+    samples: np.ndarray  #: (K,) int64 a site near each
     length: float
 
 
@@ -28,27 +28,27 @@ class RowNodes(NamedTuple):
 def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
     """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
     patch = np.zeros(PATCH)
-    first, site = front.count[NODES], -1
+    first, sample = front.count[NODES], -1
     for i in range(len(nodes)):
         place = row(nodes, i)
-        if site >= 0:
-            site = walk(surface, site, place)
-        if site < 0 or norm(subtract(row(surface.mean, site), place)) > 2.0 * surface.step:
-            site = nearest_site(surface, place[0], place[1], place[2])
-        fit_patch(surface, patch, site, place)
+        if sample >= 0:
+            sample = walk(surface, sample, place)
+        if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > 2.0 * surface.step:
+            sample = nearest_sample(surface, place[0], place[1], place[2])
+        fit_patch(surface, patch, sample, place)
         propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)
         add_node(front)
     return first
 
 
 @kernel
-def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) -> None:
+def add_candidate_nodes(front: Front, surface: Surface, candidates: CandidateNodes, clear: float) -> None:
     """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
-    found = np.empty(NEAR, np.int64)
+    found = np.empty(MOST_NEAR_NODES, np.int64)
     begun = front.count[NODES]
-    for i in range(len(rows.places)):
-        place, normal = row(rows.places, i), row(rows.normals, i)
-        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + rows.length, found)
+    for i in range(len(candidates.places)):
+        place, normal = row(candidates.places, i), row(candidates.normals, i)
+        near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + candidates.length, found)
         room = True
         for k in range(near):
             q = found[k]
@@ -60,5 +60,5 @@ def offer_nodes(front: Front, surface: Surface, rows: RowNodes, clear: float) ->
                     room = room and away > clear
                     s = front.out_next[s]
         if room:
-            propose_node(front, place, normal, walk(surface, rows.sites[i], place), False)
+            propose_node(front, place, normal, walk(surface, candidates.samples[i], place), False)
             add_node(front)

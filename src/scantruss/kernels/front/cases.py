@@ -158,8 +158,8 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
     if front.on_boundary[keep]:
         place = row(front.nodes, keep)
     else:
-        site = walk(surface, front.site[c], middle)
-        count = flood(surface, site, middle, 2.0 * surface.step)
+        sample = walk(surface, front.sample[c], middle)
+        count = flood(surface, sample, middle, 2.0 * surface.step)
         least = 1e300
         for i in range(count):
             t = surface.queue[i]
@@ -210,7 +210,7 @@ def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
         front.corner_next[at] = front.corner[keep]
         front.corner[keep] = at
         at = following
-    front.corner[lose] = front.site[lose] = -1
+    front.corner[lose] = front.sample[lose] = -1
     s = front.out[lose]
     while s >= 0:
         following = front.out_next[s]
@@ -262,11 +262,11 @@ def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: n
     middle = along(pa, 0.5, ab)
     r = reach(rules.length, segment, rules.length_weight)
     ideal = along(middle, r, turned(ab, normal, 0.5 * math.pi))
-    site = walk(surface, front.site[a], ideal)
+    sample = walk(surface, front.sample[a], ideal)
     extent = rules.search_range
-    best, chosen, of = -1.0, -1, site
+    best, chosen, of = -1.0, -1, sample
     for _ in range(2):
-        count = flood(surface, site, ideal, 1.5 * extent + surface.step)
+        count = flood(surface, sample, ideal, 1.5 * extent + surface.step)
         for i in range(count):
             t = surface.queue[i]
             if dot(row(surface.normals, t), normal) < 0.0:

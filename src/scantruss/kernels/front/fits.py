@@ -41,7 +41,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
     if facing < -0.5 and flat > 0.7:
         return False
     place = along(row(front.nodes, a), 0.5, d)
-    return linked(surface, front.site[a], front.site[q], place, 0.6 * far + 1.5 * surface.step)
+    return linked(surface, front.sample[a], front.sample[q], place, 0.6 * far + 1.5 * surface.step)
 
 
 @kernel

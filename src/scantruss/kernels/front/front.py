@@ -24,7 +24,7 @@ from ..geometry.vectors import Vector
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
-NEAR = 400  # most front nodes looked at in one step
+MOST_NEAR_NODES = 400  # most front nodes looked at in one step
 
 
 class Rules(NamedTuple):
@@ -66,7 +66,7 @@ class Front(NamedTuple):
 
     nodes: np.ndarray  #: (C, 3)
     normals: np.ndarray  #: (C, 3) outer normals of the surface at the nodes
-    site: np.ndarray  #: (C,) site nearest to each node
+    sample: np.ndarray  #: (C,) site nearest to each node
     on_boundary: np.ndarray  #: (C,) bool
     out: np.ndarray  #: (C,) a front segment that starts at the node, -1: none
     tail: np.ndarray  #: (F,)
@@ -84,13 +84,13 @@ class Front(NamedTuple):
 
 
 @kernel
-def propose_node(front: Front, place: Vector, normal: Vector, site: int, on_boundary: bool) -> int:
+def propose_node(front: Front, place: Vector, normal: Vector, sample: int, on_boundary: bool) -> int:
     """Write down the node that may come next, without adding it; returns its number."""
     n = front.count[NODES]
     for c in range(3):
         front.nodes[n, c] = place[c]
         front.normals[n, c] = normal[c]
-    front.site[n] = site
+    front.sample[n] = sample
     front.on_boundary[n] = on_boundary
     front.out[n] = -1
     front.corner[n] = -1

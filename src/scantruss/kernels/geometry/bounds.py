@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
-BLOCK = 1 << 14  # points that are summed up at a time
+POINTS_PER_BLOCK = 1 << 14  # points that are summed up at a time
 
 
 @kernel
@@ -33,11 +33,11 @@ def move_points(
 ) -> None:
     """Fill moved (N, 3) with points less origin, and sums (blocks, 9) with their x, y, z, xx, xy, xz, yy, yz, zz.
 
-    A row of `sums` for each `BLOCK` of points, from block `begin` to `end` - 1: these do not depend on who fills them.
+    A row of `sums` for each `POINTS_PER_BLOCK` of points, from block `begin` to `end` - 1: these do not depend on who fills them.
     """
     for block in range(begin, end):
         sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0
-        for p in range(block * BLOCK, min((block + 1) * BLOCK, len(points))):
+        for p in range(block * POINTS_PER_BLOCK, min((block + 1) * POINTS_PER_BLOCK, len(points))):
             x, y, z = points[p, 0] - origin[0], points[p, 1] - origin[1], points[p, 2] - origin[2]
             moved[p, 0], moved[p, 1], moved[p, 2] = x, y, z
             sx, sy, sz = sx + x, sy + y, sz + z

@@ -13,10 +13,10 @@ import numpy as np
 from ...runtime.jit import kernel
 
 LEAF = 10  # most points of a leaf
-DEEPEST = 64  # levels of the stack of a search, more than any tree has
+STACK_LEVELS = 64  # levels of the stack of a search, more than any tree has
 
 
-class Tree(NamedTuple):
+class KDTree(NamedTuple):
     """Points in halves of halves; node n has the halves 2 n + 1 and 2 n + 2."""
 
     points: np.ndarray  #: (N, 3) in the order of the leaves
@@ -25,7 +25,7 @@ class Tree(NamedTuple):
     ranges: np.ndarray  #: (nodes, 2) int64 first point and the one after the last
 
 
-def empty_tree(points: np.ndarray) -> Tree:
+def empty_kd_tree(points: np.ndarray) -> KDTree:
     """Return a tree of points (N, 3) that is not yet divided; see `divide`."""
     levels = 0
     while len(points) > LEAF << levels:
@@ -33,11 +33,11 @@ def empty_tree(points: np.ndarray) -> Tree:
     nodes = (2 << levels) - 1
     ranges = np.zeros((nodes, 2), np.int64)
     ranges[0, 1] = len(points)
-    return Tree(np.array(points, np.float64, order="C"), np.arange(len(points)), np.zeros((nodes, 6)), ranges)
+    return KDTree(np.array(points, np.float64, order="C"), np.arange(len(points)), np.zeros((nodes, 6)), ranges)
 
 
 @kernel
-def _swap(tree: Tree, i: int, j: int) -> None:
+def _swap(tree: KDTree, i: int, j: int) -> None:
     """Let two points change places."""
     for c in range(3):
         kept = tree.points[i, c]
@@ -49,7 +49,7 @@ def _swap(tree: Tree, i: int, j: int) -> None:
 
 
 @kernel
-def _select(tree: Tree, axis: int, begin: int, end: int, middle: int) -> None:
+def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
     """Order the points from begin to end - 1 so that none before `middle` has a larger coordinate than any from there on."""
     low, high = begin, end - 1
     while low < high:
@@ -74,7 +74,7 @@ def _select(tree: Tree, axis: int, begin: int, end: int, middle: int) -> None:
 
 
 @kernel
-def divide(tree: Tree, root: int, levels: int) -> None:
+def divide(tree: KDTree, root: int, levels: int) -> None:
     """Divide a node across its longest side, and its halves, so many levels deep; what one root holds no other touches."""
     nodes = len(tree.ranges)
     first, count = root, 1
@@ -102,7 +102,7 @@ def divide(tree: Tree, root: int, levels: int) -> None:
 
 
 @kernel
-def _away(tree: Tree, node: int, x: float, y: float, z: float) -> float:
+def _away(tree: KDTree, node: int, x: float, y: float, z: float) -> float:
     """Squared distance of a place from the box of a node."""
     dx = max(tree.bounds[node, 0] - x, 0.0, x - tree.bounds[node, 3])
     dy = max(tree.bounds[node, 1] - y, 0.0, y - tree.bounds[node, 4])
@@ -112,11 +112,11 @@ def _away(tree: Tree, node: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def nearest(
-    tree: Tree, x: float, y: float, z: float, most: int, stack: np.ndarray, found: np.ndarray, squares: np.ndarray
+    tree: KDTree, x: float, y: float, z: float, most: int, stack: np.ndarray, found: np.ndarray, squares: np.ndarray
 ) -> int:
     """The `most` points nearest to a place, nearest first, with their squared distances; returns how many there are.
 
-    stack (2 `DEEPEST`,), found (>= most,) int64 and squares (>= most,) are filled.
+    stack (2 `STACK_LEVELS`,), found (>= most,) int64 and squares (>= most,) are filled.
     """
     held, top = 0, 1
     stack[0] = 0
@@ -147,7 +147,7 @@ def nearest(
 
 
 @kernel
-def within(tree: Tree, x: float, y: float, z: float, radius: float, stack: np.ndarray, found: np.ndarray) -> int:
+def within(tree: KDTree, x: float, y: float, z: float, radius: float, stack: np.ndarray, found: np.ndarray) -> int:
     """All points within a radius of a place, in the order of the leaves; returns how many, at most len(found)."""
     count, top = 0, 1
     stack[0] = 0
@@ -170,13 +170,13 @@ def within(tree: Tree, x: float, y: float, z: float, radius: float, stack: np.nd
 
 
 @kernel
-def nearest_others(tree: Tree, neighbors: np.ndarray, squares: np.ndarray, begin: int, end: int) -> None:
+def nearest_others(tree: KDTree, neighbors: np.ndarray, squares: np.ndarray, begin: int, end: int) -> None:
     """The K nearest other points of those from `begin` to `end` - 1, nearest first, by their places in the tree; -1 where there are fewer.
 
     neighbors (N, K) int64 and squares (N, K), squared distances, inf where there is none, are filled.
     """
     most = neighbors.shape[1]
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1)
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1)
     for p in range(begin, end):
         count = nearest(tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], most + 1, stack, found, away)
         held = 0

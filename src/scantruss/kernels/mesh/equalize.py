@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Rim, slide
+from ..boundary.curves import Curves, slide
 from ..surface.local_surface import onto_patch
-from .grid import INTERIOR, REST, RIM, Net
+from .grid import INTERIOR, ON_CURVE, REST, Net
 
 ROOT = 4.0 * math.sqrt(3.0)
 STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes move together
@@ -77,7 +77,7 @@ def star_energy(
 
 @kernel
 def settle_node(
-    net: Net, patches: np.ndarray, rim: Rim, v: int, length: float, weight: float, still: float, stride: float
+    net: Net, patches: np.ndarray, curves: Curves, v: int, length: float, weight: float, still: float, stride: float
 ) -> float:
     """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
 
@@ -103,8 +103,8 @@ def settle_node(
     arc = net.arc[v]
     for _ in range(2):
         place = (x - step * gx, y - step * gy, z - step * gz)
-        if kind == RIM:
-            arc, px, py, pz = slide(rim, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
+        if kind == ON_CURVE:
+            arc, px, py, pz = slide(curves, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
             dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
@@ -124,7 +124,7 @@ def settle_node(
 def settle_some(
     net: Net,
     patches: np.ndarray,
-    rim: Rim,
+    curves: Curves,
     awake: np.ndarray,
     some: np.ndarray,
     length: float,
@@ -144,7 +144,7 @@ def settle_some(
             v = some[k]
             if awake[v] == 1:
                 awake[v] = 0
-                gained = settle_node(net, patches, rim, v, length, weight, 1e-4 * length, stride)
+                gained = settle_node(net, patches, curves, v, length, weight, 1e-4 * length, stride)
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1

@@ -14,7 +14,7 @@ import numpy as np
 from ...runtime.jit import kernel
 
 INTERIOR = 0  # slides on the scanned surface
-RIM = 1  # slides on its curve: of the boundary, or, for a node that is not open, of a line
+ON_CURVE = 1  # slides on its curve: of the boundary, or, for a node that is not open, of a line
 REST = 2  # corner or fixed node: never moved, never removed
 LOCKED = 3  # at a defect of the grid (pinch, seam): nothing near it changes
 
@@ -235,15 +235,15 @@ def may_collapse(net: Net, a: int, b: int) -> bool:
             return False
         if place_of(net, a, u) >= 0:
             common += 1
-    on_rim = right < 0 or left < 0
-    if common != (1 if on_rim else 2):
+    on_boundary = right < 0 or left < 0
+    if common != (1 if on_boundary else 2):
         return False
-    if net.is_open[b] == 1 and (not on_rim or net.degree[b] < 3 or net.curve[a] != net.curve[b]):
+    if net.is_open[b] == 1 and (not on_boundary or net.degree[b] < 3 or net.curve[a] != net.curve[b]):
         return False
     for v in (right, left):
         if v >= 0 and net.degree[v] <= lowest_degree(net, v):
             return False
-    after = net.degree[a] + net.degree[b] - (3 if on_rim else 4)
+    after = net.degree[a] + net.degree[b] - (3 if on_boundary else 4)
     return lowest_degree(net, a) <= after < net.ring.shape[1]
 
 
@@ -280,7 +280,7 @@ def collapse(net: Net, a: int, b: int) -> None:
 @kernel
 def slides_on_line(net: Net, v: int) -> bool:
     """Whether a node slides on the curve of a line."""
-    return net.kind[v] == RIM and net.is_open[v] == 0
+    return net.kind[v] == ON_CURVE and net.is_open[v] == 0
 
 
 @kernel
@@ -311,9 +311,9 @@ def split(net: Net, a: int, b: int) -> int:
     net.ring[a, place_of(net, a, b)] = m
     net.ring[b, place_of(net, b, a)] = m
     net.degree[m] = net.line[m] = 0
-    rim = right < 0 or left < 0
-    net.is_open[m], net.kind[m] = (1, RIM) if rim else (0, INTERIOR)
-    net.curve[m] = net.curve[a] if rim else -1
+    curves = right < 0 or left < 0
+    net.is_open[m], net.kind[m] = (1, ON_CURVE) if curves else (0, INTERIOR)
+    net.curve[m] = net.curve[a] if curves else -1
     net.desired[m] = 0.5 * (net.desired[a] + net.desired[b])
     if right >= 0:
         put_in(net, right, place_of(net, right, b) + 1, m)
@@ -324,7 +324,7 @@ def split(net: Net, a: int, b: int) -> int:
         if u >= 0:
             put_in(net, m, net.degree[m], u)
     if line:
-        net.kind[m] = RIM
+        net.kind[m] = ON_CURVE
         net.curve[m] = net.curve[a] if slides_on_line(net, a) else net.curve[b]
         mark_line(net, m, a)
         mark_line(net, m, b)

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Rim, is_open
+from ..boundary.curves import Curves, is_open
 from .grid import Net
 
 
 @kernel
-def arc_on_line(net: Net, rim: Rim, v: int, a: int, b: int) -> float:
+def arc_on_line(net: Net, curves: Curves, v: int, a: int, b: int) -> float:
     """Arc length of node a on the line of node v; a node of several lines is at an end of it, the one on the side away from node b."""
     curve = net.curve[v]
     if net.curve[a] == curve:
         return net.arc[a]
-    first, last = rim.start[curve], rim.start[curve + 1] - 1
+    first, last = curves.start[curve], curves.start[curve + 1] - 1
     before = after = 0.0
     for c in range(3):
-        before += (net.nodes[a, c] - rim.points[first, c]) ** 2
-        after += (net.nodes[a, c] - rim.points[last, c]) ** 2
-    total = rim.total[curve]
+        before += (net.nodes[a, c] - curves.points[first, c]) ** 2
+        after += (net.nodes[a, c] - curves.points[last, c]) ** 2
+    total = curves.total[curve]
     if abs(before - after) > 1e-6 * total * total:
         return 0.0 if before < after else total
     return 0.0 if net.arc[b] < 0.5 * total else total  # a line that comes back to where it starts
 
 
 @kernel
-def halfway(rim: Rim, curve: int, a: float, b: float) -> float:
+def halfway(curves: Curves, curve: int, a: float, b: float) -> float:
     """Arc length half way between two on a line; on a closed one the shorter way."""
     ahead = b - a
-    if not is_open(rim, curve):
-        total = rim.total[curve]
+    if not is_open(curves, curve):
+        total = curves.total[curve]
         ahead = ahead % total
         if ahead > 0.5 * total:
             ahead -= total

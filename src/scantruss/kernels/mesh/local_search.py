@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Rim, at_arc
+from ..boundary.curves import Curves, at_arc
 from ..geometry.vectors import cross, dot, norm, row, subtract
 from .equalize import STRIDE, settle_node
 from .grid import (
-    RIM,
+    ON_CURVE,
     Net,
     collapse,
     flip,
@@ -30,7 +30,7 @@ FLIP, COLLAPSE, SPLIT = 0, 1, 2
 TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
 SWEEPS = 2
 EARLY = (0.35, 1.2, 2.0)  # growth of the energy that may still turn out well, once the quadrangle has settled ...
-HOPE = (0.06, 0.3, 0.5)  # ... and once all nodes around have; for a flip, collapse, split
+ALLOWANCE = (0.06, 0.3, 0.5)  # ... and once all nodes around have; for a flip, collapse, split
 STRAINED = 0.15  # a member that is longer or shorter by this asks for a move
 SHORT, LONG = 1.05, 1.1  # members shorter are not split, longer are not collapsed, in lengths
 STILL = 0.005  # shorter steps are not made in trials, in lengths
@@ -39,19 +39,19 @@ FLIPS = 4  # most of these flips
 
 
 @kernel
-def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
+def place_between(net: Net, curves: Curves, v: int, a: int, b: int) -> None:
     """Put node v halfway between a and b: along their curve if it is on the rim."""
     if slides_on_line(net, v):
-        first = arc_on_line(net, rim, v, a, b)
-        middle = halfway(rim, net.curve[v], first, arc_on_line(net, rim, v, b, a))
-        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(rim, net.curve[v], middle)
-    elif net.kind[v] == RIM:
-        total = rim.total[net.curve[v]]
+        first = arc_on_line(net, curves, v, a, b)
+        middle = halfway(curves, net.curve[v], first, arc_on_line(net, curves, v, b, a))
+        net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(curves, net.curve[v], middle)
+    elif net.kind[v] == ON_CURVE:
+        total = curves.total[net.curve[v]]
         ahead = (net.arc[b] - net.arc[a]) % total if total > 0.0 else 0.0
         if ahead > 0.5 * total:
             ahead -= total
         net.arc[v], net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = at_arc(
-            rim, net.curve[v], net.arc[a] + 0.5 * ahead
+            curves, net.curve[v], net.arc[a] + 0.5 * ahead
         )
     else:
         for c in range(3):
@@ -62,16 +62,16 @@ def place_between(net: Net, rim: Rim, v: int, a: int, b: int) -> None:
 def disorder(net: Net, move: int, a: int, b: int) -> int:
     """By how much a move at the edge a-b changes the sum of squared differences between neighbours and ideal."""
     right, left = wings(net, a, b)
-    rim = right < 0 or left < 0
+    curves = right < 0 or left < 0
     da, db = net.degree[a] - net.ideal[a], net.degree[b] - net.ideal[b]
     change = 0
     if move == FLIP:
         change = 2 - 2 * da - 2 * db
     elif move == COLLAPSE:
-        merged = net.degree[a] + net.degree[b] - (3 if rim else 4) - net.ideal[a]
+        merged = net.degree[a] + net.degree[b] - (3 if curves else 4) - net.ideal[a]
         change = merged * merged - da * da - db * db
     else:
-        change = 1 if rim else 4
+        change = 1 if curves else 4
     for v in (right, left):
         if v >= 0:
             d = net.degree[v] - net.ideal[v]
@@ -105,20 +105,20 @@ def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
 
 
 @kernel
-def make_move(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, move: int, a: int, b: int) -> int:
+def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, move: int, a: int, b: int) -> int:
     """Make a move at the edge a-b; returns the node that a split adds, else -1."""
     if move == FLIP:
         flip(net, a, b)
         return -1
     if move == COLLAPSE:
         if net.kind[a] == net.kind[b]:
-            place_between(net, rim, a, a, b)
+            place_between(net, curves, a, a, b)
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
     for c in range(patches.shape[1]):
         patches[added, c] = patches[a, c]
-    place_between(net, rim, added, a, b)
+    place_between(net, curves, added, a, b)
     net.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.held[added] = scratch.trial[0]
     scratch.around[scratch.gathered[0]] = added
@@ -143,7 +143,7 @@ def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
 def try_move(
     net: Net,
     patches: np.ndarray,
-    rim: Rim,
+    curves: Curves,
     scratch: Scratch,
     move: int,
     a: int,
@@ -168,7 +168,7 @@ def try_move(
         if turn == 1 or not rehearse:
             before = local_energy(net, scratch, length, weight)
             before += worth if move == SPLIT else (-worth if move == COLLAPSE else 0.0)
-        added = make_move(net, patches, rim, scratch, move, a, b)
+        added = make_move(net, patches, curves, scratch, move, a, b)
         if tidied:
             change += tidy(net, scratch, 4)
         if turn == 0 and rehearse:
@@ -179,11 +179,11 @@ def try_move(
         break
     for turn in range(1 + SWEEPS):
         for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
-            settle_node(net, patches, rim, scratch.around[i], length, weight, STILL * length, STRIDE)
+            settle_node(net, patches, curves, scratch.around[i], length, weight, STILL * length, STRIDE)
         if turn == 0 and added >= 0:
-            settle_node(net, patches, rim, added, length, weight, STILL * length, STRIDE)
+            settle_node(net, patches, curves, added, length, weight, STILL * length, STRIDE)
         after = local_energy(net, scratch, length, weight)
-        if after > before + (EARLY[move] if turn == 0 else HOPE[move]):
+        if after > before + (EARLY[move] if turn == 0 else ALLOWANCE[move]):
             break
     if after < before - 1e-4:
         for i in range(scratch.gathered[0]):
@@ -221,7 +221,7 @@ def is_allowed(net: Net, move: int, a: int, b: int) -> bool:
 def search(
     net: Net,
     patches: np.ndarray,
-    rim: Rim,
+    curves: Curves,
     scratch: Scratch,
     length: float,
     weight: float,
@@ -270,7 +270,7 @@ def search(
                 continue
             half = 0.5 if move == SPLIT else -0.5
             worth = share + price * (strain - 0.5 * (free - net.spare[0] + half) / count)
-            if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
+            if try_move(net, patches, curves, scratch, move, a, b, length, weight, worth):
                 i = 0
         if left:
             scratch.tried[v] = 0

@@ -35,7 +35,7 @@ def farthest(net: Net, start: int, among: np.ndarray, away: np.ndarray, queue: n
 
 
 @kernel
-def ways_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.ndarray) -> bool:
+def paths_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.ndarray) -> bool:
     """Fill away (2, C) with the members from two far ends of the nodes `among` (C,) bool to each node; False where none is among.
 
     The ends depend on the net alone, not on where it lies.

@@ -8,21 +8,21 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Rim
+from ..boundary.curves import Curves
 from ..geometry.vectors import fill_row, norm, row, subtract
 from .equalize import STRIDE, settle_node
 from .grid import LOCKED, Net, place_of, target_length, wings
 from .local_search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
 from .trial import Scratch, gather, local_energy
 
-WIDE, SEARCHED, KICKED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
-MOST = 400  # nodes of an area
+WIDE, SEARCHED, PERTURBED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
+MOST_NODES = 400  # nodes of an area
 KEPT = 32  # free nodes at the top of the stack that are written down
 MOVES = 3  # most random moves of a kick
-ROUNDS = 2  # of settling and searching
+SEARCH_ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
-HOPELESS = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
-HOPE = 0.2  # the same once searched: what costs more hardly ever does
+ALLOWANCE_SETTLED = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
+ALLOWANCE_SEARCHED = 0.2  # the same once searched: what costs more hardly ever does
 LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
 
 
@@ -54,7 +54,7 @@ class Area(NamedTuple):
 
 
 @kernel
-def chance(area: Area, choices: int) -> int:
+def random_choice(area: Area, choices: int) -> int:
     """A number from 0 to choices - 1, the same in every run."""
     area.seed[0] = (area.seed[0] * 1103515245 + 12345) & 0x7FFFFFFF
     return (area.seed[0] >> 8) % choices
@@ -131,7 +131,7 @@ def added_node(net: Net, area: Area, k: int) -> int:
     if net.degree[v] == 0:
         return -1
     if area.mark[v] != area.number[0]:
-        area.mark[v], area.away[v] = area.number[0], KICKED
+        area.mark[v], area.away[v] = area.number[0], PERTURBED
     return v
 
 
@@ -167,42 +167,49 @@ def is_within(net: Net, area: Area, a: int, b: int) -> bool:
 
 
 @kernel
-def move_at_random(net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, area: Area) -> int:
+def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, area: Area) -> int:
     """Make some random moves near the kicked node; returns how many."""
     made = 0
-    for _ in range(1 + chance(area, MOVES)):
+    for _ in range(1 + random_choice(area, MOVES)):
         near = 1
-        while near < area.gathered[0] and area.away[area.around[near]] <= KICKED:
+        while near < area.gathered[0] and area.away[area.around[near]] <= PERTURBED:
             near += 1
-        a = area.around[chance(area, near)]
+        a = area.around[random_choice(area, near)]
         if net.degree[a] == 0:
             continue
-        b = net.ring[a, chance(area, net.degree[a])]
-        kind = chance(area, 5)
+        b = net.ring[a, random_choice(area, net.degree[a])]
+        kind = random_choice(area, 5)
         move = FLIP if kind < 3 else (COLLAPSE if kind == 3 else SPLIT)
         if is_allowed(net, move, a, b) and is_within(net, area, a, b):
             gather(net, scratch, a, b)
-            added = make_move(net, patches, rim, scratch, move, a, b)
+            added = make_move(net, patches, curves, scratch, move, a, b)
             if added >= 0:
-                area.mark[added], area.away[added] = area.number[0], KICKED
+                area.mark[added], area.away[added] = area.number[0], PERTURBED
             made += 1
     return made
 
 
 @kernel
-def settle_area(net: Net, patches: np.ndarray, rim: Rim, area: Area, length: float, weight: float) -> None:
+def settle_area(net: Net, patches: np.ndarray, curves: Curves, area: Area, length: float, weight: float) -> None:
     """Settle the nodes of the area but those at its edge."""
     for _ in range(CALM):
         for k in range(area.gathered[0] + area.saved[0]):
             listed = k < area.gathered[0]
             v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
             if v >= 0 and net.degree[v] > 0 and area.away[v] < WIDE:
-                settle_node(net, patches, rim, v, length, weight, STILL * length, STRIDE)
+                settle_node(net, patches, curves, v, length, weight, STILL * length, STRIDE)
 
 
 @kernel
 def search_area(
-    net: Net, patches: np.ndarray, rim: Rim, scratch: Scratch, area: Area, length: float, weight: float, worth: float
+    net: Net,
+    patches: np.ndarray,
+    curves: Curves,
+    scratch: Scratch,
+    area: Area,
+    length: float,
+    weight: float,
+    worth: float,
 ) -> int:
     """Try moves at the irregular nodes in the middle of the area that are not marked as tried; returns how many were kept."""
     kept = 0
@@ -231,7 +238,7 @@ def search_area(
             size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
             if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
                 continue
-            if try_move(net, patches, rim, scratch, move, a, b, length, weight, worth):
+            if try_move(net, patches, curves, scratch, move, a, b, length, weight, worth):
                 kept += 1
                 i = 0
     return kept
@@ -260,42 +267,42 @@ def is_as_before(net: Net, area: Area) -> bool:
 
 
 @kernel
-def kick(
+def perturb(
     net: Net,
     patches: np.ndarray,
-    rim: Rim,
+    curves: Curves,
     scratch: Scratch,
     area: Area,
     length: float,
     weight: float,
     worth: float,
     bend: float,
-    heat: float,
-    hope: float,
+    temperature: float,
+    allowance: float,
 ) -> bool:
     """Kick the grid in the area that is listed; True if that has paid, else all is as before.
 
     worth, bend : n more nodes may cost worth n - bend n^2
-    hope : what still costs more once it is searched is given up; below HOPELESS, so is what the search has undone
+    allowance : what still costs more once it is searched is given up; below ALLOWANCE_SETTLED, so is what the search has undone
     """
     before = area_energy(net, scratch, area, length, weight)
-    if move_at_random(net, patches, rim, scratch, area) == 0:
+    if move_at_random(net, patches, curves, scratch, area) == 0:
         return False
-    for turn in range(ROUNDS):
+    for turn in range(SEARCH_ROUNDS):
         forget_trials(scratch, area)
-        settle_area(net, patches, rim, area, length, weight)
-        if area_energy(net, scratch, area, length, weight) - before > (HOPELESS if turn == 0 else hope):
+        settle_area(net, patches, curves, area, length, weight)
+        if area_energy(net, scratch, area, length, weight) - before > (ALLOWANCE_SETTLED if turn == 0 else allowance):
             put_area_back(net, patches, area)
             return False
-        if search_area(net, patches, rim, scratch, area, length, weight, worth) == 0:
+        if search_area(net, patches, curves, scratch, area, length, weight, worth) == 0:
             break
-        if turn == 0 and hope < HOPELESS and is_as_before(net, area):
+        if turn == 0 and allowance < ALLOWANCE_SETTLED and is_as_before(net, area):
             put_area_back(net, patches, area)
             return False
-    settle_area(net, patches, rim, area, length, weight)
+    settle_area(net, patches, curves, area, length, weight)
     after = area_energy(net, scratch, area, length, weight)
     more = area.spare[0] - net.spare[0]
-    luck = -heat * math.log((chance(area, 100000) + 1.0) / 100001.0) if heat > 0.0 else -1e-4
+    luck = -temperature * math.log((random_choice(area, 100000) + 1.0) / 100001.0) if temperature > 0.0 else -1e-4
     if after - before < worth * more - bend * more * more + luck:
         area.paid[0] += 1
         return True
@@ -304,10 +311,10 @@ def kick(
 
 
 @kernel
-def kick_all(
+def perturb_all(
     net: Net,
     patches: np.ndarray,
-    rim: Rim,
+    curves: Curves,
     scratch: Scratch,
     area: Area,
     waiting: np.ndarray,
@@ -317,8 +324,8 @@ def kick_all(
     price: float,
     share: float,
     count: int,
-    heat: float,
-    hope: float,
+    temperature: float,
+    allowance: float,
 ) -> int:
     """Kick the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
 
@@ -327,7 +334,7 @@ def kick_all(
     waiting : (C,) bool; on return only of nodes with one out of bounds around them
     strain, price, share : as in `search`
     count : V, as in `search`; those within bounds
-    heat, hope : as in `kick`
+    temperature, allowance : as in `perturb`
     """
     paid, free = area.paid[0], net.spare[0]
     for v in range(net.in_use[0]):
@@ -339,5 +346,7 @@ def kick_all(
         waiting[v] = listed == BEYOND
         if listed == LISTED:
             worth = share + price * (strain - 0.5 * (free - net.spare[0]) / count)
-            kick(net, patches, rim, scratch, area, length, weight, worth, 0.25 * price / count, heat, hope)
+            perturb(
+                net, patches, curves, scratch, area, length, weight, worth, 0.25 * price / count, temperature, allowance
+            )
     return area.paid[0] - paid

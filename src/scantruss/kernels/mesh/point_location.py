@@ -5,67 +5,67 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Rim, nearest_on_rim, slide
+from ..boundary.curves import Curves, nearest_on_curves, slide
 from ..geometry.vectors import fill_row, norm, row, subtract
 from ..surface.local_surface import Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
-from .grid import INTERIOR, REST, RIM, Net
+from .grid import INTERIOR, ON_CURVE, REST, Net
 
-ASTRAY = 0.5  # a patch that passes a node at this distance is none of its sheet, in lengths
+OFF_SHEET = 0.5  # a patch that passes a node at this distance is none of its sheet, in lengths
 
 
 @kernel
-def nearest_site(surface: Surface, x: float, y: float, z: float) -> int:
+def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
     """Site of the scan nearest to a place, by trying all."""
-    best, site = np.inf, 0
+    best, sample = np.inf, 0
     for s in range(len(surface.mean)):
         dx, dy, dz = surface.mean[s, 0] - x, surface.mean[s, 1] - y, surface.mean[s, 2] - z
         square = dx * dx + dy * dy + dz * dz
         if square < best:
-            best, site = square, s
-    return site
+            best, sample = square, s
+    return sample
 
 
 @kernel
-def seat_nodes(
-    net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, seated: np.ndarray
+def locate_nodes(
+    net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, located: np.ndarray
 ) -> None:
     """Find the site under every node; from node to node over the members, so that each stays on its sheet of the scan.
 
-    `queue` and `seated` (C,) int64 are scratch, zero at the start.
+    `queue` and `located` (C,) int64 are scratch, zero at the start.
     """
     used = net.in_use[0]
     for seed in range(used):
-        if seated[seed] == 1 or net.degree[seed] == 0:
+        if located[seed] == 1 or net.degree[seed] == 0:
             continue
         queue[0], count, at = seed, 1, 0
-        seated[seed] = 1
-        patches[seed, 15] = nearest_site(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
+        located[seed] = 1
+        patches[seed, 15] = nearest_sample(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
         while at < count:
             v = queue[at]
             at += 1
             place = row(net.nodes, v)
-            site = walk(surface, int(patches[v, 15]), place)
-            if norm(subtract(row(surface.mean, site), place)) > 0.5 * length:
-                site = nearest_site(surface, place[0], place[1], place[2])
-            patches[v, 15] = site
+            sample = walk(surface, int(patches[v, 15]), place)
+            if norm(subtract(row(surface.mean, sample), place)) > 0.5 * length:
+                sample = nearest_sample(surface, place[0], place[1], place[2])
+            patches[v, 15] = sample
             for i in range(net.degree[v]):
                 u = net.ring[v, i]
-                if seated[u] == 0:
-                    seated[u] = 1
-                    patches[u, 15] = site
+                if located[u] == 0:
+                    located[u] = 1
+                    patches[u, 15] = sample
                     queue[count] = u
                     count += 1
 
 
 @kernel
-def seat_on_rim(net: Net, rim: Rim, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
+def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
     """Find the place of every boundary node on the curves; those that are no corner (K, 3) and not fixed may slide from there."""
     for v in range(net.in_use[0]):
         if net.is_open[v] == 0 or net.kind[v] != REST:
             continue
         place = row(net.nodes, v)
-        curve, arc, distance = nearest_on_rim(rim, place[0], place[1], place[2])
+        curve, arc, distance = nearest_on_curves(curves, place[0], place[1], place[2])
         if curve < 0 or distance > 0.5 * length:
             continue
         net.curve[v], net.arc[v] = curve, arc
@@ -73,7 +73,7 @@ def seat_on_rim(net: Net, rim: Rim, corners: np.ndarray, fixed: np.ndarray, leng
         for k in range(len(corners)):
             free = free and norm(subtract(row(corners, k), place)) > 1e-6 * length
         if free:
-            net.kind[v] = RIM
+            net.kind[v] = ON_CURVE
 
 
 @kernel
@@ -91,7 +91,7 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
                 local = surface.length * net.desired[v]
-                if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > ASTRAY * local:
+                if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > OFF_SHEET * local:
                     fill_row(patches[v], before)
                 count += 1
     return count
@@ -106,14 +106,14 @@ def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, e
 
 
 @kernel
-def return_to_scan(net: Net, patches: np.ndarray, rim: Rim, reach: float) -> None:
+def return_to_scan(net: Net, patches: np.ndarray, curves: Curves, reach: float) -> None:
     """Bring every free node back: onto its patch of the scanned surface, or onto its boundary curve within `reach` along it."""
     for v in range(net.in_use[0]):
         x, y, z = row(net.nodes, v)
         if net.degree[v] > 0 and net.kind[v] == INTERIOR:
             x, y, z = onto_patch(patches[v], (x, y, z))
-        elif net.degree[v] > 0 and net.kind[v] == RIM:
-            net.arc[v], x, y, z = slide(rim, net.curve[v], net.arc[v], reach * net.desired[v], x, y, z)
+        elif net.degree[v] > 0 and net.kind[v] == ON_CURVE:
+            net.arc[v], x, y, z = slide(curves, net.curve[v], net.arc[v], reach * net.desired[v], x, y, z)
         net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = x, y, z
 
 

@@ -11,10 +11,12 @@ from .grid import INTERIOR, Net
 
 LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
-ALIKE = 0.85  # patches of radii nearer to each other are as good as one
+EQUAL_PATCH_RATIO = 0.85  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
 TERMS = 6.0  # of a quadric: so many points it passes through
-FEW = 24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much
+FEWEST_FOR_WIDE_PATCH = (
+    24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much
+)
 
 
 @kernel
@@ -25,22 +27,22 @@ def _away(patch: np.ndarray, taken: int) -> float:
 
 @kernel
 def _fit_widest(
-    fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, narrow: np.ndarray, site: int, place: Vector
+    fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, narrow: np.ndarray, sample: int, place: Vector
 ) -> int:
     """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off.
 
     Points along one scan line tell nothing of the surface beside it, and a few too little: such a patch is too narrow, however near
     they lie.
     """
-    taken = fit_patch(fine, patch, site, place)
+    taken = fit_patch(fine, patch, sample, place)
     fill_row(narrow, patch)
     least = _away(patch, taken)
     kept = patch.copy()
     for turn in range(2):
-        if turn == 0 and middle.patch_radius > ALIKE * broad.patch_radius:
+        if turn == 0 and middle.patch_radius > EQUAL_PATCH_RATIO * broad.patch_radius:
             continue
-        more = fit_patch(middle if turn == 0 else broad, patch, site, place)
-        too_narrow = kept[18] < LINED or taken < FEW
+        more = fit_patch(middle if turn == 0 else broad, patch, sample, place)
+        too_narrow = kept[18] < LINED or taken < FEWEST_FOR_WIDE_PATCH
         away = _away(patch, more)
         if more < 4 or (away > LIKE * least and not too_narrow):
             fill_row(patch, kept)
@@ -53,7 +55,7 @@ def _fit_widest(
 
 
 @kernel
-def land_nodes(
+def project_nodes(
     net: Net,
     fine: Surface,
     middle: Surface,

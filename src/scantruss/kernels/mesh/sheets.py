@@ -37,7 +37,7 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
 
 
 @kernel
-def first_torn(
+def first_disconnected(
     links: np.ndarray, nearest: np.ndarray, first: np.ndarray, ends: np.ndarray, most: int, enough: int
 ) -> int:
     """The first site whose node is far in the grid from that of a site linked to it; -1 where there are fewer than `enough` such links.
@@ -50,7 +50,7 @@ def first_torn(
     most : members one after the other that still lead from node to node
     """
     stamp, queue = np.full(len(first) - 1, -1, np.int64), np.empty(len(first) - 1, np.int64)
-    torn, site, number = 0, -1, 0
+    disconnected, sample, number = 0, -1, 0
     for s in range(len(nearest)):
         a = nearest[s]
         for k in range(links.shape[1] if a >= 0 else 0):
@@ -74,7 +74,7 @@ def first_torn(
                 if found:
                     break
             if not found:
-                torn += 1
-                if site < 0:
-                    site = s
-    return site if torn >= enough else -1
+                disconnected += 1
+                if sample < 0:
+                    sample = s
+    return sample if disconnected >= enough else -1

@@ -9,7 +9,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import cross, dot, norm, row, subtract
 from .equalize import ROOT
-from .grid import INTERIOR, RIM, Net, slides_on_line
+from .grid import INTERIOR, ON_CURVE, Net, slides_on_line
 
 
 @kernel
@@ -25,7 +25,7 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
         before[v, 0], before[v, 1], before[v, 2] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     for v in range(used):
         d = net.degree[v]
-        if d == 0 or net.kind[v] > RIM:
+        if d == 0 or net.kind[v] > ON_CURVE:
             continue
         along_line = slides_on_line(net, v)
         step = 1 if net.kind[v] == INTERIOR or along_line else d - 1

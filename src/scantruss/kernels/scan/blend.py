@@ -11,13 +11,13 @@ from .overlap import moved, turned
 
 
 @kernel
-def depths(places: np.ndarray, rims: np.ndarray, boxes: SearchBoxes, most: float, depth: np.ndarray) -> None:
+def depths(places: np.ndarray, boundary_points: np.ndarray, boxes: SearchBoxes, most: float, depth: np.ndarray) -> None:
     """Distance of each place (S, 3) from the nearest place at a rim (R, 3), at most `most`; boxes : of the rims."""
     for s in range(len(places)):
-        n = nearest(boxes, rims, places[s, 0], places[s, 1], places[s, 2], most)
+        n = nearest(boxes, boundary_points, places[s, 0], places[s, 1], places[s, 2], most)
         depth[s] = most
         if n >= 0:
-            d = subtract(row(places, s), row(rims, n))
+            d = subtract(row(places, s), row(boundary_points, n))
             depth[s] = np.sqrt(dot(d, d))
 
 

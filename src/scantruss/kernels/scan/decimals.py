@@ -9,7 +9,7 @@ from ...runtime.jit import kernel
 POWERS = 10.0 ** np.arange(23)  # exact, all of them
 FULL = 100_000_000_000_000_000  # a mantissa above takes no further digit
 WHOLE = 1 << 53  # whole numbers below are doubles
-DOUBT = 1e-12  # of a correction: what its own rounding may change
+CORRECTION_ERROR = 1e-12  # of a correction: what its own rounding may change
 BAD, GOOD, SLOW = 0, 1, 2  # no number; a number; a number whose rounding must be left to Python
 
 
@@ -49,10 +49,10 @@ def scaled(mantissa: int, rest: float, power: int) -> tuple[float, int]:
         value = main / scale
         product, lost = times(value, scale)
         left = (main - product) - lost
-        step, doubt = (left + small) / scale, (abs(left) + abs(small)) / scale * DOUBT
+        step, doubt = (left + small) / scale, (abs(left) + abs(small)) / scale * CORRECTION_ERROR
     else:
         value, lost = times(main, scale)
-        step, doubt = lost + small * scale, (abs(lost) + abs(small) * scale) * DOUBT
+        step, doubt = lost + small * scale, (abs(lost) + abs(small) * scale) * CORRECTION_ERROR
     result = value + step
     certain = value + (step - doubt) == result and value + (step + doubt) == result
     return result, GOOD if certain else SLOW

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import DEEPEST, Tree, nearest
+from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.vectors import dot, row, subtract
 
 
 @kernel
 def turn_like_beside(
-    tree: Tree, settled: np.ndarray, points: np.ndarray, normals: np.ndarray, beside: int, begin: int, end: int
+    tree: KDTree, settled: np.ndarray, points: np.ndarray, normals: np.ndarray, beside: int, begin: int, end: int
 ) -> None:
     """Turn the normals of points to the side of that point of the tree, of the nearest few, that lies most beside them.
 
     settled : normals of the points of the tree. normals (N, 3), turned in place. What stands over a point is on another sheet.
     """
-    stack, found, squares = np.empty(2 * DEEPEST, np.int64), np.empty(beside, np.int64), np.empty(beside)
+    stack, found, squares = np.empty(2 * STACK_LEVELS, np.int64), np.empty(beside, np.int64), np.empty(beside)
     for p in range(begin, end):
         place, normal = row(points, p), row(normals, p)
         best, side = np.inf, 1.0

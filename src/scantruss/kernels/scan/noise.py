@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import DEEPEST, Tree
+from ..geometry.kd_tree import STACK_LEVELS, KDTree
 from ..geometry.quadric import COLUMNS
 from ..geometry.vectors import along, dot, row, subtract, unit
 from ..surface.patches import PATCH, fit, foot, gather
 
 ROOM = 600  # most points around a place
-STEP = 1.3  # from one radius to the next narrower one
-ROUNDS = 2  # fits of a patch, the second with the points that lie off the first weighed down
+RADIUS_RATIO = 1.3  # from one radius to the next narrower one
+PATCH_FITS = 2  # fits of a patch, the second with the points that lie off the first weighed down
 
 
 @kernel
 def fit_patches(
-    tree: Tree,
+    tree: KDTree,
     centres: np.ndarray,
     radii: np.ndarray,
     widest: float,
@@ -36,20 +36,20 @@ def fit_patches(
     usual : (C,) rms distance of the points from a patch that fits
     patches : (C, PATCH), filled; column 13 with how flat the distances of the points from it are distributed, see `_flatness`
     """
-    stack, found = np.empty(2 * DEEPEST, np.int64), np.empty(ROOM, np.int64)
+    stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(ROOM, np.int64)
     buffer, matrix, patch = np.zeros((ROOM, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
     for i in range(begin, end):
         place = row(tree.points, centres[i])
         taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
         share = widest
         while taken == ROOM and share > 1.0:
-            share = max(share / STEP, 1.0)
+            share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:
-            fit(buffer, taken, share * radii[i], ROUNDS, patch, matrix)
+            fit(buffer, taken, share * radii[i], PATCH_FITS, patch, matrix)
             if patch[12] <= usual[i] or share <= 1.0:
                 break
-            share = max(share / STEP, 1.0)
+            share = max(share / RADIUS_RATIO, 1.0)
         patch[13] = _flatness(buffer, taken, patch[15])
         for c in range(PATCH):
             patches[i, c] = patch[c]
@@ -68,7 +68,7 @@ def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
 
 @kernel
 def onto_patches(
-    tree: Tree,
+    tree: KDTree,
     number: np.ndarray,
     patches: np.ndarray,
     neighbors: np.ndarray,

@@ -7,21 +7,23 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import DEEPEST, Tree, nearest
+from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.quadric import COLUMNS
 from ..geometry.vectors import Vector, dot, norm, row, smallest_eigenvector, spread_along, subtract
 from ..surface.patches import FLAT, FULL, PATCH, doubt, fit
 
-ROUNDS = 3  # fits of a patch, each with the points that lie off the one before weighed down
+PATCH_FITS = 3  # fits of a patch, each with the points that lie off the one before weighed down
 BULK = 40  # points around a place that tell a cloud from a crease
 THICK = 0.2  # thickness, in radii, from which on the points around a place are no surface to stand off from
 
 
 @kernel
-def nearest_alive(tree: Tree, alive: np.ndarray, which: np.ndarray, neighbors: np.ndarray, squares: np.ndarray) -> None:
+def nearest_alive(
+    tree: KDTree, alive: np.ndarray, which: np.ndarray, neighbors: np.ndarray, squares: np.ndarray
+) -> None:
     """Fill the rows of some points in the table of `nearest_others` anew, from points that are alive (N,) bool."""
     most = neighbors.shape[1]
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(3 * most, np.int64), np.empty(3 * most)
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(3 * most, np.int64), np.empty(3 * most)
     for i in range(len(which)):
         p = which[i]
         count = nearest(tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], 3 * most, stack, found, away)
@@ -54,7 +56,7 @@ def usual_reaches(
 
 @kernel
 def stand_off(
-    tree: Tree,
+    tree: KDTree,
     alive: np.ndarray,
     which: np.ndarray,
     around: int,
@@ -68,7 +70,7 @@ def stand_off(
     A point itself is left out of its surface. What is expected grows with the thickness of the points there and with the doubt
     about the surface, large at a rim. least : part of the radius that counts as thickness in any case.
     """
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
     buffer, matrix, patch = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
     for i in range(begin, end):
         p = which[i]
@@ -88,7 +90,7 @@ def stand_off(
             most *= 2
         if taken < FULL or radius <= 0.0:
             continue
-        fit(buffer, taken, radius, ROUNDS, patch, matrix)
+        fit(buffer, taken, radius, PATCH_FITS, patch, matrix)
         if patch[12] > THICK * radius:
             continue
         doubt(buffer, taken, 6 if patch[14] >= FULL else (3 if patch[14] >= FLAT else 1), patch, matrix)
@@ -114,7 +116,7 @@ def _plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, f
 
 @kernel
 def measure_planes(
-    tree: Tree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
+    tree: KDTree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
 ) -> None:
     """How thick the nearest of points `which` lie, in radii, and how far off their plane each is, in thicknesses; (P,), filled."""
     offsets = np.empty((neighbors.shape[1], 3))
@@ -139,12 +141,12 @@ def measure_planes(
 
 
 @kernel
-def measure_bulk(tree: Tree, alive: np.ndarray, which: np.ndarray, bulk: np.ndarray, begin: int, end: int) -> None:
+def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.ndarray, begin: int, end: int) -> None:
     """Share of the spread of the living points around each of `which` that is across their plane; bulk (P,), filled.
 
     0 on a surface, 1/3 where points lie to all sides alike, and little more than half of that in a sharp crease.
     """
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
     offsets = np.empty((BULK, 3))
     for i in range(begin, end):
         place = row(tree.points, which[i])
@@ -185,18 +187,18 @@ def join_near(neighbors: np.ndarray, squares: np.ndarray, reach: np.ndarray, far
 
 
 @kernel
-def nearest_of_places(tree: Tree, places: np.ndarray, away: np.ndarray, which: np.ndarray) -> None:
+def nearest_of_places(tree: KDTree, places: np.ndarray, away: np.ndarray, which: np.ndarray) -> None:
     """Distance of each place (P, 3) from the nearest point of a tree, and the number that this point had."""
-    stack, found, squares = np.empty(2 * DEEPEST, np.int64), np.empty(1, np.int64), np.empty(1)
+    stack, found, squares = np.empty(2 * STACK_LEVELS, np.int64), np.empty(1, np.int64), np.empty(1)
     for i in range(len(places)):
         nearest(tree, places[i, 0], places[i, 1], places[i, 2], 1, stack, found, squares)
         away[i], which[i] = math.sqrt(squares[0]), tree.ids[found[0]]
 
 
 @kernel
-def ranked_of_places(tree: Tree, places: np.ndarray, rank: int, squares: np.ndarray) -> None:
+def ranked_of_places(tree: KDTree, places: np.ndarray, rank: int, squares: np.ndarray) -> None:
     """Squared distance of each place (P, 3) from the point of a tree that is at a rank of nearness to it, 1 for the nearest."""
-    stack, found, away = np.empty(2 * DEEPEST, np.int64), np.empty(rank, np.int64), np.empty(rank)
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(rank, np.int64), np.empty(rank)
     for i in range(len(places)):
         count = nearest(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away)
         squares[i] = away[count - 1]

@@ -23,7 +23,7 @@ def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, rea
 
 
 @kernel
-def mark_rim(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, aside: np.ndarray) -> None:
+def mark_boundary(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, aside: np.ndarray) -> None:
     """How far the mean of its neighbours lies aside of each place, in the reach of the farthest; near 0.4 at a straight rim."""
     for s in range(len(places)):
         o = row(places, s)
@@ -117,10 +117,10 @@ def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: 
 def step_sums(
     points: np.ndarray,
     normals: np.ndarray,
-    rim: np.ndarray,
+    on_boundary: np.ndarray,
     places: np.ndarray,
     place_normals: np.ndarray,
-    place_rim: np.ndarray,
+    place_at_boundary: np.ndarray,
     boxes: SearchBoxes,
     pose: np.ndarray,
     back: np.ndarray,
@@ -142,7 +142,7 @@ def step_sums(
     for p in range(0, len(points), every):
         q = moved(back, row(points, p))
         n = nearest(boxes, places, q[0], q[1], q[2], reach)
-        if n < 0 or place_rim[n]:
+        if n < 0 or place_at_boundary[n]:
             continue
         v = turned(back, row(normals, p))
         m = row(place_normals, n)
@@ -182,7 +182,7 @@ def judge(
     normals: np.ndarray,
     places: np.ndarray,
     place_normals: np.ndarray,
-    place_rim: np.ndarray,
+    place_at_boundary: np.ndarray,
     boxes: SearchBoxes,
     back: np.ndarray,
     turn: float,
@@ -200,7 +200,7 @@ def judge(
     for p in range(len(points)):
         q = moved(back, row(points, p))
         n = nearest(boxes, places, q[0], q[1], q[2], reach)
-        if n < 0 or place_rim[n]:
+        if n < 0 or place_at_boundary[n]:
             continue
         m = row(place_normals, n)
         d = subtract(q, row(places, n))

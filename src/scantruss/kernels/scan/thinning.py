@@ -16,10 +16,10 @@ from ...runtime.jit import kernel
 STEPS = 4294967296.0  # along the side of a box; 2**31 points fit into a box
 FARTHEST = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box is finer than float64
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
-LARGEST = 9223372036854775807  # int64
+LARGEST_INTEGER = 9223372036854775807  # int64
 ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
 WIDE = 2  # boxes to every side that tell whether a box is at the rim
-AROUND = 2.0  # radius about its mean within which the means of others count [box]
+BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
 ASIDE = 0.25  # it is at the rim where their middle lies farther aside than this [box]
 
 
@@ -36,8 +36,8 @@ class BoxTable(NamedTuple):
 def slot_of_box(slots: np.ndarray, rows: np.ndarray, i: int, j: int, k: int) -> int:
     """Slot of a box: where it is, or the free slot where it would go. Eight boxes along x lie side by side, as scans come."""
     mask = len(slots) - 1
-    mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST
-    mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST
+    mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST_INTEGER
+    mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST_INTEGER
     slot = (8 * (mixed ^ (mixed >> 19)) + (i & 7)) & mask
     while slots[slot] >= 0:
         row = slots[slot]
@@ -192,7 +192,7 @@ def take_nearest(
 
 
 @kernel
-def rim_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
+def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
     """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the rim that lie on its outer side.
 
     Returns their number. A box is at the rim where the middle of the points around it, the nearer the more they count, lies
@@ -213,7 +213,9 @@ def rim_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray
                         means[other, 1] - means[row, 1],
                         means[other, 2] - means[row, 2],
                     )
-                    weight = table.rows[other, COUNT] * (1.0 - (dx * dx + dy * dy + dz * dz) / (AROUND * size) ** 2)
+                    weight = table.rows[other, COUNT] * (
+                        1.0 - (dx * dx + dy * dy + dz * dz) / (BLEND_RADIUS * size) ** 2
+                    )
                     if weight > 0.0:
                         around += weight
                         x, y, z = x + weight * dx, y + weight * dy, z + weight * dz

@@ -41,19 +41,19 @@ class Surface(NamedTuple):
 
 
 @kernel
-def walk(surface: Surface, site: int, place: Vector) -> int:
+def walk(surface: Surface, sample: int, place: Vector) -> int:
     """Site nearest to a place, reached by going downhill over the links: never leaves the sheet."""
-    return descend(surface, site, place, place, math.inf)
+    return descend(surface, sample, place, place, math.inf)
 
 
 @kernel
-def descend(surface: Surface, site: int, target: Vector, place: Vector, reach: float) -> int:
+def descend(surface: Surface, sample: int, target: Vector, place: Vector, reach: float) -> int:
     """Site reached over links by steps that each come nearer to a target, to sites within `reach` of a place only."""
-    best = _square(row(surface.mean, site), target)
+    best = _square(row(surface.mean, sample), target)
     while True:
         to = -1
         for k in range(surface.neighbors.shape[1]):
-            n = surface.neighbors[site, k]
+            n = surface.neighbors[sample, k]
             if n < 0:
                 break
             at = row(surface.mean, n)
@@ -61,8 +61,8 @@ def descend(surface: Surface, site: int, target: Vector, place: Vector, reach: f
             if square < best and _square(at, place) <= reach * reach:
                 best, to = square, n
         if to < 0:
-            return site
-        site = to
+            return sample
+        sample = to
 
 
 @kernel
@@ -73,12 +73,12 @@ def _square(a: Vector, b: Vector) -> float:
 
 
 @kernel
-def flood(surface: Surface, site: int, place: Vector, reach: float) -> int:
-    """Sites within `reach` of a place that are linked to `site` within that reach, into surface.queue; returns their number."""
+def flood(surface: Surface, sample: int, place: Vector, reach: float) -> int:
+    """Sites within `reach` of a place that are linked to `sample` within that reach, into surface.queue; returns their number."""
     surface.counter[0] += 1
     mark = surface.counter[0]
-    surface.queue[0] = site
-    surface.stamp[site] = mark
+    surface.queue[0] = sample
+    surface.stamp[sample] = mark
     count, at = 1, 0
     while at < count:
         s = surface.queue[at]
@@ -111,11 +111,11 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
 
 
 @kernel
-def _queued(surface: Surface, site: int, count: int) -> bool:
+def _queued(surface: Surface, sample: int, count: int) -> bool:
     """Whether a site is among those the last flood found (it stamps the sites just outside too)."""
     found = False
     for i in range(count):
-        found = found or surface.queue[i] == site
+        found = found or surface.queue[i] == sample
     return found
 
 
@@ -152,21 +152,21 @@ def gather_points(
 
 
 @kernel
-def fit_patch(surface: Surface, patch: np.ndarray, site: int, place: Vector) -> int:
-    """Fit the quadric of a patch (one row) to the points around a place, on the sheet of `site`; returns the points used.
+def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -> int:
+    """Fit the quadric of a patch (one row) to the points around a place, on the sheet of `sample`; returns the points used.
 
     Points weigh (1 - d^2 / R^2)^2; where some lie far off the first fit (plants, noise) they are weighed down and it is fitted again.
     """
-    site = walk(surface, site, place)
-    facing = row(surface.normals, site)
+    sample = walk(surface, sample, place)
+    facing = row(surface.normals, sample)
     local = surface.field[
-        site
+        sample
     ]  # a patch is as wide as the members there; the wider, the fewer points of a site suffice
     radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
-    patch[15] = site
+    patch[15] = sample
     taken = 0
     while True:
-        count = flood(surface, site, place, radius + 0.5 * surface.step)
+        count = flood(surface, sample, place, radius + 0.5 * surface.step)
         if count < 1:
             count = 1
         buffer = np.empty((_points_at_most(surface, count, most), COLUMNS))

@@ -36,7 +36,7 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
 
 
 @kernel
-def site_normals(
+def sample_normals(
     mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray, begin: int, end: int
 ) -> None:
     """Normal of the least-squares plane of each site from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
@@ -49,7 +49,7 @@ def site_normals(
 
 
 @kernel
-def trust_thin_sites(
+def trust_thin_samples(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
 ) -> None:
     """Drop the links of a thick site to thin ones over whose plane it stands, and fit its normal anew.

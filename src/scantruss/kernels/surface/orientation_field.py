@@ -18,7 +18,7 @@ from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, sub
 HALF_ROOT = 0.5 * math.sqrt(3.0)
 
 
-class Posts(NamedTuple):
+class Level(NamedTuple):
     """Posts of one level and the lattice at each."""
 
     mean: np.ndarray  #: (P, 3)
@@ -30,7 +30,7 @@ class Posts(NamedTuple):
 
 
 @kernel
-def choose_posts(
+def choose_level(
     mean: np.ndarray, neighbors: np.ndarray, radius: float, owner: np.ndarray, chosen: np.ndarray, queue: np.ndarray
 ) -> int:
     """Choose posts so that every place has one within `radius` over the links; returns their number.
@@ -68,14 +68,14 @@ def choose_posts(
 
 
 @kernel
-def link_posts(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, posts: Posts) -> None:
+def link_level(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, level: Level) -> None:
     """Fill in means, normals and links of posts, all zero at the start: posts are linked whose places are."""
     for s in range(len(mean)):
         p = owner[s]
-        posts.mark[p] += 1
+        level.mark[p] += 1
         for c in range(3):
-            posts.mean[p, c] += mean[s, c]
-            posts.normals[p, c] += normals[s, c]
+            level.mean[p, c] += mean[s, c]
+            level.normals[p, c] += normals[s, c]
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
             if n < 0:
@@ -84,15 +84,15 @@ def link_posts(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, own
             if q == p:
                 continue
             i = 0
-            while i < posts.neighbors.shape[1] and posts.neighbors[p, i] >= 0 and posts.neighbors[p, i] != q:
+            while i < level.neighbors.shape[1] and level.neighbors[p, i] >= 0 and level.neighbors[p, i] != q:
                 i += 1
-            if i < posts.neighbors.shape[1]:
-                posts.neighbors[p, i] = q
-    for p in range(len(posts.mean)):
-        normal = unit(row(posts.normals, p))
+            if i < level.neighbors.shape[1]:
+                level.neighbors[p, i] = q
+    for p in range(len(level.mean)):
+        normal = unit(row(level.normals, p))
         for c in range(3):
-            posts.mean[p, c] /= max(posts.mark[p], 1)
-            posts.normals[p, c] = normal[c]
+            level.mean[p, c] /= max(level.mark[p], 1)
+            level.normals[p, c] = normal[c]
 
 
 @kernel
@@ -158,20 +158,20 @@ def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
 
 
 @kernel
-def smooth_directions(posts: Posts, some: np.ndarray) -> None:
+def smooth_directions(level: Level, some: np.ndarray) -> None:
     """Turn the direction of some posts (K,) to the mean of those beside."""
     for i in range(len(some)):
         p = some[i]
-        normal = row(posts.normals, p)
-        total = row(posts.direction, p)
+        normal = row(level.normals, p)
+        total = row(level.direction, p)
         weight = 0.0
-        for k in range(posts.neighbors.shape[1]):
-            q = posts.neighbors[p, k]
+        for k in range(level.neighbors.shape[1]):
+            q = level.neighbors[p, k]
             if q < 0:
                 break
-            other = row(posts.normals, q)
+            other = row(level.normals, q)
             # the pair of turns that agree best
-            b = row(posts.direction, q)
+            b = row(level.direction, q)
             a = nearest_turn(total, b, normal)
             most, left, right = dot(a, b), a, b
             for _turn in range(2):
@@ -184,7 +184,7 @@ def smooth_directions(posts: Posts, some: np.ndarray) -> None:
             )
             weight += 1.0
         for c in range(3):
-            posts.direction[p, c] = total[c]
+            level.direction[p, c] = total[c]
 
 
 @kernel
@@ -227,14 +227,14 @@ def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
 
 
 @kernel
-def agree(posts: Posts, p: int, q: int, node: Vector, length: float) -> tuple[Vector, Vector]:
+def agree(level: Level, p: int, q: int, node: Vector, length: float) -> tuple[Vector, Vector]:
     """The nodes of the lattices of two posts that lie nearest to each other between them; node is of the lattice of p."""
-    n, m = row(posts.normals, p), row(posts.normals, q)
-    middle = between(row(posts.mean, p), n, row(posts.mean, q), m)
-    u, x = row(posts.direction, p), row(posts.direction, q)
+    n, m = row(level.normals, p), row(level.normals, q)
+    middle = between(row(level.mean, p), n, row(level.mean, q), m)
+    u, x = row(level.direction, p), row(level.direction, q)
     v, y = sixth(u, n), sixth(x, m)
     here = lower_corner(node, u, v, middle, length)
-    there = lower_corner(row(posts.node, q), x, y, middle, length)
+    there = lower_corner(row(level.node, q), x, y, middle, length)
     left, right, least = here, there, 1e300
     for i in range(4):
         a = along(along(here, length * (i & 1), u), length * (i >> 1), v)
@@ -247,18 +247,18 @@ def agree(posts: Posts, p: int, q: int, node: Vector, length: float) -> tuple[Ve
 
 
 @kernel
-def smooth_lattice(posts: Posts, length: float, some: np.ndarray) -> None:
+def smooth_lattice(level: Level, length: float, some: np.ndarray) -> None:
     """Move the lattice of some posts (K,) to the mean of those beside."""
     for i in range(len(some)):
         p = some[i]
-        mean, normal = row(posts.mean, p), row(posts.normals, p)
-        total = row(posts.node, p)
+        mean, normal = row(level.mean, p), row(level.normals, p)
+        total = row(level.node, p)
         weight = 0.0
-        for k in range(posts.neighbors.shape[1]):
-            q = posts.neighbors[p, k]
+        for k in range(level.neighbors.shape[1]):
+            q = level.neighbors[p, k]
             if q < 0:
                 break
-            a, b = agree(posts, p, q, total, length)
+            a, b = agree(level, p, q, total, length)
             share = 1.0 / (weight + 1.0)
             total = (
                 (weight * a[0] + b[0]) * share,
@@ -267,64 +267,64 @@ def smooth_lattice(posts: Posts, length: float, some: np.ndarray) -> None:
             )
             total = along(total, -dot(subtract(total, mean), normal), normal)
             weight += 1.0
-        total = nearest_node(total, row(posts.direction, p), normal, mean, length)
+        total = nearest_node(total, row(level.direction, p), normal, mean, length)
         for c in range(3):
-            posts.node[p, c] = total[c]
+            level.node[p, c] = total[c]
 
 
 @kernel
-def lay_first(posts: Posts, first: int, direction: Vector, node: Vector, length: float, queue: np.ndarray) -> None:
+def lay_first(level: Level, first: int, direction: Vector, node: Vector, length: float, queue: np.ndarray) -> None:
     """Lay a direction and a lattice at one post and carry them on from post to post, over all that are linked to it.
 
     queue : (P,) int64 scratch
     """
-    for p in range(len(posts.mean)):
-        posts.mark[p] = 0
+    for p in range(len(level.mean)):
+        level.mark[p] = 0
     begin = first
-    for _ in range(len(posts.mean)):
-        way = flat(direction, row(posts.normals, begin))
-        put_lattice(posts, begin, way, node, length)
-        posts.mark[begin] = 1
+    for _ in range(len(level.mean)):
+        way = flat(direction, row(level.normals, begin))
+        put_lattice(level, begin, way, node, length)
+        level.mark[begin] = 1
         queue[0] = begin
         last, at = 1, 0
         while at < last:
             p = queue[at]
             at += 1
-            for k in range(posts.neighbors.shape[1]):
-                q = posts.neighbors[p, k]
+            for k in range(level.neighbors.shape[1]):
+                q = level.neighbors[p, k]
                 if q < 0:
                     break
-                if posts.mark[q] == 0:
-                    posts.mark[q] = 1
-                    put_lattice(posts, q, row(posts.direction, p), row(posts.node, p), length)
+                if level.mark[q] == 0:
+                    level.mark[q] = 1
+                    put_lattice(level, q, row(level.direction, p), row(level.node, p), length)
                     queue[last] = q
                     last += 1
         begin = -1
-        for p in range(len(posts.mean)):
-            if posts.mark[p] == 0:
+        for p in range(len(level.mean)):
+            if level.mark[p] == 0:
                 begin = p
                 break
         if begin < 0:
             return
-        other = posts.neighbors[begin, 0]
-        node = row(posts.mean, begin)
-        direction = subtract(row(posts.mean, max(other, 0)), node)
+        other = level.neighbors[begin, 0]
+        node = row(level.mean, begin)
+        direction = subtract(row(level.mean, max(other, 0)), node)
 
 
 @kernel
-def put_lattice(posts: Posts, p: int, direction: Vector, node: Vector, length: float) -> None:
+def put_lattice(level: Level, p: int, direction: Vector, node: Vector, length: float) -> None:
     """Give a post a direction and a lattice that has a node at (or straight above) a place."""
-    mean, normal = row(posts.mean, p), row(posts.normals, p)
+    mean, normal = row(level.mean, p), row(level.normals, p)
     direction = flat(direction, normal)
     node = along(node, -dot(subtract(node, mean), normal), normal)
     node = nearest_node(node, direction, normal, mean, length)
     for c in range(3):
-        posts.direction[p, c] = direction[c]
-        posts.node[p, c] = node[c]
+        level.direction[p, c] = direction[c]
+        level.node[p, c] = node[c]
 
 
 @kernel
-def hand_down(coarse: Posts, owner: np.ndarray, fine: Posts, length: float) -> None:
+def hand_down(coarse: Level, owner: np.ndarray, fine: Level, length: float) -> None:
     """Give the posts of a finer level the directions and the lattice of their posts of the coarser level."""
     for p in range(len(fine.mean)):
         q = owner[p]
@@ -333,7 +333,7 @@ def hand_down(coarse: Posts, owner: np.ndarray, fine: Posts, length: float) -> N
 
 @kernel
 def list_nodes(
-    posts: Posts, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
+    level: Level, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
 ) -> int:
     """Choose posts whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
 
@@ -345,7 +345,7 @@ def list_nodes(
     reach = 1.2 * length + apart
     for o in range(len(order)):
         p = order[o]
-        place = row(posts.node, p)
+        place = row(level.node, p)
         scratch[2, 0] = p
         scratch[1, p] = p
         last, at = 1, 0
@@ -354,15 +354,15 @@ def list_nodes(
             here = scratch[2, at]
             at += 1
             if scratch[0, here] == 1:
-                d = subtract(row(posts.node, here), place)
+                d = subtract(row(level.node, here), place)
                 free = dot(d, d) >= apart * apart
-            for k in range(posts.neighbors.shape[1]):
-                q = posts.neighbors[here, k]
+            for k in range(level.neighbors.shape[1]):
+                q = level.neighbors[here, k]
                 if q < 0:
                     break
                 if scratch[1, q] != p:
                     scratch[1, q] = p
-                    d = subtract(row(posts.mean, q), place)
+                    d = subtract(row(level.mean, q), place)
                     if dot(d, d) < reach * reach:
                         scratch[2, last] = q
                         last += 1

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import Tree, within
+from ..geometry.kd_tree import KDTree, within
 from ..geometry.quadric import fit_heights, normal_equations, project, second_moments, solve
 from ..geometry.vectors import Vector, across, along, cross, dot, row, smallest_eigenvector, subtract, unit
 
@@ -24,7 +24,7 @@ FULL, FLAT = 10, 5  # points that a quadric needs, and a plane
 
 @kernel
 def gather(
-    tree: Tree, place: Vector, radius: float, leave: int, stack: np.ndarray, found: np.ndarray, buffer: np.ndarray
+    tree: KDTree, place: Vector, radius: float, leave: int, stack: np.ndarray, found: np.ndarray, buffer: np.ndarray
 ) -> int:
     """Points within a radius of a place but one, `leave`, into the buffer; returns their number, at most len(found)."""
     count = within(tree, place[0], place[1], place[2], radius, stack, found)

@@ -24,12 +24,12 @@ FOUND = (
     9  # numbers that `fit_fold` writes: place, direction, angle of the jump, gain over a smooth surface, rms distance
 )
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
-ROUNDS = 3
-FEW = 2  # points of a site that tell at first sight
+FOLD_FITS = 3
+POINTS_OF_FIRST_LOOK = 2  # points of a site that tell at first sight
 
 
 @kernel
-def bends_of_sites(surface: Surface, bends: np.ndarray) -> None:
+def bends_of_samples(surface: Surface, bends: np.ndarray) -> None:
     """Least cosine between the normal of each site and those of its neighbours, (S,)."""
     for s in range(len(surface.mean)):
         least = 1.0
@@ -43,9 +43,9 @@ def bends_of_sites(surface: Surface, bends: np.ndarray) -> None:
 
 
 @kernel
-def mean_normal(surface: Surface, site: int, place: Vector, radius: float) -> tuple[Vector, Vector]:
+def mean_normal(surface: Surface, sample: int, place: Vector, radius: float) -> tuple[Vector, Vector]:
     """Mean of the normals of the sites around a place, and the direction at right angles to it in which they differ most."""
-    count = flood(surface, site, place, radius)
+    count = flood(surface, sample, place, radius)
     n = (0.0, 0.0, 0.0)
     for i in range(count):
         n = along(n, 1.0, row(surface.normals, surface.queue[i]))
@@ -122,12 +122,12 @@ def jump_of(matrix: np.ndarray) -> float:
 
 
 @kernel
-def is_folded(surface: Surface, site: int, radius: float, least: float, buffer: np.ndarray) -> bool:
+def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer: np.ndarray) -> bool:
     """Whether a few points around a site look as if they were folded by an angle of at least `least` [radian]."""
-    place = row(surface.mean, site)
-    n, c = mean_normal(surface, site, place, radius)
-    count = flood(surface, site, place, radius + 0.5 * surface.step)
-    taken = gather_points(surface, count, place, radius, FEW, n, EITHER_SIDE, buffer)
+    place = row(surface.mean, sample)
+    n, c = mean_normal(surface, sample, place, radius)
+    count = flood(surface, sample, place, radius + 0.5 * surface.step)
+    taken = gather_points(surface, count, place, radius, POINTS_OF_FIRST_LOOK, n, EITHER_SIDE, buffer)
     if taken < 20 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
@@ -165,7 +165,7 @@ def keep_folded(
 
 @kernel
 def fit_fold(
-    surface: Surface, site: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, found: np.ndarray
+    surface: Surface, sample: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, found: np.ndarray
 ) -> bool:
     """Fit a folded surface around a place; False where there are too few points.
 
@@ -173,11 +173,11 @@ def fit_fold(
     found : (FOUND,), filled: place on the ridge, its direction, angle of the jump [radian], by how much the fold fits better than a
         smooth surface (as an F statistic), rms distance of the points [scan unit]
     """
-    site = walk(surface, site, place)
-    n, c = mean_normal(surface, site, place, radius)
+    sample = walk(surface, sample, place)
+    n, c = mean_normal(surface, sample, place, radius)
     if norm(towards) > 0.0:
         c = unit(cross(towards, n))
-    count = flood(surface, site, place, radius + 0.5 * surface.step)
+    count = flood(surface, sample, place, radius + 0.5 * surface.step)
     taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
     if taken < 30 or norm(c) < 0.5:
         return False
@@ -185,7 +185,7 @@ def fit_fold(
     angle = shift = 0.0
     reach, swing = 0.4, 0.35
     least = np.inf
-    for _ in range(ROUNDS):
+    for _ in range(FOLD_FITS):
         at_angle, at_shift = angle, shift
         for i in range(TURNS):
             for j in range(SHIFTS):

@@ -13,11 +13,11 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
 from ..geometry.vectors import dot, row, smallest_eigenvector, subtract
 
-ALIKE = 1e-6  # squared distances that differ by less are the same, as a share
+TIE_TOLERANCE = 1e-6  # squared distances that differ by less are the same, as a share
 
 
 @kernel
-def _site_within(
+def _sample_within(
     boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
 ) -> int:
     """A site of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
@@ -31,7 +31,7 @@ def _site_within(
 
 
 @kernel
-def choose_sites(
+def choose_samples(
     points: np.ndarray,
     radius: float,
     boxes: SearchBoxes,
@@ -59,7 +59,7 @@ def choose_sites(
     for p in range(begin, len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         a, b, c = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
-        home = _site_within(boxes, places, a, b, c, x, y, z, square)  # most have one in their own box
+        home = _sample_within(boxes, places, a, b, c, x, y, z, square)  # most have one in their own box
         if home < 0:
             i0, i1 = box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius)
             j0, j1 = box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius)
@@ -68,7 +68,7 @@ def choose_sites(
                 for j in range(j0, j1 + 1):
                     for k in range(k0, k1 + 1):
                         if home < 0 and (i != a or j != b or k != c):
-                            home = _site_within(boxes, places, i, j, k, x, y, z, square)
+                            home = _sample_within(boxes, places, i, j, k, x, y, z, square)
         if home < 0:
             if count == len(chosen) or 2 * (count + 1) > len(boxes.keys):
                 return p, count
@@ -91,13 +91,13 @@ def settle_points(
     difference, nor where the scan lies.
     """
     for p in range(begin, end):
-        place, site = row(points, p), owner[p]
-        d = subtract(row(places, site), place)
+        place, sample = row(points, p), owner[p]
+        d = subtract(row(places, sample), place)
         least = dot(d, d)
         while True:
-            to, first, nearly = site, site, least * (1.0 + ALIKE)
+            to, first, nearly = sample, sample, least * (1.0 + TIE_TOLERANCE)
             for k in range(neighbors.shape[1]):
-                n = neighbors[site, k]
+                n = neighbors[sample, k]
                 if n < 0:
                     break
                 d = subtract(row(places, n), place)
@@ -106,10 +106,10 @@ def settle_points(
                     first = min(first, n)
                 if dd < least:
                     least, to = dd, n
-            if to == site:
+            if to == sample:
                 owner[p] = first
                 break
-            site = to
+            sample = to
 
 
 @kernel
@@ -117,17 +117,17 @@ def group_points(
     points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, mean: np.ndarray
 ) -> None:
     """Sort the points by site (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each site's points."""
-    sites = len(start) - 1
+    samples = len(start) - 1
     for p in range(len(points)):
         start[owner[p] + 1] += 1
-    for s in range(sites):
+    for s in range(samples):
         start[s + 1] += start[s]
     at = start.copy()
     for p in range(len(points)):
         to = at[owner[p]]
         at[owner[p]] += 1
         grouped[to, 0], grouped[to, 1], grouped[to, 2] = row(points, p)
-    for s in range(sites):
+    for s in range(samples):
         first = row(grouped, start[s])
         x = y = z = 0.0
         for i in range(start[s] + 1, start[s + 1]):
@@ -138,7 +138,7 @@ def group_points(
 
 
 @kernel
-def nearest_sites(
+def nearest_samples(
     positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
 ) -> None:
     """The K nearest sites of each site from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
@@ -200,7 +200,7 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 
 
 @kernel
-def settle_sites(
+def settle_samples(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
     """Move each rough site (thickness over `rough`) to the plane of the sites linked to it within a wider radius.

@@ -11,7 +11,7 @@ from ..geometry.boxes import SearchBoxes, put, search
 from ..geometry.vectors import Vector, dot, norm, row, subtract
 from .local_surface import PATCH, Surface, fit_patch, flood, walk
 
-BESIDE = 2.2  # sites farther than so many steps do not count at a place
+BLEND_STEPS = 2.2  # sites farther than so many steps do not count at a place
 SPREAD, ASIDE = (
     14.4,
     14.0,
@@ -20,13 +20,13 @@ NEAREST = 12  # given lengths that count at a place; the next one says how far a
 
 
 @kernel
-def length_at(surface: Surface, site: int, place: Vector) -> float:
+def length_at(surface: Surface, sample: int, place: Vector) -> float:
     """Desired length at a place near a site: the mean of the site and its neighbours, the nearer the weightier."""
-    site = walk(surface, site, place)
-    reach = BESIDE * surface.step
+    sample = walk(surface, sample, place)
+    reach = BLEND_STEPS * surface.step
     total = mean = 0.0
     for k in range(-1, surface.neighbors.shape[1]):
-        s = site if k < 0 else surface.neighbors[site, k]
+        s = sample if k < 0 else surface.neighbors[sample, k]
         if s < 0:
             break
         d = subtract(row(surface.mean, s), place)
@@ -34,21 +34,21 @@ def length_at(surface: Surface, site: int, place: Vector) -> float:
         if weight > 0.0:
             total += weight * weight
             mean += weight * weight * surface.field[s]
-    return mean / total if total > 0.0 else surface.field[site]
+    return mean / total if total > 0.0 else surface.field[sample]
 
 
 @kernel
 def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> None:
     """Desired length (P,) at places (P, 3) each of which lies near the one before; the site of the first is looked for in all."""
-    site, least = 0, np.inf
+    sample, least = 0, np.inf
     for s in range(len(surface.mean)):
         d = subtract(row(surface.mean, s), row(places, 0))
         if dot(d, d) < least:
-            site, least = s, dot(d, d)
+            sample, least = s, dot(d, d)
     for p in range(len(places)):
         place = row(places, p)
-        site = walk(surface, site, place)
-        lengths[p] = length_at(surface, site, place)
+        sample = walk(surface, sample, place)
+        lengths[p] = length_at(surface, sample, place)
 
 
 @kernel
@@ -152,7 +152,7 @@ def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
 
 
 @kernel
-def measure_bends(surface: Surface, sites: np.ndarray, found: np.ndarray, begin: int, end: int) -> None:
+def measure_bends(surface: Surface, samples: np.ndarray, found: np.ndarray, begin: int, end: int) -> None:
     """Measure how much the scan bends at some sites (P,), from `begin` to `end` - 1.
 
     found : (P, 2), filled: largest curvature without sign, and its standard deviation by the noise: that of least squares with the
@@ -160,9 +160,9 @@ def measure_bends(surface: Surface, sites: np.ndarray, found: np.ndarray, begin:
     """
     patch = np.zeros(PATCH)
     for i in range(begin, end):
-        place = row(surface.mean, sites[i])
-        taken = fit_patch(surface, patch, sites[i], place)
-        count = flood(surface, sites[i], place, surface.patch_radius)
+        place = row(surface.mean, samples[i])
+        taken = fit_patch(surface, patch, samples[i], place)
+        count = flood(surface, samples[i], place, surface.patch_radius)
         x = y = z = 0.0
         for k in range(count):
             d = subtract(row(surface.mean, surface.queue[k]), place)

@@ -7,11 +7,11 @@ import numpy as np
 from ...kernels.scan import duplicates as kernels
 from ...kernels.scan import outliers as trees
 from ...runtime.parallel import in_parts
-from .nearby import grow_tree
+from .nearby import build_kd_tree
 
-SAMPLE = 500  # points of which repeats are looked for before it is worth looking for all
-SHARE = 0.01  # part of these that must be repeated
-PART = 50_000  # fewest points for a thread of their own
+POINTS_LOOKED_AT = 500  # points of which repeats are looked for before it is worth looking for all
+REPEATED_SHARE = 0.01  # part of these that must be repeated
+POINTS_PER_THREAD = 50_000  # fewest points for a thread of their own
 COPIES = 16  # a point may be repeated almost so often and its spacing be told
 SAID = 300  # points at which the spacing is measured
 DENSEST = 0.05  # part of the points that lie closer than what counts as spacing here
@@ -29,14 +29,16 @@ def find_repeated(points: np.ndarray) -> np.ndarray:
 def has_repeats(points: np.ndarray) -> bool:
     """Whether so many points are repeated that it is worth looking for all; takes a hundredth of the time of a look at all."""
     points = np.ascontiguousarray(points, np.float64)
-    chosen = np.linspace(0, len(points) - 1, min(len(points), SAMPLE)).astype(np.int64)
+    chosen = np.linspace(0, len(points) - 1, min(len(points), POINTS_LOOKED_AT)).astype(np.int64)
     slots = np.full(1 << 12, -1, np.int64)
     bits = points.view(np.int64)
     repeats = [kernels.enter_points(points, bits, np.unique(chosen), slots)]
     in_parts(
-        len(points), PART, lambda _, begin, end: repeats.append(kernels.count_repeats(points, bits, slots, begin, end))
+        len(points),
+        POINTS_PER_THREAD,
+        lambda _, begin, end: repeats.append(kernels.count_repeats(points, bits, slots, begin, end)),
     )
-    return sum(repeats) > SHARE * len(chosen)
+    return sum(repeats) > REPEATED_SHARE * len(chosen)
 
 
 def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
@@ -65,5 +67,5 @@ def _densest_spacing(points: np.ndarray) -> float:
         return 0.0
     places = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), SAID)).astype(np.int64)])
     squares = np.empty(len(places))
-    trees.ranked_of_places(grow_tree(points), places, rank + 1, squares)
+    trees.ranked_of_places(build_kd_tree(points), places, rank + 1, squares)
     return float(np.sqrt(np.quantile(squares, DENSEST) * np.pi / rank))

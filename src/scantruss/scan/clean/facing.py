@@ -10,15 +10,15 @@ from ...kernels.scan import facing as near_kernels
 from ...kernels.surface import normals as kernels
 from ...runtime.parallel import in_parts
 from ..normals import HEAD_ON, cut_steep_links, face_one_side, face_outside
-from .nearby import AROUND, PART, Nearby, grow_tree
+from .nearby import POINTS_PER_THREAD, REACH_TO, Nearby, build_kd_tree
 from .thinning import thin_to
 
 COARSE = (
     2.0  # spacing of the points at which sides are settled, in mean spacings: lines of a scanner are no pieces then
 )
-LINKS = 10  # links of each of them
+LINKS_OF_A_POINT = 10  # links of each of them
 SMOOTH = 0.15  # thickness, in their spacings, up to which these are smooth enough to tell that a surface is one-sided
-BESIDE = 4  # of them a point asks for its side, the one most beside it counts
+NEIGHBORS_ASKED = 4  # of them a point asks for its side, the one most beside it counts
 
 
 class Facing(NamedTuple):
@@ -35,26 +35,26 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     A piece faces away from its middle, which is outwards where it is closed; where that does not tell (a plate) upwards.
     """
     reach = near.reach[np.isfinite(near.reach)]
-    mean_spacing = float(np.median(reach)) * np.sqrt(np.pi / AROUND) if len(reach) else 0.0
+    mean_spacing = float(np.median(reach)) * np.sqrt(np.pi / REACH_TO) if len(reach) else 0.0
     extent = float(np.ptp(points, axis=0).max())
     coarse = max(COARSE * mean_spacing, 1e-5 * extent, 1e-300)
     stays = thin_to(points, coarse)
     few = Nearby.of(points[stays])
     chosen = np.flatnonzero(stays)[few.tree.ids]
     place, own = few.tree.points, np.ascontiguousarray(normals[chosen])
-    neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS])
+    neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS_OF_A_POINT])
     cut_steep_links(place, own, neighbors)
     piece = face_one_side(place, own, neighbors)
     face_outside(place, own, piece)
     planes, thickness = np.empty_like(own), np.empty(len(place))
-    kernels.site_normals(place, neighbors, planes, thickness, 0, len(place))
+    kernels.sample_normals(place, neighbors, planes, thickness, 0, len(place))
     head_on = int(kernels.head_on_links(place, own, neighbors, thickness, SMOOTH * coarse))
     turned = normals.copy()
-    tree = grow_tree(place)
+    tree = build_kd_tree(place)
     settled = np.ascontiguousarray(own[tree.ids])
     in_parts(
         len(points),
-        PART,
-        lambda _, begin, end: near_kernels.turn_like_beside(tree, settled, points, turned, BESIDE, begin, end),
+        POINTS_PER_THREAD,
+        lambda _, begin, end: near_kernels.turn_like_beside(tree, settled, points, turned, NEIGHBORS_ASKED, begin, end),
     )
     return Facing(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)

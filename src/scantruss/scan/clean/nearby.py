@@ -10,30 +10,34 @@ from ...kernels.geometry import kd_tree as kernels
 from ...runtime.parallel import in_parts
 
 NEAREST = 16  # other points that are known of each point
-AROUND = 8  # a point's reach is the distance to this one of them
-PART = 2000  # least points of a part that a thread looks at
+REACH_TO = 8  # a point's reach is the distance to this one of them
+POINTS_PER_THREAD = 2000  # least points of a part that a thread looks at
 
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
     """Points in a tree, and a table of the nearest of each; all rows in the order of the tree."""
 
-    tree: kernels.Tree
+    tree: kernels.KDTree
     neighbors: np.ndarray  #: (N, NEAREST) int64, nearest first, -1 where there are fewer
     squares: np.ndarray  #: (N, NEAREST) squared distances, inf where there are fewer [scan unit^2]
 
     @classmethod
     def of(cls, points: np.ndarray) -> Nearby:
         """Look up the nearest of all points (N, 3)."""
-        tree = grow_tree(points)
+        tree = build_kd_tree(points)
         neighbors, squares = np.empty((len(points), NEAREST), np.int64), np.empty((len(points), NEAREST))
-        in_parts(len(points), PART, lambda _, begin, end: kernels.nearest_others(tree, neighbors, squares, begin, end))
+        in_parts(
+            len(points),
+            POINTS_PER_THREAD,
+            lambda _, begin, end: kernels.nearest_others(tree, neighbors, squares, begin, end),
+        )
         return cls(tree, neighbors, squares)
 
     @property
     def reach(self) -> np.ndarray:
         """Distance of each point to its eighth neighbour (N,) [scan unit]; inf where there is none."""
-        return np.sqrt(self.squares[:, AROUND - 1])
+        return np.sqrt(self.squares[:, REACH_TO - 1])
 
     def in_order(self, values: np.ndarray) -> np.ndarray:
         """Return rows of the tree in the order in which the points were given."""
@@ -42,10 +46,12 @@ class Nearby:
         return ordered
 
 
-def grow_tree(points: np.ndarray) -> kernels.Tree:
+def build_kd_tree(points: np.ndarray) -> kernels.KDTree:
     """Return the tree of points (N, 3), N > 0."""
-    tree = kernels.empty_tree(points)
+    tree = kernels.empty_kd_tree(points)
     kernels.divide(tree, 0, 1)
     if len(tree.ranges) > 1:
-        in_parts(2, 1, lambda _, begin, end: [kernels.divide(tree, 1 + i, kernels.DEEPEST) for i in range(begin, end)])
+        in_parts(
+            2, 1, lambda _, begin, end: [kernels.divide(tree, 1 + i, kernels.STACK_LEVELS) for i in range(begin, end)]
+        )
     return tree

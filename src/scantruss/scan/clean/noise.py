@@ -20,7 +20,7 @@ SOME = 0.02  # part of the points that must lie in layers, as a few seem to by c
 FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
 BROAD = 3.0  # radius of a patch that holds as much of two layers, in the distance up to which they are looked for
 FOLLOWED = 0.5  # a narrower patch that fits so much better shows that the surface is one
-PART = 200  # least patches of a part that a thread fits
+PATCHES_PER_THREAD = 200  # least patches of a part that a thread fits
 
 
 class Surfaces(NamedTuple):
@@ -52,7 +52,7 @@ def _fit(near: Nearby, centres: np.ndarray, radii: np.ndarray, widest: float, us
     patches = np.empty((len(centres), PATCH))
     in_parts(
         len(centres),
-        PART,
+        PATCHES_PER_THREAD,
         lambda _, begin, end: kernels.fit_patches(near.tree, centres, radii, widest, usual, patches, begin, end),
     )
     return patches
@@ -74,7 +74,7 @@ def onto_surfaces(near: Nearby, surfaces: Surfaces) -> tuple[np.ndarray, np.ndar
     moved, normals = np.empty_like(points), np.empty_like(points)
     in_parts(
         len(points),
-        PART,
+        PATCHES_PER_THREAD,
         lambda _, begin, end: kernels.onto_patches(
             near.tree, surfaces.number, surfaces.patches, near.neighbors, moved, normals, begin, end
         ),

@@ -9,16 +9,18 @@ import numpy as np
 
 from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts
-from .nearby import AROUND, NEAREST, PART, Nearby
+from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
 
-ROUNDS = 5  # strays near each other hide each other: after a round some more stand out
-FAR = 4.5  # reach, in those of which a quarter of the points have more, at which a point is a stray whatever is near it
+MOST_ROUNDS = 5  # strays near each other hide each other: after a round some more stand out
+FARTHEST_REACH = (
+    4.5  # reach, in those of which a quarter of the points have more, at which a point is a stray whatever is near it
+)
 CLOUD = 2.5  # ... where the points around form no surface
 THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
 MUCH = 0.1  # part of the points that form none from which on it is no cloud of strays but the scan
-ROUND = 0.18  # share of the spread across the plane from which on points are no crease but a cloud
+CLOUD_SHARE = 0.18  # share of the spread across the plane from which on points are no crease but a cloud
 SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
-BESIDE = 4  # neighbours in a cloud from which on a point is looked at with it
+CLOUD_NEIGHBORS = 4  # neighbours in a cloud from which on a point is looked at with it
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
 TOO_FAR = 1.1  # the same in member lengths
 LONELY = (
@@ -26,17 +28,17 @@ LONELY = (
 )
 DENSE = 4  # ... the reach of the densest but so many around it
 PATCH = 28  # points of the surface that a point may stand off
-OFF = 5.0  # distance from it, in what is to be expected, from which on it does
+STANDS_OFF = 5.0  # distance from it, in what is to be expected, from which on it does
 THIN = 0.01  # what is to be expected in any case, in radii of that surface
 LONE = 3e-4  # share of sites without neighbours from which on strays are looked for
 
 
-def has_strays(neighbors: np.ndarray) -> bool:
-    """Whether so many sites stand alone that it is worth looking for strays; neighbors (S, K) as `kernels.nearest_sites`."""
+def has_outliers(neighbors: np.ndarray) -> bool:
+    """Whether so many sites stand alone that it is worth looking for strays; neighbors (S, K) as `kernels.nearest_samples`."""
     return bool((neighbors[:, 5] < 0).mean() > LONE)
 
 
-def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> np.ndarray:
+def find_outliers(points: np.ndarray, distance: float, length: float = np.inf) -> np.ndarray:
     """Return which points are strays (N,) bool.
 
     Points are strays if their reach is more than `distance` times that of their neighbours, if there are hardly any around them
@@ -45,7 +47,7 @@ def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> 
     Parameters
     ----------
     points : (N, 3) [scan unit]
-    distance : as `Settings.stray_distance`
+    distance : as `Settings.outlier_distance`
     length : desired member length [scan unit]; where points are farther apart no grid can be made of them
     """
     if len(points) <= NEAREST:
@@ -55,23 +57,23 @@ def find_strays(points: np.ndarray, distance: float, length: float = np.inf) -> 
     which = np.arange(len(points))
     reach = near.reach
     usual = float(np.quantile(reach, 0.75))
-    limit = min(FAR * usual, max(TOO_FAR * length, distance * float(np.median(reach))))
-    for _ in range(ROUNDS):
+    limit = min(FARTHEST_REACH * usual, max(TOO_FAR * length, distance * float(np.median(reach))))
+    for _ in range(MOST_ROUNDS):
         thick, aside = _planes(near, which)
-        stray = _stand_alone(near, which, reach, distance, limit)
-        stray |= (thick > THICK) & (reach[which] > CLOUD * usual)
-        stray |= _stand_off(near, alive, which, ~stray & (aside > SIGHT))
-        found = which[stray]
+        outlier = _stand_alone(near, which, reach, distance, limit)
+        outlier |= (thick > THICK) & (reach[which] > CLOUD * usual)
+        outlier |= _stand_off(near, alive, which, ~outlier & (aside > SIGHT))
+        found = which[outlier]
         if not len(found):
             break
         alive[found] = False
         which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
         kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
-        reach[which] = np.sqrt(near.squares[which, AROUND - 1])
+        reach[which] = np.sqrt(near.squares[which, REACH_TO - 1])
     cloud = np.zeros(len(points), np.bool_)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
         cloud |= _clouds(near, alive)
-        beside = np.where(near.neighbors >= 0, cloud[near.neighbors], False).sum(axis=1) >= BESIDE
+        beside = np.where(near.neighbors >= 0, cloud[near.neighbors], False).sum(axis=1) >= CLOUD_NEIGHBORS
         found = _in_clouds(near, alive, np.flatnonzero(alive & (cloud | beside)))
         if not len(found):
             break
@@ -92,10 +94,14 @@ def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
     if not 0 < len(thick) < MUCH * len(which):
         return cloud
     found = np.empty(len(thick))
-    in_parts(len(thick), PART, lambda _, begin, end: kernels.measure_bulk(near.tree, alive, thick, found, begin, end))
+    in_parts(
+        len(thick),
+        POINTS_PER_THREAD,
+        lambda _, begin, end: kernels.measure_bulk(near.tree, alive, thick, found, begin, end),
+    )
     bulk[thick] = found
     around = near.neighbors[thick]
-    cloud[thick] = np.where(around >= 0, bulk[around], 0.0).mean(axis=1) > ROUND
+    cloud[thick] = np.where(around >= 0, bulk[around], 0.0).mean(axis=1) > CLOUD_SHARE
     for _ in range(SKIN):
         cloud[thick] |= np.where(around >= 0, cloud[around], False).any(axis=1)
     return cloud
@@ -108,10 +114,10 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
     off = np.empty(len(doubted))
     in_parts(
         len(doubted),
-        PART,
+        POINTS_PER_THREAD,
         lambda _, begin, end: kernels.stand_off(near.tree, sure, doubted, 2 * PATCH, THIN, off, begin, end),
     )
-    return doubted[off > OFF]
+    return doubted[off > STANDS_OFF]
 
 
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -119,19 +125,19 @@ def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     thick, aside = np.empty((2, len(which)))
     in_parts(
         len(which),
-        PART,
+        POINTS_PER_THREAD,
         lambda _, begin, end: kernels.measure_planes(near.tree, which, near.neighbors, thick, aside, begin, end),
     )
     return thick, aside
 
 
 def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: float, limit: float) -> np.ndarray:
-    """One round of `find_strays`, by distances."""
+    """One round of `find_outliers`, by distances."""
     neighbors = near.neighbors[which]
     low, middle = np.empty((2, len(which)))
     in_parts(
         len(which),
-        PART,
+        POINTS_PER_THREAD,
         lambda _, begin, end: kernels.usual_reaches(neighbors, reach, DENSE, low, middle, begin, end),
     )
     third = np.sqrt(near.squares[which, 2])
@@ -140,14 +146,14 @@ def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: f
 
 
 def _stand_off(near: Nearby, alive: np.ndarray, which: np.ndarray, doubted: np.ndarray) -> np.ndarray:
-    """One round of `find_strays`, by the surface of the points around: which of the doubted points stand off."""
-    stray = np.zeros(len(which), np.bool_)
+    """One round of `find_outliers`, by the surface of the points around: which of the doubted points stand off."""
+    outlier = np.zeros(len(which), np.bool_)
     looked = which[doubted]
     off = np.empty(len(looked))
     in_parts(
         len(looked),
-        PART,
+        POINTS_PER_THREAD,
         lambda _, begin, end: kernels.stand_off(near.tree, alive, looked, PATCH, THIN, off, begin, end),
     )
-    stray[doubted] = off > OFF
-    return stray
+    outlier[doubted] = off > STANDS_OFF
+    return outlier

@@ -6,13 +6,13 @@ import numpy as np
 
 from ...kernels.geometry import kd_tree as trees
 from ...kernels.scan import outliers as kernels
-from .nearby import AROUND, Nearby, grow_tree
+from .nearby import REACH_TO, Nearby, build_kd_tree
 from .outliers import THICK
 
 LINK = 3.0  # reaches over which points belong to one piece
 BLOB = 4.0  # a cloud of points may have so many times more of them than a small surface
 NARROW = 0.3  # extent of such a cloud, in that of the largest piece, up to which it is small however many points it has
-APART = (
+PIECE_DISTANCE = (
     6.0  # reaches over which a small piece belongs to what is beside it: a line of the scanner, a part behind a shadow
 )
 
@@ -20,12 +20,12 @@ APART = (
 def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     """Return which points belong to loose small pieces, away from all others; rows of the tree.
 
-    Small is a piece with fewer than this share of all points, or than `AROUND` of them; one that is no surface but a cloud also with
+    Small is a piece with fewer than this share of all points, or than `REACH_TO` of them; one that is no surface but a cloud also with
     fewer than `BLOB` times as many, or with any number where it is narrower than `NARROW` of the largest piece. A
     small surface that lies near a large one stays, and so does what lies near that. No piece is small where the share is 0.
     """
     count = len(near.squares)
-    if count <= AROUND or share == 0.0:
+    if count <= REACH_TO or share == 0.0:
         return np.zeros(count, np.bool_)
     piece = np.empty(count, np.int64)
     kernels.join_near(near.neighbors, near.squares, near.reach, LINK, piece)
@@ -33,15 +33,15 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     thick, aside = np.empty((2, count))
     kernels.measure_planes(near.tree, np.arange(count), near.neighbors, thick, aside, 0, count)
     blob = np.bincount(piece, thick > THICK, minlength=count) > 0.5 * sizes
-    least = np.minimum(np.maximum(share * count, AROUND) * np.where(blob, BLOB, 1.0), float(sizes.max()))
+    least = np.minimum(np.maximum(share * count, REACH_TO) * np.where(blob, BLOB, 1.0), float(sizes.max()))
     clouds = np.flatnonzero(blob & (sizes >= least))
     loose = (sizes[piece] < least[piece]) | _small_clouds(near.tree.points, piece, clouds, int(sizes.argmax()))
     typical = float(np.median(near.reach))
     while loose.any():
         kept = np.flatnonzero(~loose)
-        tree = grow_tree(near.tree.points[kept])
+        tree = build_kd_tree(near.tree.points[kept])
         away, which = _distances(tree, near.tree.points[loose])
-        beside = away <= APART * np.maximum(typical, near.reach[kept[which]])
+        beside = away <= PIECE_DISTANCE * np.maximum(typical, near.reach[kept[which]])
         joined = np.unique(piece[loose][beside & ~blob[piece[loose]]])
         if not len(joined):
             break
@@ -56,7 +56,7 @@ def _small_clouds(points: np.ndarray, piece: np.ndarray, clouds: np.ndarray, lar
     return np.isin(piece, small)
 
 
-def _distances(tree: trees.Tree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _distances(tree: trees.KDTree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance of places (P, 3) from the nearest point of a tree, and the number of that point."""
     away, which = np.empty(len(places)), np.empty(len(places), np.int64)
     kernels.nearest_of_places(tree, np.ascontiguousarray(places), away, which)

@@ -11,13 +11,13 @@ from ...errors import InputError
 from ..cloud import PointCloud
 from .duplicates import find_near_duplicates, find_repeated
 from .facing import face_one_way
-from .nearby import AROUND, Nearby
+from .nearby import REACH_TO, Nearby
 from .noise import find_layers, fit_surfaces, onto_surfaces
-from .outliers import find_strays
+from .outliers import find_outliers
 from .pieces import find_loose_pieces
 from .thinning import thin_to
 
-FEWEST = 24  # points of a surface
+FEWEST_POINTS_OF_A_SURFACE = 24  # points of a surface
 LAYERS = 3  # rounds of merging layers: what lies farther apart comes together step by step
 Progress = Callable[[str, float], None]
 
@@ -47,7 +47,7 @@ def clean_points(
     points: np.ndarray | PointCloud,
     *,
     duplicates: float | None = 0.01,
-    stray_distance: float | None = 3.0,
+    outlier_distance: float | None = 3.0,
     loose_pieces: float | None = 0.005,
     layer_distance: float | None = 2.0,
     smooth: bool = True,
@@ -63,9 +63,9 @@ def clean_points(
     points : (N, 3) array or PointCloud [scan unit]
     duplicates : float
         Points nearer to an earlier one than this share of the spacing where the scan is densest are left out, and all repeats.
-    stray_distance : float
+    outlier_distance : float
         Points so many times farther from others than their neighbours are left out, and what stands off the surface; 0 keeps
-        all, as `Settings.stray_distance` does.
+        all, as `Settings.outlier_distance` does.
     loose_pieces : float
         Pieces with fewer than this share of the points, away from all others, are left out; clouds of points that form no surface
         with up to four times as many, or with any number where they are narrow beside the largest piece; 0 leaves out none.
@@ -87,15 +87,15 @@ def clean_points(
     InputError
         A number is out of range, or too few points are left.
     """
-    _check(duplicates, stray_distance, loose_pieces, layer_distance, spacing)
+    _check(duplicates, outlier_distance, loose_pieces, layer_distance, spacing)
     cloud = points if isinstance(points, PointCloud) else PointCloud.from_array(points, unit=unit)
     work = _Work(cloud, progress)
     if duplicates is not None:
         work.leave_out("duplicates", find_repeated(work.points), "repeated points left out")
         work.leave_out("near_duplicates", find_near_duplicates(work.points, duplicates), "near duplicates left out")
-    if stray_distance:
+    if outlier_distance:
         work.say("strays")
-        work.leave_out("strays", find_strays(work.points, stray_distance), "stray points left out")
+        work.leave_out("strays", find_outliers(work.points, outlier_distance), "stray points left out")
     work.check_enough()
     if loose_pieces is not None:
         work.say("pieces")
@@ -115,7 +115,7 @@ def clean_points(
 
 def _check(*numbers: float | None) -> None:
     """Refuse numbers that are not positive."""
-    names = ("duplicates", "stray_distance", "loose_pieces", "layer_distance", "spacing")
+    names = ("duplicates", "outlier_distance", "loose_pieces", "layer_distance", "spacing")
     for name, value in zip(names, numbers, strict=True):
         if value is not None and not (isinstance(value, int | float) and 0 <= value < np.inf):
             raise InputError(f"{name} must be a number of 0 or more, got {value!r}")
@@ -160,10 +160,10 @@ class _Work:
 
     def check_enough(self) -> None:
         """Refuse to go on with next to nothing."""
-        if len(self.points) < FEWEST:
+        if len(self.points) < FEWEST_POINTS_OF_A_SURFACE:
             raise InputError(
-                f"only {len(self.points)} points are left after cleaning, {FEWEST} are needed;"
-                " keep more (--keep-strays, --keep-pieces), or a smaller --spacing"
+                f"only {len(self.points)} points are left after cleaning, {FEWEST_POINTS_OF_A_SURFACE} are needed;"
+                " keep more (--keep-outliers, --keep-pieces), or a smaller --spacing"
             )
 
     def settle(self, layer_distance: float | None, smooth: bool) -> None:
@@ -172,7 +172,7 @@ class _Work:
         near = self.nearby()
         surfaces = fit_surfaces(near)
         if layer_distance is not None:
-            distance = layer_distance * float(np.median(near.reach)) * np.sqrt(np.pi / AROUND)
+            distance = layer_distance * float(np.median(near.reach)) * np.sqrt(np.pi / REACH_TO)
             merged = np.zeros(len(self.points), np.bool_)
             for _ in range(LAYERS):
                 layers, between = find_layers(near, surfaces, distance, merged[near.tree.ids])

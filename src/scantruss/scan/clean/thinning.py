@@ -6,7 +6,7 @@ import numpy as np
 
 from ...errors import InputError
 
-LARGEST = 2.0**20  # most boxes along an axis
+MOST_BOXES = 2.0**20  # most boxes along an axis
 
 
 def thin_to(points: np.ndarray, spacing: float) -> np.ndarray:
@@ -14,9 +14,9 @@ def thin_to(points: np.ndarray, spacing: float) -> np.ndarray:
     if not spacing > 0:
         raise InputError(f"spacing must be a positive length in the scan's unit, got {spacing:g}")
     extent = float(np.ptp(points, axis=0).max())
-    if extent > LARGEST * spacing:
+    if extent > MOST_BOXES * spacing:
         raise InputError(
-            f"spacing {spacing:g} is too small for a scan of {extent:.4g}; use at least {extent / LARGEST:.2g}"
+            f"spacing {spacing:g} is too small for a scan of {extent:.4g}; use at least {extent / MOST_BOXES:.2g}"
         )
     box = np.floor((points - points.min(axis=0)) / spacing).astype(np.int64)
     key = (box[:, 0] << 42) | (box[:, 1] << 21) | box[:, 2]

@@ -12,7 +12,7 @@ from ...selection import Selection, parts_of
 from .copc import Place
 
 WORDS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
-PART = 1 << 17  # points tested against a polygon in one go
+POINTS_PER_TEST = 1 << 17  # points tested against a polygon in one go
 NONE = np.empty(0)
 
 
@@ -132,8 +132,8 @@ def in_polygon(places: np.ndarray, rings: list[np.ndarray]) -> np.ndarray:
     inside = np.zeros(len(places), dtype=bool)
     corners = np.concatenate(rings)
     near = np.flatnonzero(np.all((places >= corners.min(axis=0)) & (places <= corners.max(axis=0)), axis=1))
-    for begin in range(0, len(near), PART):
-        rows = near[begin : begin + PART]
+    for begin in range(0, len(near), POINTS_PER_TEST):
+        rows = near[begin : begin + POINTS_PER_TEST]
         x, y = places[rows].T
         odd = np.zeros(len(rows), dtype=bool)
         for ring in rings:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...settings import UNITS
-from ..units import SAME, name_of
+from ..units import SAME_UNIT, name_of
 from .content import Content
 
 
@@ -71,7 +71,7 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
         raise InputError(f"{path} does not say the unit of x and y; --unit says it, besides --z-unit {z_unit}")
     z_metres = UNITS[z_unit] or z_metres
     size = UNITS[name]
-    if not size or not z_metres or math.isclose(z_metres, size * scale, rel_tol=SAME):
+    if not size or not z_metres or math.isclose(z_metres, size * scale, rel_tol=SAME_UNIT):
         return content.points * scale if scale != 1.0 else content.points, name, tuple(notes)
     other = name_of(z_metres) or f"units of {z_metres:g} m"
     notes.append(

@@ -49,6 +49,6 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
     }
 
 
-def said_of_more(name: str, held: int, promised: int) -> str:
+def surplus_note(name: str, held: int, promised: int) -> str:
     """Return what should be said of a file with more points than it promises."""
     return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

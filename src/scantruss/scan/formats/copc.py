@@ -20,7 +20,7 @@ NAME = b"copc".ljust(16, b"\0") + b"\1\0"  # user and number of the record that 
 INFO = 160  # its bytes; it is the first of the file
 ENTRY = np.dtype([("key", "<i4", 4), ("place", "<u8"), ("size", "<i4"), ("count", "<i4")])  # of the table
 ELSEWHERE = -1  # count of an entry that tells where more of the table is
-DEEPEST = 30  # level of an octree
+DEEPEST_OCTREE_LEVEL = 30  # level of an octree
 CLOSE = 1e-9  # of the octree's side; coordinates are rounded
 
 
@@ -57,7 +57,7 @@ def find_boxes(path: Path, header: Any) -> Boxes | None:
             return None
     corner = np.array([x, y, z]) - half
     level, keys = entries["key"][:, 0], entries["key"][:, 1:]
-    if level.min() < 0 or level.max() > DEEPEST or len(np.unique(entries["key"], axis=0)) < len(entries):
+    if level.min() < 0 or level.max() > DEEPEST_OCTREE_LEVEL or len(np.unique(entries["key"], axis=0)) < len(entries):
         return None
     close = 2.0 * np.abs(header.scales) + CLOSE * half
     whole = (corner - close <= header.mins) & (header.maxs <= corner + 2.0 * half + close)

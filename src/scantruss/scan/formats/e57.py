@@ -18,10 +18,10 @@ from .content import Content, find_attributes
 from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
 from .e57_pages import logical
 from .kinds import read_head, wrong_kind
-from .las_header import said_of_room
+from .las_header import room_note
 
 LEAST_SURPLUS = 64  # bits of a field behind those of its records that may only fill a word
-BLOCK = 1 << 18  # records taken out of their bits in one go
+RECORDS_PER_BLOCK = 1 << 18  # records taken out of their bits in one go
 
 
 class ScanPoints(NamedTuple):
@@ -87,7 +87,7 @@ def e57_scans(path: Path, wanted: Sequence[str] = ()) -> Iterator[ScanPoints]:
         if not kept.all():
             points, attributes = points[kept], {name: values[kept] for name, values in attributes.items()}
         invalid = len(kept) - int(kept.sum())
-        notes = said_of_room(path, scan.count, room, f" in {scan.name}")
+        notes = room_note(path, scan.count, room, f" in {scan.name}")
         yield ScanPoints(scan.name, points, scan.rotation, scan.translation, invalid, attributes, notes)
 
 
@@ -159,8 +159,8 @@ def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> lis
 
 def _streams(packet: np.ndarray, count: int) -> list[np.ndarray] | None:
     """Return the bytes of each field in a data packet; None where it does not hold so many fields."""
-    told, begin = int(packet[4]) + 256 * int(packet[5]), 6 + 2 * count
-    if told != count or begin > len(packet):
+    stated, begin = int(packet[4]) + 256 * int(packet[5]), 6 + 2 * count
+    if stated != count or begin > len(packet):
         return None
     ends = begin + np.cumsum(packet[6:begin].view("<u2").astype(np.int64))
     if ends[-1] > len(packet):
@@ -175,8 +175,8 @@ def _decode(stream: np.ndarray, field: Field, count: int) -> np.ndarray:
         return stream[: count * size].view(f"<f{size}").astype(np.float64, copy=False)
     values = np.empty(count)
     padded = np.concatenate([stream, np.zeros(16, dtype=np.uint8)])
-    for begin in range(0, count, BLOCK):
-        end = min(begin + BLOCK, count)
+    for begin in range(0, count, RECORDS_PER_BLOCK):
+        end = min(begin + RECORDS_PER_BLOCK, count)
         whole = _unpack(padded, field.bits, begin, end) + np.uint64(field.low % (1 << 64))  # wraps to the signed number
         values[begin:end] = whole.view(np.int64)
     if (field.scale, field.offset) != (1.0, 0.0):

@@ -62,8 +62,8 @@ def read_pages(path: Path) -> np.ndarray:
     if size < length or size % PAGE:
         raise FormatError(f"{path} ends early: its header promises {length:,} bytes, got {size:,}; copy it again")
     pages = np.memmap(path, dtype=np.uint8, mode="r").reshape(-1, PAGE)
-    told = np.ascontiguousarray(pages[:, DATA:]).view(">u4")[:, 0]
-    wrong = np.flatnonzero(checksums(pages) != told)
+    stated = np.ascontiguousarray(pages[:, DATA:]).view(">u4")[:, 0]
+    wrong = np.flatnonzero(checksums(pages) != stated)
     if len(wrong):
         raise FormatError(f"{path} is damaged: page {wrong[0] + 1} of {len(pages)} has a wrong checksum; copy it again")
     return pages[:, :DATA].reshape(-1)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 TALL = 45.0  # units; the median of woods, in metres, stays below
-SAMPLE = 400_000  # points
+POINTS_LOOKED_AT = 400_000  # points
 PLACES = 100  # boxes of either kind that are enough to tell
 
 
@@ -38,8 +38,8 @@ def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
 def _height_of_woods(points: np.ndarray, returns: np.ndarray) -> float:
     """Return the median span of heights in boxes with several returns, less that in boxes without; 0 where there are few."""
     x, y = points[:, 0], points[:, 1]
-    if len(points) > SAMPLE:  # a strip of the scan, with all its points
-        share = 0.5 * SAMPLE / len(points)
+    if len(points) > POINTS_LOOKED_AT:  # a strip of the scan, with all its points
+        share = 0.5 * POINTS_LOOKED_AT / len(points)
         low, high = np.quantile(x[:: max(1, len(x) // 100_000)], [0.5 - share, 0.5 + share])
         inside = np.flatnonzero((x >= low) & (x <= high))
         points, returns = points[inside], returns[inside]

@@ -12,12 +12,12 @@ import numpy as np
 from ...errors import FormatError, ScanTrussError
 from .content import Content
 from .copc import Place, find_boxes, read_boxes, touching
-from .heights import SAMPLE, look_like_feet
+from .heights import POINTS_LOOKED_AT, look_like_feet
 from .kinds import read_head, unreadable, wrong_kind
 from .las_header import check_header
 from .systems import system_of
 
-CHUNK = 1_000_000  # points
+POINTS_PER_CHUNK = 1_000_000  # points
 FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
 WITHHELD = "marked as withheld"  # the format's word for deleted
 
@@ -79,7 +79,7 @@ def note_on_heights(path: Path) -> str:
 
     try:
         with laspy.open(path) as file:
-            content = take(file.read_points(min(SAMPLE, int(file.header.point_count))), ["return_count"])
+            content = take(file.read_points(min(POINTS_LOOKED_AT, int(file.header.point_count))), ["return_count"])
             return look_like_feet(content.points, content.attributes["return_count"])
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
@@ -94,7 +94,7 @@ def fields_for(names: Sequence[str]) -> Any:
 
 
 def records_near(
-    path: Path, header: Any, places: Sequence[Place], names: Sequence[str], most: int = CHUNK
+    path: Path, header: Any, places: Sequence[Place], names: Sequence[str], most: int = POINTS_PER_CHUNK
 ) -> tuple[Iterator[Any], dict[str, int]] | None:
     """Return the records of a COPC file near all places, and how many others there are by the words of these; None of other files."""
     boxes = find_boxes(path, header) if places else None
@@ -113,6 +113,6 @@ def _read(path: Path, names: Sequence[str], places_of: Places | None) -> tuple[i
         system = system_of([*header.vlrs, *(header.evlrs or [])])
         said = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
         near = records_near(path, header, places_of(said), names) if places_of else None
-        records, unread = near or (file.chunk_iterator(CHUNK), {})
+        records, unread = near or (file.chunk_iterator(POINTS_PER_CHUNK), {})
         chunks = [take(record, names) for record in records]
     return header.point_count, replace(said, unread=unread), chunks

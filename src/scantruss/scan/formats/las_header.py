@@ -53,15 +53,15 @@ def check_header(path: Path) -> tuple[str, ...]:
             end = min(waves, end)
         if form & 0xC0:
             room = _check_packed(path, size, length, records, start, width, count)
-            return said_of_room(path, promised, room)
+            return room_note(path, promised, room)
     held = (size - start) // max(width, 1)
     if form < 64 and count > held:
         raise FormatError(f"{path} ends early: its header promises {count:,} points, got {held:,}; copy it again")
     whole = form < 64 and width > 0 and (end - start) % width == 0
-    return said_of_room(path, promised, (end - start) // width if whole else 0)
+    return room_note(path, promised, (end - start) // width if whole else 0)
 
 
-def said_of_room(path: Path, count: int, room: int, of: str = "") -> tuple[str, ...]:
+def room_note(path: Path, count: int, room: int, of: str = "") -> tuple[str, ...]:
     """Return a note where a file surely holds more points than are promised."""
     if room <= count:
         return ()
@@ -102,9 +102,9 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
         place = start + 8
         for _, long in entries:
             file.seek(place + width + 4)
-            told = np.frombuffer(file.read(4 * layers), dtype="<u4")
+            stated = np.frombuffer(file.read(4 * layers), dtype="<u4")
             place += long
-            if place > table or len(told) < layers or int(told.sum(dtype=np.int64)) > long:
+            if place > table or len(stated) < layers or int(stated.sum(dtype=np.int64)) > long:
                 raise early
         if lazrs.LazVlr(described).uses_variable_size_chunks():
             return sum(points for points, _ in entries)

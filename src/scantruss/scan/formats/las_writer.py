@@ -14,9 +14,9 @@ from ...errors import InputError
 from ...settings import UNITS
 from ..cloud import measure_spacing
 
-SHARE = 1e-3  # of the spacing: what a coordinate may lose
-LARGEST = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
-CHUNK = 1_000_000  # points
+LOST_OF_SPACING = 1e-3  # of the spacing: what a coordinate may lose
+LARGEST_INTEGER = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
+POINTS_PER_CHUNK = 1_000_000  # points
 CODES = {"m": 9001, "foot": 9002}  # EPSG
 
 
@@ -37,7 +37,7 @@ def write_las(path: Path, points: np.ndarray, normals: np.ndarray | None, unit: 
     scale = las_scale(points)
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle = 0.5 * (lower + upper) if origin is None else np.asarray(origin, dtype=np.float64)
-    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST:
+    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST_INTEGER:
         middle = 0.5 * (lower + upper)
     header.scales, header.offsets = np.full(3, scale), np.round(middle / scale) * scale
     if normals is not None:
@@ -54,8 +54,8 @@ def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarr
     import laspy
 
     with path.open("wb") as file, laspy.open(file, "w", header=header, do_compress=_is_laz(path), closefd=False) as out:
-        for begin in range(0, len(points), CHUNK):
-            part = slice(begin, begin + CHUNK)
+        for begin in range(0, len(points), POINTS_PER_CHUNK):
+            part = slice(begin, begin + POINTS_PER_CHUNK)
             record = laspy.ScaleAwarePointRecord.zeros(len(points[part]), header=header)
             record.x, record.y, record.z = points[part].T
             for axis, name in enumerate("XYZ" if normals is not None else ""):
@@ -66,14 +66,14 @@ def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarr
 def las_scale(points: np.ndarray) -> float:
     """Return the step of the coordinates: a power of ten below a thousandth of the spacing."""
     extent = float(np.ptp(points, axis=0).max())
-    finest = extent / (1.9 * LARGEST)
-    wanted = SHARE * measure_spacing(points) or 1e-6 * extent or 1e-3
+    finest = extent / (1.9 * LARGEST_INTEGER)
+    wanted = LOST_OF_SPACING * measure_spacing(points) or 1e-6 * extent or 1e-3
     scale = float(f"1e{math.floor(math.log10(wanted))}")
     if scale >= finest:
         return scale
     if wanted < finest:
         raise InputError(
-            f"LAS cannot hold points {wanted / SHARE:.3g} apart in a box of {extent:.3g}; write PLY, or crop or thin the scan"
+            f"LAS cannot hold points {wanted / LOST_OF_SPACING:.3g} apart in a box of {extent:.3g}; write PLY, or crop or thin the scan"
         )
     return wanted
 

@@ -18,7 +18,7 @@ from .columns import check_not_degrees, fit_columns
 from .content import find_attributes
 from .kinds import is_text, kind_of, read_head, wrong_kind
 
-PART = 1 << 16  # bytes looked at, at the start and in the middle
+BYTES_LOOKED_AT = 1 << 16  # bytes looked at, at the start and in the middle
 LINES = 1000  # lines looked at in each part
 ANY = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
@@ -166,12 +166,12 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
     """Return the whole lines of the first part of a file and of a part in its middle."""
     size = path.stat().st_size
     with path.open("rb") as file:
-        raw = file.read(PART)
+        raw = file.read(BYTES_LOOKED_AT)
         file.seek(size // 2)
-        later = file.read(PART // 4) if size > 2 * PART and encoding != "utf-16" else b""
+        later = file.read(BYTES_LOOKED_AT // 4) if size > 2 * BYTES_LOOKED_AT and encoding != "utf-16" else b""
     start = re.split(r"\r\n|\n|\r", raw.decode(encoding, errors="replace"))
     middle = re.split(r"\r\n|\n|\r", later.decode("latin-1"))[1:-1]
-    return (start[:-1] if size > PART and len(start) > 1 else start), middle
+    return (start[:-1] if size > BYTES_LOOKED_AT and len(start) > 1 else start), middle
 
 
 def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:

@@ -14,7 +14,7 @@ from .kinds import read_head, wrong_kind
 
 MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros would to a thousandth
 ALWAYS = 1 << 26  # bytes that any file may unpack to
-BLOCK = 1 << 20  # bytes
+BYTES_PER_BLOCK = 1 << 20  # bytes
 
 
 @contextmanager
@@ -42,7 +42,7 @@ def _unpack(path: Path, inner: Path) -> None:
     try:
         with gzip.open(path) as source, inner.open("wb") as target:
             size = 0
-            while block := source.read(BLOCK):
+            while block := source.read(BYTES_PER_BLOCK):
                 size += len(block)
                 check_size(path, size)
                 target.write(block)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import PATTERN, metres_of
-from .content import Content, find_attributes, said_of_more
+from .content import Content, find_attributes, surplus_note
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 
 LONGEST_HEADER = 1 << 16  # bytes
@@ -62,7 +62,7 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     if header.moved:
         notes.append(f"the viewpoint of {path.name} is where the scanner stood; the points are not moved by it")
     if len(table) > header.points:
-        notes.append(said_of_more(path.name, len(table), header.points))
+        notes.append(surplus_note(path.name, len(table), header.points))
     if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
         notes.append(f"{path.name} goes on for {more:,} bytes behind the points that it promises; they are left aside")
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))

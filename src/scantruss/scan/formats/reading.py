@@ -12,8 +12,8 @@ import numpy as np
 from ...errors import FormatError, InputError
 from ...selection import Selection
 from ..cloud import PointCloud
-from ..degrees import said_of_degrees
-from ..extent import extent_of, said_of_apart
+from ..degrees import degrees_note
+from ..extent import extent_note, extent_of
 from ..units import check_unit
 from .choose import check_attributes, choose, describe, places_in
 from .common_unit import to_common_unit
@@ -101,7 +101,7 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     if not len(points):
         raise _nothing_left(files, parts)
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
-    return replace(cloud, notes=(*notes, *cloud.notes, *said_of_degrees(cloud)))
+    return replace(cloud, notes=(*notes, *cloud.notes, *degrees_note(cloud)))
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
@@ -168,13 +168,13 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
 def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
     """Return the points of all files in one unit, the unit, and what should be said."""
     check_systems(files, [part.system for part in parts])
-    unit, notes = said_together(files, [part.unit for part in parts], [part.notes for part in parts])
+    unit, notes = joint_notes(files, [part.unit for part in parts], [part.notes for part in parts])
     points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
-    notes = (*notes, *said_of_left_out([part.left_out for part in parts]))
-    return points, unit, (*notes, *said_of_apart(files, [extent_of(part.points) for part in parts]))
+    notes = (*notes, *left_out_note([part.left_out for part in parts]))
+    return points, unit, (*notes, *extent_note(files, [extent_of(part.points) for part in parts]))
 
 
-def said_together(
+def joint_notes(
     files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> tuple[str, tuple[str, ...]]:
     """Return the unit of all files of a scan, "" where none says one, and what should be said of them, each thing once."""
@@ -187,7 +187,7 @@ def said_together(
     return unit, tuple(said)
 
 
-def said_of_left_out(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
+def left_out_note(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
     """Return what should be said of the points that are left out of the parts of a scan."""
     return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
 

@@ -10,12 +10,12 @@ import numpy as np
 from .layout import Layout
 
 LARGE = 1 << 23  # bytes of a file for which it is worth loading the compiled loop
-BLOCK = 1 << 24  # bytes
+BYTES_PER_BLOCK = 1 << 24  # bytes
 LONGEST = 1 << 20  # bytes of a line
 MOST_SLOW = 1 << 16  # numbers of a block that Python rounds; of more, numpy is as fast
 
 
-def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int = BLOCK) -> np.ndarray | None:
+def read_regular(path: Path, layout: Layout, columns: Sequence[int], block: int = BYTES_PER_BLOCK) -> np.ndarray | None:
     """Return some columns of a text file, (N, len(columns)) float64; None where a line is not of plain numbers.
 
     Parameters

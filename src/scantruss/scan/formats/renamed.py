@@ -50,7 +50,7 @@ def check_names(path: Path, names: Names, row: Sequence[str], layout: Layout, be
     found = fit_columns(names.names, len(row), layout.columns[0] > 0)
     if found is None and names.in_comment:
         return
-    if found == layout.columns and not _says_otherwise(path, names.names, found, layout):
+    if found == layout.columns and not _differs(path, names.names, found, layout):
         return
     raise FormatError(
         f"{path}: line {before + names.number} ({names.line.strip()[:60]!r}) names the columns again, in another way than"
@@ -58,7 +58,7 @@ def check_names(path: Path, names: Names, row: Sequence[str], layout: Layout, be
     )
 
 
-def _says_otherwise(path: Path, names: Sequence[str], columns: Sequence[int], layout: Layout) -> bool:
+def _differs(path: Path, names: Sequence[str], columns: Sequence[int], layout: Layout) -> bool:
     """Whether attributes stand elsewhere, or lengths are in another unit."""
     if max(columns) >= len(names):
         return False

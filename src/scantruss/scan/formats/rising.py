@@ -24,7 +24,7 @@ def has_unnamed_first(layout: Layout) -> bool:
     return not layout.named and layout.width > 3 and layout.columns[0] == 0
 
 
-def said_of_first(name: str, layout: Layout, *parts: np.ndarray) -> tuple[str, ...]:
+def first_column_note(name: str, layout: Layout, *parts: np.ndarray) -> tuple[str, ...]:
     """Return what should be said of how the first column of a file, or of parts of it, is taken; () where it is plain."""
     values = np.concatenate(parts) if parts else np.empty(0)
     if not has_unnamed_first(layout) or len(values) < 3:

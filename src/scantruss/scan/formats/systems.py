@@ -15,7 +15,7 @@ CODES = {
 }  # fmt: skip
 PLANE, DEGREES = 1, 2  # GTModelTypeGeoKey
 OWN = 32767  # "user defined"
-DEEPEST = 60  # brackets in brackets
+DEEPEST_BRACKET = 60  # brackets in brackets
 _TOKEN = re.compile(r'"(?:[^"]|"")*"|[A-Za-z_][\w.]*|[-+.\d][\w.+-]*|[\[\](),]')
 
 Node = tuple[str, list[Any]]  # a keyword of WKT and what its brackets hold: texts, numbers as texts, nodes
@@ -67,7 +67,7 @@ def _root(text: str) -> Node | None:
         held = stack[-1][1]
         if token in "[(":
             word = held.pop() if held and isinstance(held[-1], str) else ""
-            if len(stack) > DEEPEST:
+            if len(stack) > DEEPEST_BRACKET:
                 return None
             stack.append((word.upper(), []))
             held.append(stack[-1])

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError
-from .content import Content, said_of_more
+from .content import Content, surplus_note
 from .layout import Layout, find_layout
 from .ragged_text import EMPTY, Ragged, is_plain, read_ragged
 from .regular_text import LARGE, read_regular
-from .rising import is_number_of_point, said_of_first
+from .rising import first_column_note, is_number_of_point
 
 
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -36,9 +36,9 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
     if width == 4:  # the first column may be a running number
         points = points[:, 1:] if is_number_of_point(rows[:, 0]) else points[:, :3]
     attributes = {name: more[:, i] for i, (name, _) in enumerate(layout.attributes)}
-    notes = said_of_first(path.name, layout, rows[:, 0])
+    notes = first_column_note(path.name, layout, rows[:, 0])
     if layout.promised is not None and held > promised:
-        notes = (*notes, said_of_more(path.name, held, promised))
+        notes = (*notes, surplus_note(path.name, held, promised))
     left_out = {EMPTY: empty} if empty else {}
     return Content(points, attributes, layout.metres, layout.z_metres, notes=notes, left_out=left_out)
 

@@ -25,7 +25,7 @@ AS_CLOSE = 1.25  # residual that it may have, in that of the present one
 AS_MUCH = 0.2  # places that must agree there, in those that agree now
 LEAST = 0.08  # and in those of the scan
 ELSEWHERE = 1.5  # distance from which on a place is another one, in coarse spacings
-FEWEST = 3  # scans that tell which of several ways holds where one of them does not
+FEWEST_SCANS = 3  # scans that tell which of several ways holds where one of them does not
 PUSH = 4.0  # how far a scan is pushed to see whether it comes back, in coarse spacings
 
 
@@ -57,7 +57,7 @@ def leave_out_doubtful(
         if not found:
             break
         kept = _largest_linked(scans, group, found)
-        if len(kept) < FEWEST and not sure.issuperset(kept):
+        if len(kept) < FEWEST_SCANS and not sure.issuperset(kept):
             kept = []
         left_out |= set(group.members) - set(kept)
         group = Group(kept, {i: group.poses[i] for i in kept}, {i: group.turns[i] for i in kept})

@@ -16,8 +16,8 @@ from ...runtime.parallel import in_parts
 from .views import View
 
 BINS = 11
-REACH = 6.0  # reach of a feature, in spacings of the view
-FINE = 1000.0  # steps in which a feature is told
+FEATURE_REACH = 6.0  # reach of a feature, in spacings of the view
+FEATURE_STEPS = 1000.0  # steps in which a feature is told
 SAMPLES = 200_000  # values of each scan from which the bins are found
 
 
@@ -40,7 +40,7 @@ def _edges(views: Sequence[View]) -> np.ndarray:
     for view in views:
         sample = np.empty((SAMPLES, 3))
         every = max(len(view.points) * 15 // SAMPLES, 1)
-        reach = REACH * view.spacing
+        reach = FEATURE_REACH * view.spacing
         count = kernels.sample_values(view.points, view.normals, view.boxes, reach, every, sample)
         values.append(sample[:count])
     sizes = np.sort(np.abs(np.concatenate(values)), axis=0)  # mirrored, they are those of both sides
@@ -51,7 +51,7 @@ def _edges(views: Sequence[View]) -> np.ndarray:
 
 def _histograms(view: View, edges: np.ndarray) -> np.ndarray:
     """Return the features of one view."""
-    reach, count = REACH * view.spacing, len(view.points)
+    reach, count = FEATURE_REACH * view.spacing, len(view.points)
     plain = np.zeros((count, 6 * BINS))
     mixed = np.zeros_like(plain)
     in_parts(
@@ -67,4 +67,4 @@ def _histograms(view: View, edges: np.ndarray) -> np.ndarray:
         lambda _, begin, end: kernels.mix_histograms(view.points, view.boxes, reach, plain, mixed, begin, end),
     )
     # roots weigh rare values as much as frequent ones; whole numbers up to FINE can be multiplied and added exactly in float32
-    return np.round(FINE * np.sqrt(mixed)).astype(np.float32)
+    return np.round(FEATURE_STEPS * np.sqrt(mixed)).astype(np.float32)

@@ -12,10 +12,10 @@ from .poses import invert, small_motion
 from .views import View
 
 SHARP = 1000.0  # how much stiffer places hold across the surface than along it
-ROUNDS = 10  # most steps with one reach
+MOST_STEPS = 10  # most steps with one reach
 STILL = 5e-3  # a step that moves no place farther than this share of the spacing is the last
-NEAR = 0.5  # distance across the surface within which two scans agree, in spacings
-REACH = 3.0  # distance up to which they disagree, in spacings; beyond they may be two sides of a body
+AGREEING_DISTANCE = 0.5  # distance across the surface within which two scans agree, in spacings
+DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond they may be two sides of a body
 DAMPING = 1e-6  # share of the stiffness that is added, so that what slides stays where it is
 
 
@@ -45,7 +45,13 @@ class Fit:
 
 
 def align(
-    first: View, second: View, pose: np.ndarray, turn: float, reaches: Sequence[float], few: int, rounds: int = ROUNDS
+    first: View,
+    second: View,
+    pose: np.ndarray,
+    turn: float,
+    reaches: Sequence[float],
+    few: int,
+    rounds: int = MOST_STEPS,
 ) -> np.ndarray:
     """Return the pose (4, 4) that brings the first scan onto the second, from a pose nearby.
 
@@ -93,7 +99,7 @@ def add_pairs(
     ):
         part = np.zeros((7, 7))
         count += kernels.step_sums(
-            a.points, a.normals, a.rim, b.points, b.normals, b.rim, b.boxes,
+            a.points, a.normals, a.on_boundary, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(one), np.ascontiguousarray(invert(other) @ one),
             turn, every, reach, soft, SHARP, centre, part,
         )  # fmt: skip
@@ -128,7 +134,7 @@ def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float,
     for a, b, back in ((first, second, pose), (second, first, invert(pose))):
         part = np.zeros(5)
         kernels.judge(
-            a.points, a.normals, b.points, b.normals, b.rim, b.boxes,
+            a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(back), turn, b.spacing, near, reach, part,
         )  # fmt: skip
         shares.append(part[0] / max(len(a.points), 1))

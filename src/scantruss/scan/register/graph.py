@@ -13,19 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from .fine import Fit, add_pairs, judge, solve
-from .pairs import REACH, Pair, judge_views, nearness
+from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
 from .scans import Scan
 from .views import View
 
 SURE = 0.88  # agreement of two groups at which they belong together
-ENOUGH = 0.08  # share of the smaller group's places that must agree
+AGREEING_SHARE = 0.08  # share of the smaller group's places that must agree
 CONTRADICTION = 0.6  # agreement of two scans, over each other, below which they contradict a pair of groups
 CONTRADICTED = 0.08  # share of the places of the smaller one from which on that counts
-DOUBT = 0.03  # how much better the agreement of one way must be than that of another
+CLEAR_LEAD = 0.03  # how much better the agreement of one way must be than that of another
 MOST_WAYS = 12  # pairs that are tried between two groups
 LINKED = 0.02  # overlap from which on two scans hold each other
-FEW = 2000  # places of a scan that are taken in a step of all
+PLACES_PER_STEP = 2000  # places of a scan that are taken in a step of all
 
 
 @dataclass
@@ -86,7 +86,7 @@ def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> lis
     """Return the different ways in which two groups make a whole, the best first; only those that are about as good."""
     found: list[tuple[Fit, Group]] = []
     for pair in pairs[:MOST_WAYS]:
-        if any(says_the_same(pair, whole, scans) for _, whole in found):
+        if any(agree_on_pose(pair, whole, scans) for _, whole in found):
             continue
         joined = _join(scans, one, other, pair) if pair.first in one.members else _join(scans, other, one, pair)
         if joined is not None and not any(_is_same(joined[1], whole, one, other, scans) for _, whole in found):
@@ -98,13 +98,13 @@ def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> lis
 def _rivals(fit: Fit, best: Fit) -> bool:
     """Whether a way holds about as well as the best, however much of the scans overlaps in it."""
     return (
-        fit.agreement > best.agreement - DOUBT
-        and fit.residual < (1.0 + 8.0 * DOUBT) * best.residual
+        fit.agreement > best.agreement - CLEAR_LEAD
+        and fit.residual < (1.0 + 8.0 * CLEAR_LEAD) * best.residual
         and fit.agreeing > 0.4 * best.agreeing
     )
 
 
-def says_the_same(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
+def agree_on_pose(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
     """Whether two scans lie in the whole as a pair says."""
     lies = invert(whole.poses[pair.second]) @ whole.poses[pair.first]
     return apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing
@@ -157,7 +157,7 @@ def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, l
     smaller = min(
         sum(len(scans[i].middle.points) for i in group.members) / len(group.members) for group in (one, other)
     )
-    if agreeing <= 2.0 * ENOUGH * smaller or all_of_them.agreement < (0.6 if loose else SURE):
+    if agreeing <= 2.0 * AGREEING_SHARE * smaller or all_of_them.agreement < (0.6 if loose else SURE):
         return None
     return all_of_them
 
@@ -172,7 +172,7 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
     """Return how the fine views of two scans of a group agree, within the distance in which the middle ones do."""
     one, other = scans[first], scans[second]
     pose = invert(group.poses[second]) @ group.poses[first]
-    near, reach = nearness(one.middle, other.middle), REACH * one.middle.spacing
+    near, reach = nearness(one.middle, other.middle), DISAGREEING_DISTANCE * one.middle.spacing
     return judge(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
 
 
@@ -200,7 +200,7 @@ def settle(
     reaches: tuple[float, ...],
     *,
     steps: int,
-    few: int = FEW,
+    few: int = PLACES_PER_STEP,
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
     """Move all scans of a group at once so that all that overlap agree best (generalized ICP of all pairs); the first stays.

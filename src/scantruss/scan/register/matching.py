@@ -15,14 +15,14 @@ from .features import flip
 from .poses import make_pose, move, turn_by
 from .views import View
 
-ALIKE = 3  # places of the other scan that may be the same, for each place
+ALIKE_PLACES = 3  # places of the other scan that may be the same, for each place
 MOST_PAIRS = 800  # pairs of alike places that are looked at
-DISTANCE = 1.2  # difference of distances that two agreeing pairs may have, in spacings
+DISTANCE_TOLERANCE = 1.2  # difference of distances that two agreeing pairs may have, in spacings
 ANGLE = 0.30  # the same for the cosines of the normals
-APART = 3.0  # least distance between the places of two agreeing pairs, in spacings
+PAIR_DISTANCE = 3.0  # least distance between the places of two agreeing pairs, in spacings
 SEEDS = 60  # groups that become candidates
 GROUP = 24  # pairs in a group
-FEWEST = 5  # pairs below which a group says nothing
+FEWEST_PAIRS = 5  # pairs below which a group says nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ def find_candidates(
     """
     features = first_features if turn > 0 else flip(first_features)
     pairs = _alike(features, second_features)
-    if len(pairs) < FEWEST:
+    if len(pairs) < FEWEST_PAIRS:
         return []
     found = _from_pairs(first, second, pairs, turn)
     found.sort(key=lambda candidate: -candidate.support)
@@ -58,7 +58,7 @@ def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     Features are whole numbers, so that the sums are exact in whatever order they are taken.
     """
     apart = (first * first).sum(axis=1)[:, None] + (second * second).sum(axis=1) - 2.0 * (first @ second.T)
-    count = min(ALIKE, len(first), len(second))
+    count = min(ALIKE_PLACES, len(first), len(second))
     if count == 0:
         return np.zeros((0, 2), np.int64)
     there = np.argpartition(apart, count - 1, axis=1)[:, :count]
@@ -93,7 +93,7 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
             continue
         group = np.argsort(-shared[seed], kind="stable")[:GROUP]
         group = np.append(group[shared[seed, group] > 0.0], seed)
-        if len(group) < FEWEST:
+        if len(group) < FEWEST_PAIRS:
             continue
         pose = np.eye(4)
         for _ in range(3):
@@ -101,10 +101,10 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
             off = np.linalg.norm(move(pose, p) - q, axis=1)
             facing = (turn_by(pose, n) * m).sum(axis=1)
             inside = (off < 1.5 * first.spacing) & (facing > 0.7)
-            if inside.sum() < FEWEST:
+            if inside.sum() < FEWEST_PAIRS:
                 break
             group = np.flatnonzero(inside)
-        if inside.sum() >= FEWEST:
+        if inside.sum() >= FEWEST_PAIRS:
             found.append(Candidate(pose, turn, int(inside.sum())))
             free[inside] = False
         free[seed] = False
@@ -115,7 +115,7 @@ def _agree(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: 
     """Return which pairs agree with which (M, M) float32: distances and angles are those of one rigid body."""
     one, two = _between(p, n), _between(q, m)
     length = one[0]
-    agree = (np.abs(length - two[0]) < DISTANCE * spacing) & (length > APART * spacing)
+    agree = (np.abs(length - two[0]) < DISTANCE_TOLERANCE * spacing) & (length > PAIR_DISTANCE * spacing)
     for a, b in zip(one[1:], two[1:], strict=True):
         agree &= np.abs(a - b) < ANGLE
     agree &= agree.T

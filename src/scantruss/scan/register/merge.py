@@ -16,10 +16,10 @@ from .poses import invert, move
 from .scans import Scan
 from .views import View, boxes_of
 
-DEEPEST = 20.0  # depth inside a scan from which on it makes no difference, in spacings
+DEEPEST_INSIDE = 20.0  # depth inside a scan from which on it makes no difference, in spacings
 FULL = 6.0  # depth from which on a layer has its full weight
-BESIDE = 2.2  # reach in which a scan sees a point, in spacings
-OFF = 2.0  # distance across the surface up to which two layers are the same, in spacings
+SEEN_REACH = 2.2  # reach in which a scan sees a point, in spacings
+SAME_LAYER = 2.0  # distance across the surface up to which two layers are the same, in spacings
 
 
 def merge_scans(
@@ -37,11 +37,11 @@ def merge_scans(
 
 def _depth(view: View) -> np.ndarray:
     """Return how far inside the scan each place lies (S,) [scan unit]."""
-    most = DEEPEST * view.spacing
-    rims = np.ascontiguousarray(view.points[view.rim])
+    most = DEEPEST_INSIDE * view.spacing
+    boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.full(len(view.points), most)
-    if len(rims):
-        kernels.depths(view.points, rims, boxes_of(rims, 0.5 * most), most, depth)
+    if len(boundary_points):
+        kernels.depths(view.points, boundary_points, boxes_of(boundary_points, 0.5 * most), most, depth)
     return depth
 
 
@@ -49,7 +49,7 @@ def _points_of(scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndar
     """Return the points that scan i gives to the whole, moved to the mean layer, in the frame of the group."""
     points, view = scans[i].cloud.points, scans[i].fine
     own, deep = np.empty(len(points), np.int64), np.empty(len(points))
-    beside, full = BESIDE * view.spacing, FULL * view.spacing
+    beside, full = SEEN_REACH * view.spacing, FULL * view.spacing
     kernels.own_places(points, view.points, view.boxes, depth[i], beside, own, deep)
     shift, weight = np.zeros_like(points), np.minimum(deep / full, 1.0)
     kept = np.ones(len(points), np.int64)
@@ -59,7 +59,7 @@ def _points_of(scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndar
             kernels.add_layer(
                 points, own, view.normals, deep, other.points, other.normals, other.boxes, depth[j],
                 np.ascontiguousarray(invert(group.poses[j]) @ group.poses[i]), group.turns[i] * group.turns[j],
-                int(ranked.index(j) < ranked.index(i)), beside, OFF * view.spacing, full, shift, weight, kept,
+                int(ranked.index(j) < ranked.index(i)), beside, SAME_LAYER * view.spacing, full, shift, weight, kept,
             )  # fmt: skip
     moved = points + shift / np.maximum(weight, 1e-12)[:, None]
     return move(group.poses[i], moved[kept == 1])

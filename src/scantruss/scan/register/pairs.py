@@ -19,18 +19,18 @@ CANDIDATES = 40  # poses from the features that are judged as they are
 ALIGNED = 10  # the best of them, which are aligned
 TRIED = 4  # the best of these, which are aligned closely
 WORSE = 0.2  # of them those whose score is not below this share of the best
-FEW = 800  # places of a scan that are enough to align it
+PLACES_FOR_ALIGNMENT = 800  # places of a scan that are enough to align it
 KEPT = 3  # poses of a pair that are handed on
 GOOD = 0.9  # agreement at which the other side of the normals need not be looked at
 BULGE = 0.6  # how surely normals must face the outside for the other side not to be looked at
-SHARE = 0.03  # overlap below which a pair is not considered
+LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
 AGREEMENT = 0.6  # agreement below which it is not
 NOISE = 3.0  # distance within which two scans agree, in the noise of both together
 LEAST = 0.15  # least such distance, in spacings of the view; scanners bend what they see a little
-MOST = 0.5  # the largest
+LARGEST_OVERLAP = 0.5  # the largest
 WITHIN = 3.0  # distance within which two scans agree, in the residual of pairs that are taken for right
 STRICTEST = 0.35  # least share of that distance that may be left of it so
-REACH = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
+DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +47,12 @@ class Pair:
 def nearness(first: View, second: View) -> float:
     """Return the distance across the surface within which two scans agree [scan unit]."""
     noise = NOISE * math.hypot(first.noise, second.noise)
-    return min(max(noise, LEAST * first.spacing), MOST * first.spacing) * min(first.strict, second.strict)
+    return min(max(noise, LEAST * first.spacing), LARGEST_OVERLAP * first.spacing) * min(first.strict, second.strict)
 
 
 def judge_views(first: View, second: View, pose: np.ndarray, turn: float) -> Fit:
     """Return how two views agree under a pose (4, 4)."""
-    return judge(first, second, pose, turn, nearness(first, second), REACH * first.spacing)
+    return judge(first, second, pose, turn, nearness(first, second), DISAGREEING_DISTANCE * first.spacing)
 
 
 def find_pairs(
@@ -91,7 +91,7 @@ def find_pair(
         poses = [_roughly(one, other, pose, turn) for pose in poses]
         for pose in _best(one, other, poses, turn, 0.35)[: None if thorough else TRIED]:
             found += closer(one, other, first, second, pose, turn)
-        if not thorough and any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * SHARE for pair in found):
+        if not thorough and any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * LEAST_OVERLAP for pair in found):
             break
     found.sort(key=lambda pair: -pair.fit.score)
     return _different(found, one.coarse)[: None if thorough else KEPT]
@@ -100,7 +100,7 @@ def find_pair(
 def _roughly(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> np.ndarray:
     """Return the pose after alignment of the coarse views."""
     reach = one.coarse.spacing
-    return align(one.coarse, other.coarse, pose, turn, (2.0 * reach, reach), FEW, 6)
+    return align(one.coarse, other.coarse, pose, turn, (2.0 * reach, reach), PLACES_FOR_ALIGNMENT, 6)
 
 
 def settled_from(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> list[Pair]:
@@ -111,7 +111,10 @@ def settled_from(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> list[
 def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: float) -> list[np.ndarray]:
     """Return the better ones of some poses, best first, by how the coarse views agree within `near` spacings."""
     spacing = one.coarse.spacing
-    scores = [judge(one.coarse, other.coarse, pose, turn, near * spacing, REACH * spacing).score for pose in poses]
+    scores = [
+        judge(one.coarse, other.coarse, pose, turn, near * spacing, DISAGREEING_DISTANCE * spacing).score
+        for pose in poses
+    ]
     order = sorted(range(len(poses)), key=lambda k: -scores[k])
     return [poses[k] for k in order if scores[k] > WORSE * scores[order[0]]]
 
@@ -123,7 +126,7 @@ def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
     """
     best: dict[int, tuple[float, float]] = {}
     for pair in pairs:
-        if pair.fit.share > 3.0 * SHARE:
+        if pair.fit.share > 3.0 * LEAST_OVERLAP:
             for k in (pair.first, pair.second):
                 best[k] = max(best.get(k, (0.0, 0.0)), (pair.fit.score, pair.fit.residual / pair.fit.near))
     ratios = sorted(ratio for _, ratio in best.values())
@@ -136,7 +139,7 @@ def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
     found = []
     for pair in pairs:
         fit = judge_views(scans[pair.first].middle, scans[pair.second].middle, pair.pose, pair.turn)
-        if fit.share >= SHARE and fit.agreement >= AGREEMENT:
+        if fit.share >= LEAST_OVERLAP and fit.agreement >= AGREEMENT:
             found.append(replace(pair, fit=fit))
     return found
 
@@ -144,9 +147,9 @@ def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
 def closer(one: Scan, other: Scan, first: int, second: int, pose: np.ndarray, turn: float) -> list[Pair]:
     """Return the pair after close alignment from a pose nearby; nothing where they do not agree."""
     reach = one.middle.spacing
-    pose = align(one.middle, other.middle, pose, turn, (2.0 * reach, reach), 2 * FEW)
+    pose = align(one.middle, other.middle, pose, turn, (2.0 * reach, reach), 2 * PLACES_FOR_ALIGNMENT)
     fit = judge_views(one.middle, other.middle, pose, turn)
-    if fit.share < SHARE or fit.agreement < AGREEMENT:
+    if fit.share < LEAST_OVERLAP or fit.agreement < AGREEMENT:
         return []
     return [Pair(first, second, pose, turn, fit)]
 

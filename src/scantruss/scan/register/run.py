@@ -16,12 +16,12 @@ from .fine import Fit, align
 from .graph import (
     CONTRADICTION,
     Group,
+    agree_on_pose,
     assemble,
     fine_fit_of,
     fit_of,
     links_of,
     pairs_as_they_lie,
-    says_the_same,
     settle,
 )
 from .merge import merge_scans
@@ -214,7 +214,7 @@ def _start(scans: list[Scan], given: list[np.ndarray | None], first: int, second
 def _sure(scans: list[Scan], group: Group, started: list[Pair]) -> set[int]:
     """Return the scans of a group that lie as given poses say; where the features placed a scan its pose tells nothing."""
     members = set(group.members)
-    held = [p for p in started if {p.first, p.second} <= members and says_the_same(p, group, scans)]
+    held = [p for p in started if {p.first, p.second} <= members and agree_on_pose(p, group, scans)]
     return {i for pair in held for i in (pair.first, pair.second)}
 
 

@@ -14,10 +14,12 @@ from .views import View, make_view
 PARTS = 75.0  # coarse spacings along the diagonal of a typical scan
 MIDDLE = 2.5  # middle spacings in a coarse one
 FINEST = 400.0  # most fine spacings along the diagonal of a typical scan
-FINE = 1.2  # fine spacing, in distances between points
+FINE_SPACING = 1.2  # fine spacing, in distances between points
 COARSEST = 1.2  # least coarse spacing, in distances between points
-UNEVEN = 1.4  # distance of the sixth neighbour in points as even as those of a range grid, in distances between points
-FEWEST = 60  # coarse places below which a scan is too small to be told by its features
+EVEN_GAP = (
+    1.4  # distance of the sixth neighbour in points as even as those of a range grid, in distances between points
+)
+FEWEST_PLACES = 60  # coarse places below which a scan is too small to be told by its features
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class Scan:
     @property
     def tells(self) -> bool:
         """Whether it is large enough beside the others to be told by its shape."""
-        return len(self.coarse.points) >= FEWEST
+        return len(self.coarse.points) >= FEWEST_PLACES
 
 
 def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
@@ -50,15 +52,15 @@ def prepare_scans(
 ) -> list[Scan]:
     """Return the scans with their views, all at the same three spacings."""
     diagonal = typical_diagonal(clouds)
-    apart = float(np.median([max(cloud.spacing, cloud.gap / UNEVEN) for cloud in clouds]))
+    apart = float(np.median([max(cloud.spacing, cloud.gap / EVEN_GAP) for cloud in clouds]))
     coarse = max(diagonal / PARTS, COARSEST * apart)
-    middle = max(coarse / MIDDLE, FINE * apart)
-    fine = min(max(FINE * apart, diagonal / FINEST), middle)
+    middle = max(coarse / MIDDLE, FINE_SPACING * apart)
+    fine = min(max(FINE_SPACING * apart, diagonal / FINEST), middle)
     scans = []
     for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
         progress("prepare", place / len(clouds))
         wide = make_view(cloud.points, coarse)
-        if len(wide.points) < FEWEST:  # in another unit, or too sparse beside the others
+        if len(wide.points) < FEWEST_PLACES:  # in another unit, or too sparse beside the others
             scans.append(Scan(name, cloud, wide, wide, wide))
             continue
         middle_view = make_view(cloud.points, middle, wide)

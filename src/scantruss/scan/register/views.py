@@ -11,12 +11,12 @@ from ...kernels.scan import overlap as kernels_of_overlap
 from ...kernels.surface import normals as normal_kernels
 from ...kernels.surface import samples as kernels
 from ...runtime.parallel import in_parts
-from ...surface.linked_samples import sites_of_points
+from ...surface.linked_samples import samples_of_points
 from ..normals import face_one_side, mean_normals
 
-AROUND = 14  # neighbours of a place, for its normal
-FEWEST = 5  # neighbours below which a place is left out: it lies on no surface
-RIM = 0.32  # how far the mean of its neighbours lies aside of a place at the rim, in their reach
+NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
+FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out: it lies on no surface
+BOUNDARY_OFFSET = 0.32  # how far the mean of its neighbours lies aside of a place at the rim, in their reach
 PIECE = 0.02  # share of the places that a loose piece must have to vote for the side it faces
 
 
@@ -26,7 +26,7 @@ class View:
 
     points: np.ndarray  #: (S, 3) places [scan unit], in the frame of the scan
     normals: np.ndarray  #: (S, 3) unit normals, all to one side
-    rim: np.ndarray  #: (S,) bool, places at the rim of what the scan sees
+    on_boundary: np.ndarray  #: (S,) bool, places at the rim of what the scan sees
     boxes: SearchBoxes  #: of the places
     spacing: float  #: distance the places keep [scan unit]
     noise: float  #: typical distance of a place from the plane of its neighbours [scan unit]
@@ -50,24 +50,24 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     """
     places = thin(points, spacing)
     neighbors = link(places, spacing)
-    sound = neighbors[:, FEWEST - 1] >= 0
+    sound = neighbors[:, FEWEST_NEIGHBORS - 1] >= 0
     if not sound.all():
         places = np.ascontiguousarray(places[sound])
         neighbors = link(places, spacing)
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
-    normal_kernels.site_normals(places, neighbors, normals, thickness, 0, len(places))
+    normal_kernels.sample_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
         _face_as_seen(places, normals, neighbors)
     else:
         kernels_of_overlap.face_like(places, normals, coarse.points, coarse.normals, coarse.boxes, 2.0 * coarse.spacing)
     normals_around = mean_normals(normals, neighbors, 0.7)
     aside = np.zeros(len(places))
-    kernels_of_overlap.mark_rim(places, normals, neighbors, aside)
+    kernels_of_overlap.mark_boundary(places, normals, neighbors, aside)
     noise = float(np.median(thickness)) if len(places) else 0.0
     return View(
         places,
         normals_around,
-        aside > RIM,
+        aside > BOUNDARY_OFFSET,
         boxes_of(places, 1.5 * spacing),
         spacing,
         noise,
@@ -77,8 +77,8 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
 
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return places (S, 3) that nearly keep a spacing: means of the points around the first of each neighbourhood."""
-    owner, chosen, sites, boxes = sites_of_points(points, spacing)
-    kernels_of_overlap.first_places(points, boxes, sites, spacing, owner)
+    owner, chosen, samples, boxes = samples_of_points(points, spacing)
+    kernels_of_overlap.first_places(points, boxes, samples, spacing, owner)
     count = len(chosen)
     mean = np.zeros((count, 3))
     start = np.zeros(count + 1, np.int64)
@@ -97,12 +97,14 @@ def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
 
 def link(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return the nearest neighbours (N, AROUND) of each point within a few spacings, -1 where there are fewer."""
-    neighbors = np.full((len(points), AROUND), -1, np.int64)
+    neighbors = np.full((len(points), NEIGHBORS_FOR_NORMAL), -1, np.int64)
     boxes = boxes_of(points, 2.2 * spacing)
     in_parts(
         len(points),
         3000,
-        lambda _, begin, end: kernels.nearest_sites(points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end),
+        lambda _, begin, end: kernels.nearest_samples(
+            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
+        ),
     )
     far = 3.3 * spacing  # the kernel looks farther where there are few; here those are strays
     off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far

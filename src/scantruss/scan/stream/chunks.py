@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from ..formats.layout import Layout
     from .tiles import Source, Tile
 
-CHUNK = 1_000_000  # points
-SAMPLE = 10_000  # points that are described where none is taken
-BLOCK = 1 << 24  # bytes of text
+POINTS_PER_CHUNK = 1_000_000  # points
+POINTS_DESCRIBED = 10_000  # points that are described where none is taken
+TEXT_BYTES_PER_BLOCK = 1 << 24  # bytes of text
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Chunk(NamedTuple):
 
 
 def read_chunks(
-    tile: Tile, reading: Reading | None = None, size: int = CHUNK, *, alone: bool = True
+    tile: Tile, reading: Reading | None = None, size: int = POINTS_PER_CHUNK, *, alone: bool = True
 ) -> Iterator[Chunk]:
     """Yield the points of a tile: those that are selected, in the unit of the scan.
 
@@ -91,7 +91,7 @@ def read_chunks(
 
 def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
     """Return what is selected of some points, in the unit of the scan."""
-    part = select(path, content, reading.unit, reading.selection, reading.common, SAMPLE)
+    part = select(path, content, reading.unit, reading.selection, reading.common, POINTS_DESCRIBED)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out later
         points = np.ascontiguousarray(part.points, np.float64)
     return Chunk(points, part.count, part.left_out, content.notes, part.held)
@@ -195,7 +195,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             file.seek(tile.begin - 1)
             file.readline()  # of a line that began before: another tile has it
         while (at := file.tell()) < tile.end:
-            block = file.read(min(BLOCK, tile.end - at))
+            block = file.read(min(TEXT_BYTES_PER_BLOCK, tile.end - at))
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
@@ -234,6 +234,6 @@ def _count_lines(path: Path, end: int) -> int:
     """Return how many lines of a file end before a byte."""
     count = 0
     with path.open("rb") as file:
-        while raw := file.read(min(BLOCK, end - file.tell())):
+        while raw := file.read(min(TEXT_BYTES_PER_BLOCK, end - file.tell())):
             count += raw.count(b"\n")
     return count

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.memory import available_memory
-from ..cloud import LARGEST, PointCloud
-from ..degrees import said_of_degrees
+from ..cloud import LARGEST_COORDINATE, PointCloud
+from ..degrees import degrees_note
 from ..extent import BULK, usual_extent
 from ..formats.kinds import read_head
 from ..formats.paths import Source as Names
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into memory
 BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
 PACKED_POINT = 8  # bytes; a point of a packed text has about as many
-FEWEST = 100_000  # points that are never too many
+NEVER_TOO_MANY_POINTS = 100_000  # points that are never too many
 LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
-SHARE = 0.5  # of the memory at hand that a scan may take
+MEMORY_SHARE = 0.5  # of the memory at hand that a scan may take
 
 
 def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None) -> float:
@@ -50,9 +50,9 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
     if settings.thin_spacing is not None:
         return float(settings.thin_spacing)
     points = sum(map(_guess, files_of(names)))
-    if points <= FEWEST:
+    if points <= NEVER_TOO_MANY_POINTS:
         return 0.0
-    memory = SHARE * available_memory() if memory is None else memory
+    memory = MEMORY_SHARE * available_memory() if memory is None else memory
     if points * BYTES > memory and settings.selection.crop:
         sources, reading, _ = open_scan(names, settings.unit, settings.selection)
         points -= sum(count_unread(source, reading) for source in sources)
@@ -76,14 +76,14 @@ def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.nd
 
     By chance, as every n-th may be of one column of the scanner; the same each time.
     """
-    some, share, chance = np.empty((0, 3)), 1.0, np.random.default_rng(0)
+    some, share, rng = np.empty((0, 3)), 1.0, np.random.default_rng(0)
     for tile in tiles_of(sources):
         for chunk in read_chunks(tile, reading):
             report(chunk.read)
-            new = chunk.points if share == 1.0 else chunk.points[chance.random(len(chunk.points)) < share]
-            some = np.concatenate([some, new[(np.abs(new) <= LARGEST).all(axis=1)]])
+            new = chunk.points if share == 1.0 else chunk.points[rng.random(len(chunk.points)) < share]
+            some = np.concatenate([some, new[(np.abs(new) <= LARGEST_COORDINATE).all(axis=1)]])
             while len(some) > 2 * BULK:
-                some, share = some[chance.random(len(some)) < 0.5], 0.5 * share
+                some, share = some[rng.random(len(some)) < 0.5], 0.5 * share
     return some
 
 
@@ -103,13 +103,13 @@ def read_thinned(names: Names, settings: Settings, progress: Progress | None = N
     thinned = thin_scan(
         names,
         float(settings.thin_spacing or 0.0),
-        rim=True,
+        boundary=True,
         unit=settings.unit,
         selection=settings.selection,
         progress=progress,
     )
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
-    notes = (*thinned.notes, *cloud.notes, *said_of_degrees(cloud))
+    notes = (*thinned.notes, *cloud.notes, *degrees_note(cloud))
     return replace(cloud, dropped=thinned.dropped, notes=notes), thinned.read
 
 

@@ -12,7 +12,7 @@ from ..formats.content import Content
 from ..formats.las import note_on_heights
 from ..formats.paths import Source as Names
 from ..formats.paths import files_of
-from ..formats.reading import check_systems, said_together
+from ..formats.reading import check_systems, joint_notes
 from ..units import check_unit
 from .chunks import Reading
 from .tiles import Source, find_source
@@ -51,7 +51,7 @@ def open_scan(names: Names, unit: str = "", selection: Selection | None = None) 
         _, own, notes = to_common_unit(source.path, source.said_of(none), unit, selection.z_unit, common)
         units.append(own)
         said.append(notes)
-    common, notes = said_together(files, units, said)
+    common, notes = joint_notes(files, units, said)
     airborne = next((source for source in sources if source.kind == "las"), None)
     if airborne and airborne.z_metres is None and common != "foot" and not selection.z_unit:
         notes = (*notes, *filter(None, [note_on_heights(airborne.path)]))

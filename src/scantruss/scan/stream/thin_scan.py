@@ -11,14 +11,14 @@ import numpy as np
 from ...errors import FormatError, InputError
 from ...runtime.cluster import Workers
 from ...selection import Selection
-from ..extent import extent_of, joined, said_of_apart
-from ..formats.content import said_of_more
+from ..extent import extent_note, extent_of, joined
+from ..formats.content import surplus_note
 from ..formats.paths import Source as Names
 from ..formats.paths import name_of_files
-from ..formats.reading import add_counts, said_of_left_out
+from ..formats.reading import add_counts, left_out_note
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
-from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_rim
+from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
 from .tiles import TILE, Source, Tile, tiles_of
 
 Progress = Callable[[str, float], None]
@@ -36,7 +36,7 @@ class Thinned:
     points: np.ndarray
     read: int  #: points that were taken
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
-    rim: int  #: points that stand for the rim, the last of `points`
+    boundary: int  #: points that stand for the rim, the last of `points`
     unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
 
@@ -46,7 +46,7 @@ def thin_scan(
     spacing: float,
     *,
     keep: str = "mean",
-    rim: bool = False,
+    boundary: bool = False,
     unit: str = "",
     selection: Selection | None = None,
     workers: Workers | None = None,
@@ -64,7 +64,7 @@ def thin_scan(
         Side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame.
     keep : str
         "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
-    rim : bool
+    boundary : bool
         Also keep the outermost points of boxes at the rim.
     unit, selection
         As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
@@ -81,7 +81,7 @@ def thin_scan(
         The spacing does not do; the units do not; nothing is selected.
     """
     scan = open_scan(names, unit, selection)
-    return thin_open_scan(scan, spacing, keep=keep, rim=rim, workers=workers, progress=progress)
+    return thin_open_scan(scan, spacing, keep=keep, boundary=boundary, workers=workers, progress=progress)
 
 
 def thin_open_scan(
@@ -89,7 +89,7 @@ def thin_open_scan(
     spacing: float,
     *,
     keep: str = "mean",
-    rim: bool = False,
+    boundary: bool = False,
     workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Thinned:
@@ -99,16 +99,16 @@ def thin_open_scan(
         raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
     workers = workers or Workers()
     sources, reading, notes = scan
-    rows, told = _all_rows(sources, reading, spacing, rim, workers, Share(progress, "read", sources))
+    rows, summary = _all_rows(sources, reading, spacing, boundary, workers, Share(progress, "read", sources))
     if rows.points == rows.dropped:
-        raise _nothing(sources, rows, told)
+        raise _nothing(sources, rows, summary)
     if keep == "nearest":
         chosen = _all_nearest(sources, reading, rows, spacing, workers, Share(progress, "read again", sources))
     else:
         chosen = means_of(rows.rows, spacing)
-    added = points_at_rim(rows, spacing) if rim else chosen[:0]
-    notes = (*dict.fromkeys([*told.notes, *notes]), *said_of_left_out([told.left_out]))
-    both = np.concatenate([chosen, added]) if rim else chosen
+    added = points_at_boundary(rows, spacing) if boundary else chosen[:0]
+    notes = (*dict.fromkeys([*summary.notes, *notes]), *left_out_note([summary.left_out]))
+    both = np.concatenate([chosen, added]) if boundary else chosen
     return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
 
 
@@ -127,7 +127,7 @@ class Share:
             self._progress(self._stage, min(self._done / self._total, 1.0))
 
 
-class Told:
+class ReadSummary:
     """What the chunks of a scan, or of a part of it, tell beside their points."""
 
     def __init__(self) -> None:
@@ -139,7 +139,7 @@ class Told:
         self.promised = 0  #: points that count lines promise
         self.extent = extent_of(np.empty((0, 3)))  #: (2, 3) about where the points are
 
-    def add(self, other: Told | Chunk) -> None:
+    def add(self, other: ReadSummary | Chunk) -> None:
         """Add what another chunk or part tells."""
         self.read += other.read
         self.left_out = add_counts([self.left_out, other.left_out])
@@ -150,43 +150,43 @@ class Told:
 
 
 def _all_rows(
-    sources: Sequence[Source], reading: Reading, spacing: float, rim: bool, workers: Workers, report: Share
-) -> tuple[Rows, Told]:
+    sources: Sequence[Source], reading: Reading, spacing: float, boundary: bool, workers: Workers, report: Share
+) -> tuple[Rows, ReadSummary]:
     """Return the boxes of all points that are taken."""
-    thinning = Thinning(spacing, rim=rim)
-    told = {source.path.absolute(): Told() for source in sources}
+    thinning = Thinning(spacing, boundary=boundary)
+    summary = {source.path.absolute(): ReadSummary() for source in sources}
     if workers.alone:
         for tile in tiles_of(sources):
             for chunk in read_ahead(read_chunks(tile, reading)):
                 thinning.add(chunk.points)
-                told[tile.source.path.absolute()].add(chunk)
+                summary[tile.source.path.absolute()].add(chunk)
                 report(chunk.read)
     else:
         tiles = _tiles_for(sources, workers)
-        for number, (rows, part) in workers.run(_rows_of, tiles, (reading, spacing, rim)):
+        for number, (rows, part) in workers.run(_rows_of, tiles, (reading, spacing, boundary)):
             thinning.add_rows(rows)
-            told[tiles.taken[number].source.path].add(part)
+            summary[tiles.taken[number].source.path].add(part)
             report(tiles.taken[number].points)
-    whole = Told()
+    whole = ReadSummary()
     for source in sources:
-        part = told[source.path.absolute()]
+        part = summary[source.path.absolute()]
         _check_counts(source, part)
         whole.add(part)
-    extents = [told[source.path.absolute()].extent for source in sources]
-    whole.notes = (*whole.notes, *said_of_apart([source.path for source in sources], extents))
+    extents = [summary[source.path.absolute()].extent for source in sources]
+    whole.notes = (*whole.notes, *extent_note([source.path for source in sources], extents))
     return thinning.take_rows(), whole
 
 
-def _check_counts(source: Source, told: Told) -> None:
+def _check_counts(source: Source, summary: ReadSummary) -> None:
     """Refuse a text with fewer points than its count lines promise; say of one with more that they are read."""
     if source.kind == "text" and source.layout and source.layout.promised is not None:
-        promised = source.layout.promised + told.promised
-        if told.read < promised:
+        promised = source.layout.promised + summary.promised
+        if summary.read < promised:
             raise FormatError(
-                f"{source.path} ends early: its count lines promise {promised:,} points, got {told.read:,}; copy it again"
+                f"{source.path} ends early: its count lines promise {promised:,} points, got {summary.read:,}; copy it again"
             )
-        if told.read > promised:
-            told.notes = (*told.notes, said_of_more(source.path.name, told.read, promised))
+        if summary.read > promised:
+            summary.notes = (*summary.notes, surplus_note(source.path.name, summary.read, promised))
 
 
 class _Tiles:
@@ -209,14 +209,14 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
 
 
-def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Told]:
+def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, ReadSummary]:
     """Return the boxes of a tile and what its chunks tell: the work of a worker."""
-    reading, spacing, rim = shared
-    thinning, told = Thinning(spacing, rim=rim), Told()
+    reading, spacing, boundary = shared
+    thinning, summary = Thinning(spacing, boundary=boundary), ReadSummary()
     for chunk in _chunks_there(tile, reading):
         thinning.add(chunk.points)
-        told.add(chunk)
-    return thinning.take_rows(), told
+        summary.add(chunk)
+    return thinning.take_rows(), summary
 
 
 def _all_nearest(
@@ -256,12 +256,12 @@ def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
     return read_chunks(tile, reading, alone=False)
 
 
-def _nothing(sources: Sequence[Source], rows: Rows, told: Told) -> Exception:
+def _nothing(sources: Sequence[Source], rows: Rows, summary: ReadSummary) -> Exception:
     """Return why there is no point to keep."""
     where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
-    if rows.points or not told.read:
+    if rows.points or not summary.read:
         return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
-    said = ", ".join(f"{number:,} {words}" for words, number in told.left_out.items() if number)
+    said = ", ".join(f"{number:,} {words}" for words, number in summary.left_out.items() if number)
     name = name_of_files([source.path for source in sources])
-    have = f"; some of them have{told.held}" if told.held else ""
-    return InputError(f"no point of {name} is left: of {told.read:,} points {said}{have}")
+    have = f"; some of them have{summary.held}" if summary.held else ""
+    return InputError(f"no point of {name} is left: of {summary.read:,} points {said}{have}")

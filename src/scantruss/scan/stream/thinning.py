@@ -20,9 +20,9 @@ from ...kernels.scan.thinning import (
     BoxTable,
     add_points,
     add_rows,
+    boundary_points,
     fill_slots,
     middles,
-    rim_points,
     take_nearest,
 )
 from ...runtime.parallel import in_parts
@@ -30,7 +30,7 @@ from ..invalid import CAUSE
 
 FIRST_ROWS = 4096  # room of a new table
 GROWTH = 1.5  # of a table that is full
-PART = 20_000  # boxes that are worth a thread
+BOXES_PER_THREAD = 20_000  # boxes that are worth a thread
 
 
 class Rows(NamedTuple):
@@ -56,15 +56,15 @@ class Thinning:
     ----------
     spacing : float
         Side of a box [scan unit].
-    rim : bool
-        Keep the extremes of each box too, so that `points_at_rim` can tell the rim.
+    boundary : bool
+        Keep the extremes of each box too, so that `points_at_boundary` can tell the rim.
     """
 
-    def __init__(self, spacing: float, *, rim: bool = False) -> None:
+    def __init__(self, spacing: float, *, boundary: bool = False) -> None:
         self.spacing = check_spacing(spacing)
-        self.rim = rim
+        self.boundary = boundary
         self.points = 0
-        self._table = _new_table(FIRST_ROWS, rim)
+        self._table = _new_table(FIRST_ROWS, boundary)
 
     @property
     def dropped(self) -> int:
@@ -108,7 +108,7 @@ class Thinning:
         if few:
             del slots
         rows = _longer(rows, count, capacity)
-        extremes = _longer(extremes, count, capacity if self.rim else 0)
+        extremes = _longer(extremes, count, capacity if self.boundary else 0)
         if few:
             slots = np.full(_slots_for(capacity), -1, np.int64)
             fill_slots(slots, rows, count)
@@ -122,11 +122,11 @@ class Thinning:
         for column in (*rows.T, *extremes.T):  # in their place: they may fill the memory
             column[:] = column[order] if len(column) else 0
         found = Rows(rows, extremes, self.points, self.dropped)
-        self._table, self.points = _new_table(FIRST_ROWS, self.rim), 0
+        self._table, self.points = _new_table(FIRST_ROWS, self.boundary), 0
         return found
 
 
-def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", rim: bool = False) -> np.ndarray:
+def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", boundary: bool = False) -> np.ndarray:
     """Return one point for each box of points in memory, (C, 3) [scan unit].
 
     Parameters
@@ -137,17 +137,17 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", rim: 
         Side of a box [scan unit].
     keep : str
         "mean" of the points in a box, or the one "nearest" to it.
-    rim : bool
+    boundary : bool
         Also keep the outermost points of boxes at the rim.
     """
-    thinning = Thinning(spacing, rim=rim)
+    thinning = Thinning(spacing, boundary=boundary)
     thinning.add(points)
     rows = thinning.take_rows()
     chosen = means_of(rows.rows, spacing)
     if keep == "nearest":
         found = nearest_in([np.ascontiguousarray(points, np.float64)], rows.rows, spacing)
         chosen = nearest_points(len(rows.rows), [found])
-    return np.concatenate([chosen, points_at_rim(rows, spacing)]) if rim else chosen
+    return np.concatenate([chosen, points_at_boundary(rows, spacing)]) if boundary else chosen
 
 
 def check_spacing(spacing: float) -> float:
@@ -164,7 +164,7 @@ def means_of(rows: np.ndarray, spacing: float) -> np.ndarray:
     return means
 
 
-def points_at_rim(rows: Rows, spacing: float) -> np.ndarray:
+def points_at_boundary(rows: Rows, spacing: float) -> np.ndarray:
     """Return the points that stand for the rim of the scan, each once, (R, 3) [scan unit].
 
     The mean of a box at the rim lies up to half a box inside; its outermost points do not.
@@ -173,7 +173,9 @@ def points_at_rim(rows: Rows, spacing: float) -> np.ndarray:
     counters = np.array([len(rows.rows), 0, 0])
     table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counters)
     means = means_of(rows.rows, spacing)
-    in_parts(len(kept), PART, lambda _, begin, end: rim_points(table, means, spacing, kept, begin, end))
+    in_parts(
+        len(kept), BOXES_PER_THREAD, lambda _, begin, end: boundary_points(table, means, spacing, kept, begin, end)
+    )
     several = rows.rows[:, 3] > 1  # a single point is its own mean
     return np.unique(rows.extremes.reshape(-1, 6, 3)[kept.astype(bool) & several[:, None]], axis=0)
 
@@ -220,11 +222,11 @@ def nearest_points(count: int, parts: Iterable[Nearest]) -> np.ndarray:
     return np.ascontiguousarray(best[:, 1:])
 
 
-def _new_table(capacity: int, rim: bool) -> BoxTable:
+def _new_table(capacity: int, boundary: bool) -> BoxTable:
     return BoxTable(
         np.full(_slots_for(capacity), -1, np.int64),
         np.empty((capacity, 7), np.int64),
-        np.empty((capacity if rim else 0, 18)),
+        np.empty((capacity if boundary else 0, 18)),
         np.zeros(3, np.int64),
     )
 

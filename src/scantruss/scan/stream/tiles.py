@@ -25,14 +25,14 @@ from ..formats.pcd import read_pcd_header
 from ..formats.ply import row_type
 from ..formats.ply_header import PLY, read_header
 from ..formats.reading import PACKED, READERS
-from ..formats.rising import has_unnamed_first, is_number_of_point, said_of_first
+from ..formats.rising import first_column_note, has_unnamed_first, is_number_of_point
 from ..formats.systems import system_of
 from ..units import metres_of
 
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
-SAMPLE = 1 << 14  # bytes looked at, at the start, in the middle and at the end
+BYTES_LOOKED_AT = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
@@ -244,7 +244,7 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     notes: tuple[str, ...] = ()
     if has_unnamed_first(layout):
         first = _first_column(path, layout, start, size)
-        notes = said_of_first(path.name, layout, *first)
+        notes = first_column_note(path.name, layout, *first)
         if len(columns) == 4 and not is_number_of_point(np.concatenate(first)):
             columns = columns[:3]
     return Source(
@@ -266,13 +266,13 @@ def _first_column(path: Path, layout: Layout, start: int, size: int) -> list[np.
     from .chunks import text_rows
 
     parts, end = [], start
-    for place in (start, size // 2, size - SAMPLE):
+    for place in (start, size // 2, size - BYTES_LOOKED_AT):
         with path.open("rb") as file:
             file.seek(max(place, end))
             if place > end:
                 file.readline()
             begin = file.tell()
-            lines = file.read(SAMPLE) + file.readline()
+            lines = file.read(BYTES_LOOKED_AT) + file.readline()
             end = file.tell()
         if lines.strip():
             parts.append(text_rows(path, lines, layout, layout.columns, begin).rows[:, 0])
