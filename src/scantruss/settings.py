@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ class Settings:
         unit="scan unit",
         source="Eq. 10",
     )
-    length_field: str | tuple[tuple[float, float, float, float], ...] = _setting(
+    length_field: str | Sequence[Sequence[float]] = _setting(
         "",
         "desired lengths that differ over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
         unit="scan unit",
@@ -102,10 +103,10 @@ class Settings:
     advance_from: str = _setting(
         "external", "which boundaries the front starts from", source="Sec. 3.6", choices=ADVANCE_FROM
     )
-    fixed: tuple[tuple[float, float, float], ...] = _setting(
+    fixed: Sequence[Sequence[float]] = _setting(
         (), "positions that must become nodes, in the scan's own frame", unit="scan unit", source="Sec. 4.2"
     )
-    fixed_lines: tuple[tuple[tuple[float, float, float], ...], ...] = _setting(
+    fixed_lines: Sequence[Sequence[Sequence[float]]] = _setting(
         (),
         "polylines that become chains of members, in the scan's own frame; closed where the last point is the first",
         unit="scan unit",
@@ -229,6 +230,11 @@ class Settings:
                 raise InputError(f"a fixed node needs three finite coordinates, got {position}")
         object.__setattr__(self, "fixed", fixed)
 
+    def __repr__(self) -> str:
+        """Name the settings that are not the default."""
+        own = [spec.name for spec in fields(self) if getattr(self, spec.name) != spec.default]
+        return f"Settings({', '.join(f'{name}={getattr(self, name)!r}' for name in own)})"
+
     @property
     def selection(self) -> Selection:
         """Which points of the scan are taken."""
@@ -324,7 +330,7 @@ def _check_curvature(text: str) -> str:
     return f"{CURVATURE}{low!r}:{high!r}"
 
 
-def shortest_and_longest(field: str | tuple[tuple[float, float, float, float], ...]) -> tuple[float, float]:
+def shortest_and_longest(field: str | Sequence[Sequence[float]]) -> tuple[float, float]:
     """Return the bounds of a length field as it is given [scan unit]."""
     if isinstance(field, str):
         low, high = (float(part) for part in field.removeprefix(CURVATURE).split(":"))

@@ -41,6 +41,14 @@ class Grid:
     certificate: Certificate | None = None  #: what was checked against the scan
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
 
+    def __repr__(self) -> str:
+        """Say what it is made of, not every number."""
+        unit = f" {self.unit}" if self.unit else ""
+        length = f" of {self.lengths.mean():.4g}{unit}" if len(self.edges) else ""
+        return (
+            f"Grid({len(self.nodes):,} nodes, {len(self.edges):,} members{length}, {len(self.triangles):,} triangles)"
+        )
+
     def replace(self, **changes: Any) -> Grid:
         """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of.
 
