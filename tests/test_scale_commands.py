@@ -93,7 +93,7 @@ import numpy as np
 from scantruss.scan.stream.thin_scan import thin_scan
 peaks = []
 for name in sys.argv[1:]:
-    found = thin_scan([name], 1.0, rim=True)
+    found = thin_scan([name], 1.0, boundary=True)
     peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 print(found.read, *peaks)
 """
@@ -306,7 +306,7 @@ def test_several_workers_are_announced(capsys, monkeypatch):
 
     monkeypatch.setattr(crew, "has_dask", lambda: False)
     with Bars() as bars:
-        thin._workers(Namespace(workers=3, scheduler=""), bars, None)
+        thin.workers_of(Namespace(workers=3, scheduler=""), bars, None)
     assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out
 
 

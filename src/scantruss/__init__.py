@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .grid.certificate import Certificate as Certificate
     from .grid.grid import Grid as Grid
     from .grid.quality import GridQuality as GridQuality
-    from .grid.quality import Topology as Topology
+    from .grid.topology import Topology as Topology
     from .improve.optimize import optimize_grid as optimize_grid
     from .pipeline import grid_from_points as grid_from_points
     from .pipeline import grid_from_scan as grid_from_scan
@@ -58,7 +58,7 @@ _HOMES = {
     "find_constraints": "constraints.find",
     "orientation_fields": "front.orientation_field",
     "advance_front": "front.advance", "advance_fronts": "candidates", "optimize_fronts": "candidates",
-    "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.quality",
+    "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.topology",
     "optimize_grid": "improve.optimize",
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
