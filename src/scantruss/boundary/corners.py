@@ -8,27 +8,27 @@ import numpy as np
 
 from ..settings import Settings
 
-CURVE_STEP = 0.05  # distance of the points of a boundary curve, in member lengths
-ROUNDED_OFF = (
-    0.15  # what lies nearer to a corner is rounded off by the scan and does not tell its place, in member lengths
-)
-CUT = 0.4  # the same where the disc has cut off a sharp re-entrant corner
-CORNER_REACH = 2.0  # part of the curve at each side that tells the place of a corner, in member lengths
-SHORTEST = 0.6  # the same where another corner is near
-SIGHT = (0.1, 0.8)  # part of the curve at each side that shows where a corner may be, in member lengths
-CORNER_SPACING = 0.5  # corners nearer to each other are one, in member lengths
-STRAIGHT = 6.0  # a side is bent if that leaves so many times less error than a line
-BENT = 1.3  # a corner turns at most so many times more between the sides as they seem than between quadratics
-SHARPER = 1.7  # a corner turns so many times more than half the places of its loop,
-WOBBLY = 1.8  # and so many times more than three quarters of them,
-SHARP = 70.0  # or by this angle [degree]
+CURVE_STEP = 0.05  # distance between the points of a boundary curve [member lengths]
+# the scan rounds off what is nearer to a corner than this; it says nothing about where the corner is [member lengths]
+ROUNDED_OFF = 0.15
+CUT = 0.4  # the same distance where the disc has cut off a sharp re-entrant corner [member lengths]
+CORNER_REACH = 2.0  # length of the curve on each side from which the place of a corner is found [member lengths]
+SHORTEST = 0.6  # shortest such length, where another corner is near [member lengths]
+# start and end of the part of the curve on each side that shows where a corner may be [member lengths]
+SIGHT = (0.1, 0.8)
+CORNER_SPACING = 0.5  # corners closer together than this are one [member lengths]
+STRAIGHT = 6.0  # a side counts as curved if a curve leaves this many times less error than a line
+BENT = 1.3  # largest ratio between the turn of a corner as seen and the turn between quadratics fitted to its sides
+SHARPER = 1.7  # a corner turns at least this many times more than the median of its loop
+WOBBLY = 1.8  # a corner turns at least this many times more than the upper quartile of its loop
+SHARP = 70.0  # a turn this large is a corner in any case [degree]
 
 
 def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return where a closed curve has corners and their exact places.
 
     A corner may be where lines fitted to the curve before and after a place differ most in direction. It is one if quadratics do so
-    too: they tell a corner from a bend, lines are not misled by a ragged rim. On a loop that turns everywhere, as a ragged one
+    too: they tell a corner from a bend, lines are not misled by a ragged boundary. On a loop that turns everywhere, as a ragged one
     does, a corner must turn more than the rest. Its place is where the two sides meet.
 
     Parameters

@@ -12,7 +12,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
 
-AHEAD = 4  # steps to both sides that tell the direction of a curve
+AHEAD = 4  # points on each side from which the direction of a curve is found
 
 
 def length_around(turns: np.ndarray) -> float:

@@ -26,11 +26,13 @@ from .rolling_disc import boundary_loops
 
 Progress = Callable[[str, float], None]
 
-SPIKES = (0.6, 0.3, 0.16)  # tongues and bays narrower than this are cut off, in member lengths, short ones by the last
-OPEN = 0.6  # share of a loop beside which there must be room for a disc
-NEARLY_CLOSED = 10.0  # a piece so many times larger than a disc in its outer rim has a hole there, no rim
-BACK = 16  # steps within which a boundary point that is touched again was never left
-PLACES_PER_THREAD = 500  # fewest places of a loop for a thread of their own
+# tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
+SPIKES = (0.6, 0.3, 0.16)
+OPEN = 0.6  # share of a loop that must have room for a disc outside
+# a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
+NEARLY_CLOSED = 10.0
+BACK = 16  # a boundary point touched again within this many steps was never left
+PLACES_PER_THREAD = 500  # fewest places of a loop worth a thread of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +169,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
 
 
 def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
-    """Whether a loop bounds a hole: any but the outer rim of a piece, and that too where the piece is nearly closed."""
+    """Whether a loop bounds a hole: any but the outer boundary of a piece, and that too where the piece is nearly closed."""
     share = float((samples.piece == loop.piece).mean())
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
@@ -204,13 +206,13 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
 def boundary_points(
     samples: SurfaceSamples, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
 ) -> list[np.ndarray]:
-    """Return the boundary points (M, 3) along each loop of sites: what a disc slid from outside touches, in order.
+    """Return the boundary points (M, 3) along each loop of samples: what a disc slid from outside touches, in order.
 
     Where the surface has only some of the points, the disc slides once more, against all points beside what it touched at first.
     """
     along = [_places_along(surface, loop, step) for loop in loops]
     if samples.smooth:
-        # a loop of larger sites cuts re-entrant corners; on a rough scan its own sites are the ones to trust
+        # a loop of larger samples cuts re-entrant corners; on a rough scan its own samples are the ones to trust
         for places, near in along:
             kernels.come_nearer(surface, places, near)
     touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
@@ -225,7 +227,7 @@ def boundary_points(
 
 
 def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (M, 3) so far apart along a loop of sites, and the site near each (M,)."""
+    """Return places (M, 3) so far apart along a loop of samples, and the sample near each (M,)."""
     turns = smooth_turns(surface.mean[loop])
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
     places = resample(turns, step)

@@ -8,14 +8,15 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.samples import SurfaceSamples
 
-FILLING_SPACING = 0.1  # made-up points lie so far apart, in member lengths
-PLACES_AROUND_HOLE = 60  # places along a rim from which the surroundings are looked at
-LOOK_STEP = 0.3  # of these looks, away from the hole, in member lengths
-SIGHT = (1.5, 0.25)  # how far they go, in member lengths and in diameters of the hole; the larger counts
-LOST = 0.6  # member lengths from the nearest site at which a look has left the scan
-STEEP = 0.35  # cosine between the surroundings and the loop's own plane under which that plane does not show the hole
-FEWEST_PLACES_FOR_PLATE = 12  # places around a hole from which on a plate can be laid through them
-SMOOTHING = 1e-6  # of the plate against the places it is fitted to, in squared diameters
+FILLING_SPACING = 0.1  # distance between the points made up over a hole [member lengths]
+PLACES_AROUND_HOLE = 60  # places along the boundary of a hole from which its surroundings are looked at
+LOOK_STEP = 0.3  # step of a look away from the hole [member lengths]
+SIGHT = (1.5, 0.25)  # how far a look goes, in member lengths and in diameters of the hole; the larger counts
+LOST = 0.6  # distance from the nearest sample at which a look has left the scan [member lengths]
+# cosine of the angle between the surroundings and the plane of the hole below which that plane is not used
+STEEP = 0.35
+FEWEST_PLACES_FOR_PLATE = 12  # fewest places around a hole through which a plate is fitted
+SMOOTHING = 1e-6  # smoothing of the plate [squared diameters of the hole]
 
 
 def fill_holes(samples: SurfaceSamples, curves: list[np.ndarray]) -> np.ndarray:
@@ -48,7 +49,7 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
         frame = _frame(axis)
         flat, hole_boundary = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
         fine = min(1.0, 1.5 * least)
-    else:  # the hole reaches around a bend: its rim is drawn as a circle, what surrounds it as rings
+    else:  # the hole reaches around a bend: its boundary is drawn as a circle, what surrounds it as rings
         radius, turn = around / (2 * np.pi), -2 * np.pi * np.arange(len(curve)) / len(curve)
         hole_boundary = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
         flat = hole_boundary[start] * (1 + away / radius)[:, None]
@@ -60,7 +61,7 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
 def _look_around(
     surface: Surface, curve: np.ndarray, sight: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Go out over the scan from places along a rim, at right angles to it, and note what is there.
+    """Go out over the scan from places along a boundary, at right angles to it, and note what is there.
 
     Returns
     -------

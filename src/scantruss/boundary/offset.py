@@ -1,4 +1,4 @@
-"""The edge of the surface: a smooth curve with corners, a little beyond the boundary points, which lie by chance (Sec. 3.3)."""
+"""The edge of the surface: a smooth curve with corners, a little beyond the boundary points, which lie at random (Sec. 3.3)."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, room_across, runs_around, smooth_between
 
-WINDOW = 0.5  # half width of the smoothing of the curve, in member lengths
-WIDER = (1.0, 2.0, 3.0)  # the same where that moves the curve no farther than chance did,
-CURVE_PARTS = 6  # but not wider than a circle with the length of the curve,
-MOVED = 2.0  # inwards about so far at most, in `SamplingBias.beyond`,
-BAY = 4.0  # and outwards over bays in which there would be so many points, by half over those with a half more
-ACROSS = 0.6  # where another part of the curve is nearer, in member lengths,
-SIDE = 0.25  # it moves outwards at most by this share of the distance
-EMPTY = 6.0  # a corner in a bay in which there would be no more points is none;
-BAY_REACH = 1.5  # the bay is that under a line from so far before to so far behind, in member lengths
-FLAT = 0.7  # cosine between the way into a bay and the surface
-BEYOND = 0.44  # how far the surface goes on beyond points that lie on it by chance, as `sampling_bias_of` says
-EXACT = 0.1  # in that distance, how far boundary points that were put on the edge lie over their neighbours at most,
-RANDOM_POINTS = 0.4  # and those that lie by chance at least
-OUT = 0.6  # share of that distance by which the curve moves out: more would put nodes off the surface
-CORNERS_SHOW_TO = (
-    0.07  # up to this distance corners show as `corners` says, in member lengths; farther away in proportion,
-)
-COARSEST = 2.0  # at most so many times
+WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
+# half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
+WIDER = (1.0, 2.0, 3.0)
+CURVE_PARTS = 6  # a window is never wider than the curve over this number
+MOVED = 2.0  # a wider window may move the curve inwards by this many times the sampling bias
+# a wider window may close a bay in which this many points would be expected; up to 1.5 times as many by half as much
+BAY = 4.0
+ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
+SIDE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
+EMPTY = 6.0  # a corner in a bay in which no more points than this would be expected is none
+BAY_REACH = 1.5  # a bay is measured under a chord that starts and ends this far from its middle [member lengths]
+FLAT = 0.7  # least cosine between the way into a bay and the surface
+BEYOND = 0.44  # mean distance of the surface edge beyond the outermost random points, in the unit of `sampling_bias_of`
+EXACT = 0.1  # roughness of a boundary below which its points lie exactly on the edge [sampling biases]
+RANDOM_POINTS = 0.4  # roughness of a boundary above which its points lie at random [sampling biases]
+OUT = 0.6  # share of the sampling bias by which the curve is moved outwards; more would put nodes off the surface
+# sampling bias up to which corners are found at full resolution; beyond it they are looked for more coarsely [member lengths]
+CORNERS_SHOW_TO = 0.07
+COARSEST = 2.0  # corners are looked for at most this many times more coarsely
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ NO_BIAS = SamplingBias(0.0, np.inf)
 def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:
     """Return how far the surface goes on beyond its boundary points (M, 3), those that a disc slid from outside touches.
 
-    Where points lie by chance, rho to an area, it is `BEYOND` rho^(-2/3) r^(-1/3) in the mean: the disc comes in until there is about
+    Where points lie at random, rho to an area, it is `BEYOND` rho^(-2/3) r^(-1/3) in the mean: the disc comes in until there is about
     one point in the segment that it has entered, and that has an area of (4/3) (2 r)^(1/2) h^(3/2). Points that were put on the edge,
     as those of a mesh are, lie on one curve, hardly over the lines through their neighbours: then it is 0.
     """
@@ -88,7 +89,7 @@ def offset_curve(
 def _corners(
     curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a curve along points that lie by chance has corners, and their places; those in bays that chance explains are none."""
+    """Return where a curve along points that lie at random has corners, and their places; those in bays that chance explains are none."""
     coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST)
     at, places = find_corners(curve, settings, coarser)
     if len(at) == 0:
@@ -118,8 +119,8 @@ def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
 def explained(step: np.ndarray, out: np.ndarray, room: np.ndarray, density: float, inwards: float) -> np.ndarray:
     """Return the share (M,), 0 to 1, of each step (M, 3) of the places of a closed curve that chance explains.
 
-    Steps inwards cut off tongues, in which points were found: by chance they are no longer than `inwards`. Steps outwards
-    fill bays without points: they are there by chance where few points would lie in them.
+    Steps inwards cut off tongues, in which points were found: at random they are no longer than `inwards`. Steps outwards
+    fill bays without points: they are there at random where few points would lie in them.
 
     Parameters
     ----------

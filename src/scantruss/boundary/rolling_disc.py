@@ -1,4 +1,4 @@
-"""A disc rolled along the edge of the scan: the loops of sites that it touches (Sec. 3.3)."""
+"""A disc rolled along the edge of the scan: the loops of samples that it touches (Sec. 3.3)."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
-TRIES = 20  # of rolling the disc from one place
-TRAP = 30.0  # a loop shorter than this many radii that does not come back to its start is none
+TRIES = 20  # attempts to roll the disc away from one place
+TRAP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 
 
 def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: float) -> list[tuple[np.ndarray, int]]:
-    """Return the sites of each loop (H,) in order, as the rolled disc touches them, and the piece that they bound.
+    """Return the samples of each loop (H,) in order, as the rolled disc touches them, and the piece that they bound.
 
     Loops shorter than `least` are left out.
     """
@@ -46,7 +46,7 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
 
 
 class _RollingDisc:
-    """The disc rolled from one site after the other, and what it has touched."""
+    """The disc rolled from one sample after the other, and what it has touched."""
 
     def __init__(self, surface: Surface, radii: np.ndarray, room: int) -> None:
         count = len(surface.mean)
@@ -57,10 +57,10 @@ class _RollingDisc:
         self.banned = np.zeros(count, np.bool_)
 
     def loop_at(self, sample: int, direction: float, radius: float) -> np.ndarray:
-        """Sites of the loop that comes back to its start, empty where there is none.
+        """Samples of the loop that comes back to its start, empty where there is none.
 
         A disc that crosses from sheet to sheet may be caught in another loop. Rolled the other way round it seldom crosses at the
-        same place, so that way is tried next; then the sites that have caught it are left out.
+        same place, so that way is tried next; then the samples that have caught it are left out.
         """
         centre = kernels.sample_disc(self.surface, sample, direction, self.radii[sample])
         means = self.surface.mean
@@ -80,18 +80,18 @@ class _RollingDisc:
         return np.zeros(0, np.int64)
 
     def _roll(self, surface: Surface, sample: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
-        """Sites of the loop that the disc comes into, empty where it falls off or comes to an earlier loop."""
+        """Samples of the loop that the disc comes into, empty where it falls off or comes to an earlier loop."""
         first, last = kernels.roll_disc(surface, sample, centre, self.radii, self.path, seen, self.visit, self.banned)
         return self.path[first:last].copy()
 
     def _is_near(self, samples: np.ndarray, sample: int, radius: float) -> bool:
-        """Whether any of the sites lies within two radii of a site."""
+        """Whether any of the samples lies within two radii of a sample."""
         away = self.surface.mean[samples] - self.surface.mean[sample]
         return len(samples) > 0 and float(np.linalg.norm(away, axis=1).min()) < 2.0 * radius
 
 
 def disc_radii(surface: Surface, radius: float) -> np.ndarray:
-    """Radius of the disc at each site (S,): larger where the scan is sparse, so that it does not fall between the points."""
+    """Radius of the disc at each sample (S,): larger where the scan is sparse, so that it does not fall between the points."""
     sixth = surface.neighbors[:, 5]
     arm = surface.mean[sixth] - surface.mean
     gap = np.sqrt(dots(arm, arm))

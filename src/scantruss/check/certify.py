@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-COVER_REACH = (
-    0.5  #: members from the nearest triangle, or part of the scan, up to which one lies within reach of the other
-)
+COVER_REACH = 0.5  # distance within which a part of the scan and a triangle are in reach of each other [member lengths]
 
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -115,7 +113,7 @@ def _from_scan(grid: Grid, length: float, places: np.ndarray, boxes: SearchBoxes
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
     off_surface, off = away[: len(middles)], away[len(middles) :]
-    if grid.deviation is not None:  # where a patch ends at a rim it may say more than there is
+    if grid.deviation is not None:  # where a patch ends at a boundary it may say more than there is
         off = np.where(np.isnan(grid.deviation), np.nan, np.fmin(off, grid.deviation))  # not over closed holes
     return {
         "grid_within_reach": float((off_surface <= COVER_REACH * members).mean()),
@@ -162,7 +160,7 @@ def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, weight: float | n
 
 
 def fold_angles(grid: Grid) -> np.ndarray:
-    """Return the angle between the first two triangles at each member, (E,) [degree]: 180 level, 0 folded flat; NaN at the rim."""
+    """Return the angle between the first two triangles at each member, (E,) [degree]: 180 level, 0 folded flat; NaN at the boundary."""
     angles = np.empty(len(grid.edges))
     folds_of(grid.nodes, grid.triangles, grid.edge_triangles, angles)
     return angles

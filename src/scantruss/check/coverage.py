@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-FIRST_REACH = 0.1  #: the first reach of a search, in lengths; most of a scan lies nearer to its grid
+FIRST_REACH = 0.1  # reach of the first search; most of a scan is closer to its grid [member lengths]
 
 
 def places_to_reach(samples: SurfaceSamples, length: float) -> tuple[np.ndarray, SearchBoxes]:

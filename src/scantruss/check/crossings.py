@@ -15,8 +15,8 @@ import numpy as np
 from ..kernels.geometry.boxes import new_boxes
 from ..kernels.mesh.crossings import doubtful_pairs
 
-MOST_CROSSINGS = 100  #: pairs that cut each other after which no more are looked for
-ROOM = 1024  #: pairs that the first search has room for
+MOST_CROSSINGS = 100  # number of intersecting pairs after which the search stops
+ROOM = 1024  # pairs for which the first search has room
 
 Exact = tuple[Fraction, Fraction, Fraction]
 

@@ -1,4 +1,4 @@
-"""Irregular nodes: how many a grid has, and how many its Euler number and its rim force.
+"""Irregular nodes: how many a grid has, and how many its Euler number and its boundary force.
 
 A node is regular where as many members meet as have room at 60 degrees: six inside; k + 1 on the boundary, where k is the
 angle of its triangles over 60 degrees, rounded, at least one. Each member too few is a charge of +1, each too many of -1. For any
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def count_irregular(grid: Grid) -> tuple[int, int]:
-    """Return the members too few or too many at all nodes, and how many of them the topology and the rim force."""
+    """Return the members too few or too many at all nodes, and how many of them the topology and the boundary force."""
     count = len(grid.nodes)
     edges, uses = grid.edges, grid.edge_uses
     members = np.bincount(edges.ravel(), minlength=count)

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-COVER = 1.2  #: members from the nearest node on its sheet at which a part of the scan counts as left out
-DISCONNECTED = 4  #: members from node to node at which their parts of the scan, side by side, count as torn apart
-FEWEST_LINKS = 3  #: so many links between such parts are no chance
+COVER = 1.2  # distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
+DISCONNECTED = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
+FEWEST_LINKS = 3  # fewest links between such parts that are no accident
 
 
 def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.ndarray:
-    """Return the node nearest to each site on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
+    """Return the node nearest to each sample on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
     surface = with_own_scratch(samples.surface)  # grids are certified side by side
     nearest = np.empty(len(samples.piece), np.int64)
     nearest_nodes(surface, samples.boxes, grid.nodes, COVER * length, nearest)
@@ -46,13 +46,13 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -
 def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> np.ndarray | None:
     """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
 
-    Each node has a part of the scan, the sites nearest to it. Where two parts meet, their nodes must be near each other in the grid:
+    Each node has a part of the scan, the samples nearest to it. Where two parts meet, their nodes must be near each other in the grid:
     joined by fewer than `DISCONNECTED` members one after the other.
 
     Parameters
     ----------
     nearest : (S,) int64
-        Node of each site, as `nodes_of_samples`.
+        Node of each sample, as `nodes_of_samples`.
     """
     pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])

@@ -1,7 +1,7 @@
 """The initial front where there are lines: each is a slit, whose members are front segments in both directions.
 
 At every node the segments are linked in the order in which they stand around it. So a line inside is one loop, along it and back;
-one from rim to rim divides the loop of the rim; a ring has a loop at each side. The front advances from all of them.
+one from boundary to boundary divides the loop of the boundary; a ring has a loop at each side. The front advances from all of them.
 """
 
 from __future__ import annotations

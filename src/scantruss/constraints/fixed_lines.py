@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from .network import Network
 
-LINE_STEP = 0.05  # distance of the points of a line, in member lengths
-ZIGZAG = 0.005  # what a polyline zigzags by less is straightened before all else, in lengths
-COARSE = 0.03  # ... and before its corners are looked for
-FIT = 120.0  # points of the scan that a patch below a line is fitted to
-RETURN = 1.5  # a line that comes near to itself after so much of it meets itself, in lengths
-SHORTEST = 0.5  # of an open line, in lengths
-SHORTEST_RING = 2.0
+LINE_STEP = 0.05  # distance between the points of a line [member lengths]
+ZIGZAG = 0.005  # zigzags of a polyline below this are straightened first [member lengths]
+COARSE = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
+FIT = 120.0  # points of the scan that a patch under a line is fitted to
+RETURN = 1.5  # a line that comes back to itself after this length meets itself [member lengths]
+SHORTEST = 0.5  # shortest open line [member lengths]
+SHORTEST_RING = 2.0  # shortest closed line [member lengths]
 
 
 def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings) -> None:

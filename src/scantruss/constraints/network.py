@@ -1,4 +1,4 @@
-"""The network of lines: where they meet the rim and each other, and the stretches between."""
+"""The network of lines: where they meet the boundary and each other, and the stretches between."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from ..kernels.boundary.curves import Curves, at_arc, nearest_on_curves
 
-MEETING_DISTANCE = 0.3  # a line that comes as near as this to the rim or another line meets it, in lengths
-AT_END = 0.5  # the same at its ends; and ends that stand out farther over a meeting are more than stubs, in lengths
-ALONGSIDE = 1.2  # where it stays near for longer it runs along: that part is left out, in lengths
-ONE_STOP = 0.5  # corners and meetings nearer to each other are one, in lengths
-FADE = 0.6  # how far from a meeting a line is bent to it, in lengths
+MEETING_DISTANCE = 0.3  # a line this close to the boundary or another line meets it [member lengths]
+# the same distance for the end of a line; an end that stands out farther is more than a stub [member lengths]
+AT_END = 0.5
+# a line that stays close for longer than this runs alongside, and that part is left out [member lengths]
+ALONGSIDE = 1.2
+ONE_STOP = 0.5  # corners and meetings closer together than this are one [member lengths]
+FADE = 0.6  # length over which a line is bent towards a meeting [member lengths]
 
 
 @dataclass(frozen=True, eq=False)

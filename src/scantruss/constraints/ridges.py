@@ -17,32 +17,32 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .network import Network
 
-RADIUS = 0.8  # points around a place that a folded surface is fitted to, in lengths
-STRIDE = 0.25  # from place to place along a ridge, in lengths
-BEND = 0.4  # normals of neighbouring sites differ by this share of the angle where there may be a ridge
-LIKELY = 0.5  # of the angle asked for is looked at more closely
-SHARPEST = 125.0  # what bends by more is not folded but turns back: two sheets [degree]
-FADED = 0.2  # a ridge ends where its angle has fallen to this share of that asked for
-GAIN = 10.0  # a fold must fit so much better than a smooth surface (F statistic)
-ROUGHEST = 0.12  # points farther from the fold than this follow neither side, in lengths
-LOOK_SPACING = 0.33  # places nearer to each other are not looked at twice, in lengths
-LONG = 3.0  # a ridge is at least so long,
-FULL = 1.5  # and so long with its full angle, in lengths
-BRIDGE = 4.0  # ends of ridges that face each other are joined over a gap of so many lengths,
-STRAIGHT = 0.94  # if both are headed for the other (cosine)
-TOUCH = 0.6  # or, so near to each other, only headed so
-CORNER = 2.0  # ends of ridges whose continuations meet within so many lengths are led there,
-CLEAR = 3  # from so many places before, which are clear of the third side
-EVEN = 2.4  # direction and half the angle of an even ridge change by less from place to place [degree]
-UNSURE = (1.0, 0.45)  # ... or by so many times what the noise explains, angle and direction,
-WIGGLE = 3.5  # if the direction changes by less than this [degree]
-MOST_SAMPLES = 4000  # sites that are looked at, the sharpest first
-PATIENCE = 40  # places that look folded and are no ridge before no more are looked at: a rough scan
-ROUGH = 0.02  # where the points lie farther from their planes all of them count, in lengths
-MISSED = 2  # places in a row at which a ridge is not seen, and still goes on
-TURNED = 0.94  # cosine of the angle by which a ridge turns at most from place to place
+RADIUS = 0.8  # radius around a place within which a fold is fitted [member lengths]
+STRIDE = 0.25  # step from place to place along a ridge [member lengths]
+BEND = 0.4  # share of the ridge angle by which neighbouring normals must differ where a ridge is looked for
+LIKELY = 0.5  # share of the ridge angle above which a fold is looked at more closely
+SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+FADED = 0.2  # a ridge ends where its angle has fallen to this share of the ridge angle
+GAIN = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
+ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
+LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
+LONG = 3.0  # least length of a ridge [member lengths]
+FULL = 1.5  # least length of a ridge with the full angle [member lengths]
+BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
+STRAIGHT = 0.94  # least cosine of the angle between such an end and the way to the other
+TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
+CORNER = 2.0  # ends of ridges whose continuations meet within this distance are led to the meeting [member lengths]
+CLEAR = 3  # places at the end of a ridge that are left out for that, because the third side disturbs them
+EVEN = 2.4  # largest change of direction and half angle from place to place along an even ridge [degree]
+UNSURE = (1.0, 0.45)  # the same change of angle and direction, in units of what the noise explains
+WIGGLE = 3.5  # largest change of direction that noise may explain [degree]
+MOST_SAMPLES = 4000  # most samples from which ridges are looked for, the sharpest first
+PATIENCE = 40  # places that look folded and are no ridge, after which the search stops: the scan is rough
+ROUGH = 0.02  # thickness of the samples above which all points are used [member lengths]
+MISSED = 2  # places in a row at which a ridge may not be seen and still goes on
+TURNED = 0.94  # least cosine of the turn of a ridge from place to place
 FARTHEST = 20_000  # most places along a ridge
-OFF_SCAN = 0.3  # a place farther from the scan than this has left it, in lengths
+OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 
 
 class Tracer:
@@ -68,7 +68,7 @@ class Tracer:
         return found
 
     def seeds(self) -> np.ndarray:
-        """Sites (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
+        """Samples (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
         bends = np.empty(len(self.surface.mean))
         bends_of_samples(self.surface, bends)
         likely = np.flatnonzero(bends < np.cos(BEND * self.angle))

@@ -35,12 +35,12 @@ from .orientation_field import nodes_at
 
 Progress = Callable[[str, float], None]
 
-STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # rounds of the front: what found no room waits for the next, more tolerant round
-GAP = 60  # gaps with more segments stay open
-CLEAR = 0.6  # nearer to the front no node is offered at its start, in member lengths
-NEARER = 0.33  # the same for an appointed position
-BOX = 2.4  # size of the search boxes of the nodes, in member lengths: as far as a step of the front looks for others
-BUDGET = 500  # segments advanced between two calls of `progress`
+STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no room waits for the next, more tolerant one
+GAP = 60  # most segments of a gap that is filled; larger gaps stay open
+CLEAR = 0.6  # least distance of a candidate node from the initial front [member lengths]
+NEARER = 0.33  # the same distance for the position of a fixed node [member lengths]
+BOX = 2.4  # size of the search boxes of the nodes: as far as one step of the front looks [member lengths]
+BUDGET = 500  # segments advanced between two reports of progress
 
 
 def advance_front(
@@ -247,7 +247,7 @@ def add_seed(front: lists.Front, ids: list[int]) -> None:
 
 
 def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
-    """Return three nodes of the rows near a site that make a good triangle; none where the rows do not offer them."""
+    """Return three nodes of the rows near a sample that make a good triangle; none where the rows do not offer them."""
     count = int(front.count[lists.NODES])
     free = np.flatnonzero(front.out[:count] < 0)
     away = np.linalg.norm(front.nodes[free] - surface.mean[sample], axis=1)
@@ -264,7 +264,7 @@ def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length
 
 
 def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
-    """Add three nodes of a regular triangle around a site."""
+    """Add three nodes of a regular triangle around a sample."""
     patch = np.zeros(PATCH)
     centre = surface.mean[sample]
     fit_patch(surface, patch, sample, tuple(centre))

@@ -20,15 +20,16 @@ from ..scan.vectors import dots
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples
 
-LEVEL_SPACING = 0.55  # distance of the posts, in member lengths
-COARSER = 2.0  # how much farther apart the posts of the next level are
-FEWEST_SAMPLES_OF_A_LEVEL = 12  # posts of the coarsest level
-LINKS_OF_A_SAMPLE = 12  # links of a post
-PASSES = 3  # of smoothing, on each level,
-SAMPLES_FOR_THREADS = 5000  # whose posts are divided where there are so many
-WITHIN = 0.7  # nodes farther from their post are left out, in member lengths
-CLOSED = 1.02  # on a surface without boundary the search adds nodes where rows end and takes away none
-CANDIDATE_DISTANCE = 0.6  # nodes offered are at least so far apart, in member lengths
+LEVEL_SPACING = 0.55  # distance between the samples of the finest level [member lengths]
+COARSER = 2.0  # ratio of the distances from one level to the next
+FEWEST_SAMPLES_OF_A_LEVEL = 12  # fewest samples of the coarsest level
+LINKS_OF_A_SAMPLE = 12  # most links of a sample to its neighbours
+PASSES = 3  # passes of smoothing on each level
+SAMPLES_FOR_THREADS = 5000  # fewest samples of a level that two threads smooth at once
+WITHIN = 0.7  # candidate nodes farther from their sample than this are dropped [member lengths]
+# length of the rows on a closed surface, where the search adds nodes and never removes any [member lengths]
+CLOSED = 1.02
+CANDIDATE_DISTANCE = 0.6  # least distance between candidate nodes [member lengths]
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ SCALES = {  # lengths of the fronts instead, where the desired length differs fr
     "normal": (1.0, 0.97, 1.03),
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
 }
-SMALL = 600.0  # area up to which `normal` tries all its directions, in squares of the desired length: the boundary decides there
+# largest area for which `normal` tries all directions: there the boundary decides [member lengths squared]
+SMALL = 600.0
 
 
 class Field(NamedTuple):
@@ -64,8 +66,8 @@ class Hierarchy(NamedTuple):
     """The multiresolution hierarchy of a scan, from fine to coarse; see `make_levels`."""
 
     levels: list[Level]
-    owners: list[np.ndarray]  #: for each level the post of each place of the level below (sites at first)
-    independent_sets: list[tuple[np.ndarray, ...]]  #: posts of each level that are smoothed at once
+    owners: list[np.ndarray]  #: for each level the sample of each place of the level below (samples at first)
+    independent_sets: list[tuple[np.ndarray, ...]]  #: samples of each level that are smoothed at once
 
     def copy(self) -> Hierarchy:
         """Return it with directions and lattices of its own."""
@@ -137,7 +139,7 @@ def _smooth_directions(level: Level, _: float, some: np.ndarray) -> None:
 
 
 def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
-    """Nodes of the finest posts, each once: those nearest to their posts first."""
+    """Nodes of the finest samples, each once: those nearest to their samples first."""
     away = ((level.node - level.mean) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")
     order = order[away[order] < (WITHIN * length) ** 2]
@@ -150,7 +152,7 @@ def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
 
 
 def make_levels(surface: Surface, length: float) -> Hierarchy:
-    """Return the posts of a surface for members of a length [scan unit], level by level from fine to coarse."""
+    """Return the samples of a surface for members of a length [scan unit], level by level from fine to coarse."""
     mean, normals, neighbors = surface.mean, surface.normals, surface.neighbors
     levels: list[Level] = []
     owners: list[np.ndarray] = []
@@ -172,7 +174,7 @@ def make_levels(surface: Surface, length: float) -> Hierarchy:
 
 
 def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
-    """Posts that two threads may smooth at once, and those between, which depend on both; few posts are not divided."""
+    """Samples that two threads may smooth at once, and those between, which depend on both; few samples are not divided."""
     count = len(level.mean)
     if count < SAMPLES_FOR_THREADS:
         return (np.arange(count),)
@@ -190,7 +192,7 @@ def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
 def lattice_start(
     samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
 ) -> tuple[int, Vector, Vector]:
-    """Return the site, the direction and the node where the rows start: in the middle of the longest side of the boundary.
+    """Return the sample, the direction and the node where the rows start: in the middle of the longest side of the boundary.
 
     On a closed surface they start anywhere.
     """
@@ -229,7 +231,7 @@ def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
 
 
 def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> CandidateNodes:
-    """Return nodes at appointed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
+    """Return nodes at fixed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
     samples = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
     near = np.linalg.norm(surface.mean[samples] - positions, axis=1) < length
     return CandidateNodes(np.ascontiguousarray(positions[near]), surface.normals[samples[near]], samples[near], length)

@@ -57,7 +57,7 @@ class Certificate:
     sharpest_fold: Worst | None = None  #: smallest angle between two triangles at a member, 180 where level [degree]
     fixed_error: Worst | None = None  #: distance of a fixed position from its node
     irregular: int = 0  #: members too few or too many at the nodes, see `irregular`
-    irregular_forced: int = 0  #: ... that the Euler number and the angles of the rim force
+    irregular_forced: int = 0  #: ... that the Euler number and the angles of the boundary force
 
     @property
     def passed(self) -> bool:

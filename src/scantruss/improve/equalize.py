@@ -26,17 +26,19 @@ from .flips import flip_by_angle
 from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
-WEIGHT = 1.0  # of the members beside the triangles
-EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}  # the same in the last sweeps, when the topology rests
-LAST_SWEEPS = (12, 6)  # most of these, each time with new patches,
-LAST_STRIDE = 1.75  # and their steps: what is uneven in the large goes slowly (successive over-relaxation)
-PRICE = 24.0  # of a mean length that is not the desired one
-USUAL_ENERGY = 0.1  # most energy that a node may have anyway
-SEARCHES = 6  # rounds over all nodes that ask for a move
-MANY_NODES = 2500  # nodes from which on halves settle side by side (of fewer, threads would wait for each other as long as they gain),
-AT_ONCE = 2  # so many sweeps until those between follow
-ASKING = 200  # nodes asking for a move from which on halves of the grid are searched side by side
-FARTHEST_ON_THE_WAY = 0.5  # how far a node may leave the middle of its patch on the way, in lengths
+WEIGHT = 1.0  # weight of the member lengths against the shapes of the triangles
+# that weight in the last sweeps, when the topology is final, for each `prefer`
+EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
+LAST_SWEEPS = (12, 6)  # most sweeps of each of the last rounds; patches are fitted anew before each round
+LAST_STRIDE = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
+PRICE = 24.0  # energy per node of a mean length that is off the desired one, for the square of the relative error
+USUAL_ENERGY = 0.1  # largest energy per node that any node is assumed to have
+SEARCHES = 6  # most rounds of the local search
+MANY_NODES = 2500  # nodes above which two partitions settle at once; for fewer, waiting costs more than it gains
+AT_ONCE = 2  # sweeps of the partitions between two sweeps of the nodes between them
+ASKING = 200  # nodes to be searched above which two partitions are searched at once
+# how far a node may leave the middle of its patch before that is fitted anew [member lengths]
+FARTHEST_ON_THE_WAY = 0.5
 
 
 def new_scratch(mesh: WorkingMesh) -> Scratch:

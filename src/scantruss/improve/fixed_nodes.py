@@ -1,4 +1,4 @@
-"""Fixed nodes: nodes at appointed positions (Sec. 4.2)."""
+"""Fixed nodes: nodes at fixed positions (Sec. 4.2)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..surface.samples import local_field
 from .equalize import FARTHEST_ON_THE_WAY, WEIGHT, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 
-AT_BOUNDARY = 0.33  # a position this near to the boundary becomes a boundary node, in lengths
-SAME_PLACE = 1e-6  # a node this near already stands there, in lengths
-CHOICES = 3  # nodes, and edges, that are tried
+AT_BOUNDARY = 0.33  # a position this close to the boundary becomes a boundary node [member lengths]
+SAME_PLACE = 1e-6  # a node this close to a position is already there [member lengths]
+CHOICES = 3  # nearest nodes, and nearest edges, that are tried for a fixed node
 
 
 def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
@@ -52,7 +52,7 @@ def _node_at(mesh: WorkingMesh, place: np.ndarray) -> int:
 
 
 def _put_node(mesh: WorkingMesh, v: int, place: np.ndarray) -> None:
-    """Move a node to an appointed position, where it rests from now on."""
+    """Move a node to an fixed position, where it rests from now on."""
     net = mesh.net
     if net.kind[v] == ON_CURVE:
         net.curve[v], net.arc[v], _ = nearest_on_curves(mesh.curves, *place.tolist())
@@ -78,7 +78,7 @@ def _no_node(place: np.ndarray) -> InputError:
 
 
 def hold_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
-    """Let nodes that stand at appointed positions already rest there: the front has come to them."""
+    """Let nodes that stand at fixed positions already rest there: the front has come to them."""
     for place in positions:
         if (v := _node_at(mesh, place)) >= 0:
             _put_node(mesh, v, place)

@@ -9,8 +9,8 @@ from ..kernels.mesh import flips as kernels
 from ..kernels.mesh.grid import Net
 from .working_mesh import close_net, open_net
 
-FOLD = 0.0  # cosine: after a flip two triangles meet at 90 degrees or more, unless they were folded more before
-MOST_ROUNDS = 100  # rounds over all edges; a few are enough
+FOLD = 0.0  # least cosine between the normals of two triangles after a flip, unless they were folded more before
+MOST_ROUNDS = 100  # most rounds over all edges; a few are enough
 
 
 def flip_edges(grid: Grid) -> tuple[Grid, int]:

@@ -1,4 +1,4 @@
-"""Kicks of a whole grid: from where a search that only goes down does not get on."""
+"""Perturbations of a whole grid: from where a search that only goes down does not get on."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ PERTURBATIONS = {
     "quick": (0, 0.0),
     "normal": (6, 0.0),
     "best": (40, 0.2),
-}  # rounds of kicks, and what they may cost at first
-NODES_OF_LARGE_GRID = 700  # nodes from which on the rim decides little, and `normal` kicks once, in halves
+}  # rounds of perturbations, and what they may cost at first
+# nodes above which `normal` perturbs once and in partitions: there the boundary decides little
+NODES_OF_LARGE_GRID = 700
 HALVINGS, FEW_NODES = 2, 12  # times that it does so, as long as so many nodes wait
-HOT = 0.8  # part of the rounds in which they may cost anything
-DARING = 5.0  # of what they may cost, how much more than usual is left to hope while it is hot
+HOT = 0.8  # share of the rounds in which a perturbation may raise the energy
+DARING = 5.0  # how much more energy is allowed while searching, in allowances of the round
 
 
 def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
-    """Return room for what a kick may change, and a source of chance of its own for each number."""
+    """Return room for what a perturbation may change, and a source of chance of its own for each number."""
     capacity, width = mesh.net.ring.shape
     return Area(
         **{name: np.zeros(capacity, np.int64) for name in ("mark", "away", "out")},
@@ -45,7 +46,7 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
 
 
 def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], None] | None = None) -> None:
-    """Kick the grid at its irregular nodes: what a search from there finds is kept if it has paid.
+    """Perturb the grid at its irregular nodes: what a search from there finds is kept if it has paid.
 
     For `best` it may cost a little at first and less and less later on (simulated annealing).
     """
@@ -68,9 +69,9 @@ def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], No
 
 
 def perturb_in_parts(mesh: WorkingMesh) -> None:
-    """Kick a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
+    """Perturb a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
 
-    What lies between the halves is kicked in other halves, and what is left then by itself.
+    What lies between the halves is perturbed in other halves, and what is left then by itself.
     """
     net, waiting = mesh.net, np.ones(len(mesh.net.arc), np.bool_)
     rooms = [(new_scratch(mesh), new_area(mesh, number)) for number in range(3)]
@@ -101,6 +102,6 @@ def perturb(
     temperature: float,
     allowance: float,
 ) -> None:
-    """Kick a net of the grid once at each irregular node waiting (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
+    """Perturb a net of the grid once at each irregular node waiting (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
     of_grid = mesh.patches, mesh.curves, *room, waiting, mesh.length
     perturb_all(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, temperature, allowance)

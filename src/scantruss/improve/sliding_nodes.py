@@ -9,7 +9,7 @@ from ..grid.grid import Grid
 from ..kernels.boundary.curves import Curves, nearest_on_curves
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, Net
 
-SNAP = 0.4  # the end of a line is the node of a line nearest to it, within so many lengths
+SNAP = 0.4  # the end of a line is the nearest node of a line within this distance [member lengths]
 
 
 def joined(first: Curves, second: Curves) -> Curves:

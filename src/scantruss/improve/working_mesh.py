@@ -21,11 +21,12 @@ from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
 from .sliding_nodes import find_on_lines, inner_lines, joined
 
-NEAR_IN_THE_END = 0.25  # how far a node may be from the middle of its patch in the end, in lengths
-NODES_PER_THREAD = 300  # fewest nodes for a thread of their own
-PROJECTION_PARTS = 3  # parts of the nodes that a thread lands: those of the rim take less time
-WIDTH = 12  # neighbours a node may have while the grid is improved, unless it had more
-MOST_NEIGHBORS = 60  # neighbours a node may have where there are lines, whose members are bits of a number
+NEAR_IN_THE_END = 0.25  # how far a node may be from the middle of its patch in the end [member lengths]
+NODES_PER_THREAD = 300  # fewest nodes worth a thread of their own
+# parts into which the nodes of a thread are divided for projection; nodes at the boundary take less time
+PROJECTION_PARTS = 3
+WIDTH = 12  # most neighbours of a node while the grid is improved, unless it had more
+MOST_NEIGHBORS = 60  # most neighbours of a node where there are lines: their members are bits of a number
 
 #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
 Closed = tuple[Grid, np.ndarray]
@@ -133,7 +134,9 @@ class WorkingMesh:
     projection_distance: (
         np.ndarray
     )  #: (C,) distance from the scan after `project_onto_scan`, NaN before and over closed holes [scan unit]
-    sharp: np.ndarray  #: (N,) bool for each curve of the rim, whether it is a ridge, which the local surface rounds off
+    sharp: (
+        np.ndarray
+    )  #: (N,) bool for each curve of the boundary, whether it is a ridge, which the local surface rounds off
 
     @classmethod
     def from_grid(
@@ -199,7 +202,7 @@ class WorkingMesh:
         return stay
 
     def name_distances(self, measured: int) -> None:
-        """Forget the distance from the scan of nodes over closed holes, whose site is none of the first `measured`."""
+        """Forget the distance from the scan of nodes over closed holes, whose sample is none of the first `measured`."""
         self.projection_distance[self.patches[:, 15] >= measured] = np.nan
 
     def _scratch(self, part: int) -> Surface:

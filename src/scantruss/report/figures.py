@@ -47,7 +47,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
 
 
 def count_holes(grid: Grid) -> int:
-    """Count the loops that are not the outer rim of their piece: every piece with a boundary has one."""
+    """Count the loops that are not the outer boundary of their piece: every piece with a boundary has one."""
     label = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     pieces = {int(label[loop[0]]) for loop in grid.boundary_loops}
     return len(grid.boundary_loops) - len(pieces)

@@ -21,7 +21,7 @@ def extent_of(points: np.ndarray) -> np.ndarray:
 
 
 def bulk_of(points: np.ndarray) -> np.ndarray:
-    """Return the lowest and highest coordinates of points (N, 3) but for a few stray ones at each end, (2, 3)."""
+    """Return the lowest and highest coordinates of points (N, 3) but for a few outlier ones at each end, (2, 3)."""
     return np.percentile(points[:: max(len(points) // BULK, 1)], BULK_PERCENTILES, axis=0)
 
 

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud
 
-SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a rim from a gap
+SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a boundary from a gap
 GAPS = 2.2  #: ... and where points lie at random, this many distances to the sixth neighbour
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length

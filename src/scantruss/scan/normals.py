@@ -12,11 +12,11 @@ from .vectors import dots
 
 HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
 SAMPLES_PER_THREAD = 1500  # samples that a thread takes at least
-STEEP = 0.75  # sine of the angle over the plane of a site at which a neighbour lies on another sheet
+STEEP = 0.75  # sine of the angle over the plane of a sample at which a neighbour lies on another sheet
 
 
 def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
-    """Drop links (S, K) to sites that stand over a site rather than beside it."""
+    """Drop links (S, K) to samples that stand over a sample rather than beside it."""
     in_parts(
         len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j)
     )
@@ -35,14 +35,14 @@ def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) 
 
 
 def _counted_off(piece: np.ndarray) -> np.ndarray:
-    """Return the numbers of pieces (S,) without gaps, where each is the first site of its piece."""
+    """Return the numbers of pieces (S,) without gaps, where each is the first sample of its piece."""
     first = piece == np.arange(len(piece))
     number: np.ndarray = (np.cumsum(first) - 1)[piece]
     return number
 
 
 def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:
-    """Return mean normals (S, 3) of sites and those linked to them whose normals have a cosine over `facing` with their own."""
+    """Return mean normals (S, 3) of samples and those linked to them whose normals have a cosine over `facing` with their own."""
     means = np.empty_like(normals)
     in_parts(
         len(normals),
@@ -72,7 +72,7 @@ def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
     """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
 
     Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
-    or overgrown that happens by chance.
+    or overgrown that happens at random.
     """
     smooth = 0.15 * surface.step
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:

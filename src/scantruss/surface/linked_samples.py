@@ -1,4 +1,4 @@
-"""Sites chosen among the points, each point given to its site, and sites linked to those beside them."""
+"""Samples chosen among the points, each point given to its sample, and samples linked to those beside them."""
 
 from __future__ import annotations
 
@@ -14,31 +14,32 @@ from ..scan.cloud import Bounds, bounds_of
 from ..scan.normals import SAMPLES_PER_THREAD
 from .streamline import is_dense, streamlined
 
-NEIGHBORS = 12  # links of a site
-CLOSE = 2.2  # size of the search boxes while sites are chosen, in their radii
-POINTS_TO_SORT = 250_000  # points from which on they no longer fit into the cache, and are sorted
-MANY_SAMPLES = 40_000  # the same where most points are sites of their own, which takes more room:
-LONE = 0.3  # so far apart, in radii of a site
-LARGE = 8.0  # size of the sites that they are sorted by, in radii of a site
-POINTS_PER_THREAD = 20_000  # fewest points for a thread of their own
-PATCH_SPACING = 0.3  # distance of points, in radii of a site, that serves the patches as well as any smaller one
-ROUGH = 0.04  # sites thicker than this many member lengths are settled to a sheet first
-SOME_ROUGH = 0.002  # share of rough sites from which on a scan may be a thick layer,
-MANY_ROUGH = 0.007  # and from which on they are settled: fewer may lie along its ridges
-SHEETS = 0.12  # sites thicker than this may be several sheets
-FINER = 2  # times that sites are made twice as fine, to see whether a thick layer is several sheets
-FINEST = 1.0  # spacings between the finest sites
-BENT = 0.075  # sites of a smooth scan are no thicker than this, in member lengths
-SAMPLES_WITHOUT_ROOM_FOR_RIDGE = 2  # sites at which a smooth scan is not: there is no room for a ridge
+NEIGHBORS = 12  # most links of a sample
+CLOSE = 2.2  # size of the search boxes while samples are chosen [sample radii]
+# number of points above which they are sorted in space, because they no longer fit into the cache
+POINTS_TO_SORT = 250_000
+MANY_SAMPLES = 40_000  # the same number where most points are samples of their own, which needs more memory
+LONE = 0.3  # point spacing above which most points are samples of their own [sample radii]
+LARGE = 8.0  # radius of the samples by which points are sorted [sample radii]
+POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
+PATCH_SPACING = 0.3  # point spacing that is dense enough for fitting patches [sample radii]
+ROUGH = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
+SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
+MANY_ROUGH = 0.007  # share of rough samples above which they are moved; fewer may lie along ridges
+SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
+FINER = 2  # times that the samples are made twice as fine, to see whether a thick layer is several sheets
+FINEST = 1.0  # least distance between samples [point spacings]
+BENT = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
+SAMPLES_WITHOUT_ROOM_FOR_RIDGE = 2  # samples at which a smooth scan may be rough: too few for a ridge
 
 
 class Linked(NamedTuple):
-    """Sites of one thinning radius, linked; their normals of either sign."""
+    """Samples of one thinning radius, linked; their normals of either sign."""
 
-    owner: np.ndarray  #: (N,) int64 site of each point
-    chosen: np.ndarray  #: (S,) int64 point of each site
-    grouped: np.ndarray  #: (N, 3) the points sorted by site
-    start: np.ndarray  #: (S + 1,) int64 where each site's points start
+    owner: np.ndarray  #: (N,) int64 sample of each point
+    chosen: np.ndarray  #: (S,) int64 point of each sample
+    grouped: np.ndarray  #: (N, 3) the points sorted by sample
+    start: np.ndarray  #: (S + 1,) int64 where each sample's points start
     boxes: SearchBoxes
     mean: np.ndarray  #: (S, 3)
     neighbors: np.ndarray  #: (S, NEIGHBORS) int64
@@ -49,7 +50,7 @@ class Linked(NamedTuple):
 def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float) -> np.ndarray:
     """Return those of very dense points, within these bounds, that serve as well as all of them, sorted where they are many.
 
-    Sorted by much larger sites, what lies together in space does so in memory, in all that follows. By sites, not by boxes: a scan
+    Sorted by much larger samples, what lies together in space does so in memory, in all that follows. By samples, not by boxes: a scan
     that is turned or moved stays sorted as it was.
     """
     if is_dense(spacing, PATCH_SPACING * radius):
@@ -61,14 +62,14 @@ def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float
 
 
 def link_samples(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the sites of points for one thinning radius."""
+    """Return the samples of points for one thinning radius."""
     owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
     grouped, start, mean = group(points, owner, len(chosen))
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
 
 
 def is_smooth(found: Linked, length: float, uneven: float) -> bool:
-    """Whether the scan is a smooth surface at the sites, flat or evenly bent: larger sites tell as much of it as smaller ones.
+    """Whether the scan is a smooth surface at the samples, flat or evenly bent: larger samples tell as much of it as smaller ones.
 
     uneven : angle by which the normals of neighbours, one mirrored to the other, differ at most [degree]
     """
@@ -85,9 +86,9 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
 
 
 def link_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
-    """Return finer sites, and their radius, where these form smooth sheets; None where they do not.
+    """Return finer samples, and their radius, where these form smooth sheets; None where they do not.
 
-    Sheets that lie side by side, a few sites apart, look like one rough layer. They come apart as soon as the sites are finer.
+    Sheets that lie side by side, a few samples apart, look like one rough layer. They come apart as soon as the samples are finer.
     """
     for _ in range(FINER):
         radius *= 0.5
@@ -100,7 +101,7 @@ def link_finer(points: np.ndarray, radius: float, length: float, spacing: float)
 
 
 def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the sites of a rough layer moved to its middle, thinned and linked anew."""
+    """Return the samples of a rough layer moved to its middle, thinned and linked anew."""
     moved = np.empty_like(found.mean)
     kernels.settle_samples(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
     joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing)
@@ -110,14 +111,14 @@ def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: fl
 
 
 def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
-    """Whether the sites form a thick layer, no sheet: more than some of them, as a share, are thicker than `rough`."""
+    """Whether the samples form a thick layer, no sheet: more than some of them, as a share, are thicker than `rough`."""
     return bool((found.thickness > rough).mean() > some)
 
 
 def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
-    """Return a site within the radius of each point, the point of each site and where it is (S, 3), and the sites by box.
+    """Return a sample within the radius of each point, the point of each sample and where it is (S, 3), and the samples by box.
 
-    Sites are points that keep the radius: each that has no earlier site nearer.
+    Samples are points that keep the radius: each that has no earlier sample nearer.
     """
     owner = np.full(len(points), -1, np.int64)
     lower, upper = bounds_of(points)
@@ -141,7 +142,7 @@ def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np
 def _settled(
     points: np.ndarray, radius: float, length: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
-    """Return the nearest site of each point, the point of each site and where it is, the sites by box and their neighbours."""
+    """Return the nearest sample of each point, the point of each sample and where it is, the samples by box and their neighbours."""
     owner, chosen, places, boxes = samples_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
     in_parts(
@@ -153,7 +154,7 @@ def _settled(
 
 
 def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:
-    """Return the neighbours of each site (S, 3) among the others."""
+    """Return the neighbours of each sample (S, 3) among the others."""
     neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
@@ -167,7 +168,7 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
 
 
 def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal of each site (either sign) and the thickness of the points there."""
+    """Return the normal of each sample (either sign) and the thickness of the points there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
         len(mean),
@@ -178,7 +179,7 @@ def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def group(points: np.ndarray, owner: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points sorted by site, where each site's points start, and their means."""
+    """Return the points sorted by sample, where each sample's points start, and their means."""
     start, mean = np.zeros(samples + 1, np.int64), np.zeros((samples, 3))
     grouped = np.empty_like(points)
     kernels.group_points(points, owner, start, grouped, mean)

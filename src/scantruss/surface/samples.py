@@ -1,4 +1,4 @@
-"""The scan prepared for one member length: sites with oriented normals, linked on each sheet."""
+"""The scan prepared for one member length: samples with oriented normals, linked on each sheet."""
 
 from __future__ import annotations
 
@@ -38,10 +38,11 @@ from .linked_samples import (
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
-BESIDE_SAMPLES = 1.5  # how far all points are beside those that serve as well, in distances of these
-SPARSE = 0.08  # spacing of the points, in member lengths, from which on no larger sites are tried
-UNEVEN_BEND = 20.0  # as `_Asked.uneven`: a ridge that bends by twice as much would be seen
-SOME, ALL = 8.0, 24.0  # most points of a usual site that a patch is fitted to, on the way and in the end
+# distance from the points already taken within which all points of the boundary are taken [their spacings]
+BESIDE_SAMPLES = 1.5
+SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
+UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
+SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,30 +50,30 @@ class SurfaceSamples:
     """What all later steps look up in the scan."""
 
     surface: Surface
-    boxes: SearchBoxes  #: the sites by box
-    piece: np.ndarray  #: (S,) int64 number of the connected piece of each site, the largest piece is 0
-    thickness: np.ndarray  #: (S,) rms distance of each site and its neighbours from their plane [scan unit]
+    boxes: SearchBoxes  #: the samples by box
+    piece: np.ndarray  #: (S,) int64 number of the connected piece of each sample, the largest piece is 0
+    thickness: np.ndarray  #: (S,) rms distance of each sample and its neighbours from their plane [scan unit]
     spacing: float  #: typical distance between neighbouring points [scan unit]
     area: float  #: rough area of the scanned surface [scan unit^2]
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
-    outliers: int = 0  #: stray points that were left out
+    outliers: int = 0  #: outliers that were left out
     repeated: int = 0  #: points that were left out because they repeat another one
-    measured: int = 0  #: sites with measured points; those from this number on have made-up ones only
+    measured: int = 0  #: samples with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     sample_spacing: float = 0.0  #: about so far apart [scan unit]
-    smooth: bool = False  #: the scan bends evenly at all sites: no ridge is there
+    smooth: bool = False  #: the scan bends evenly at all samples: no ridge is there
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
 
     @cached_property
     def kept(self) -> np.ndarray:
-        """Which sites are of pieces that are large enough for a grid (S,) bool."""
+        """Which samples are of pieces that are large enough for a grid (S,) bool."""
         return np.isin(self.piece, self.pieces)
 
     @property
     def left_out(self) -> tuple[int, float]:
-        """How many pieces are too small for a grid, and the share of the sites, which lie evenly, that is theirs."""
+        """How many pieces are too small for a grid, and the share of the samples, which lie evenly, that is theirs."""
         samples = np.bincount(self.piece)
         small = np.delete(samples, self.pieces)
         return len(small), float(small.sum() / samples.sum())
@@ -89,7 +90,7 @@ class SurfaceSamples:
 
 
 class _Asked(NamedTuple):
-    """What of the settings decides over the sites."""
+    """What of the settings decides over the samples."""
 
     length: float
     box_size: float | None
@@ -108,11 +109,11 @@ class _Asked(NamedTuple):
 
 
 class _Chosen(NamedTuple):
-    """The sites of a scan, and of what they were chosen."""
+    """The samples of a scan, and of what they were chosen."""
 
     found: Linked
-    radius: float  #: of a site
-    points: np.ndarray  #: (N, 3) the points given to the sites
+    radius: float  #: of a sample
+    points: np.ndarray  #: (N, 3) the points given to the samples
     whole: np.ndarray  #: (M, 3) all points of the scan
     outliers: int  #: points that were left out of it
     smooth: bool
@@ -122,13 +123,13 @@ _KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = wea
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
-    """Return the sites of a cloud for a member length; kept as long as the cloud lives.
+    """Return the samples of a cloud for a member length; kept as long as the cloud lives.
 
     Parameters
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `clean`, `outlier_distance` and `drop_duplicates` which points are left
+        `length` and `box_size` decide how far apart samples are, `clean`, `outlier_distance` and `drop_duplicates` which points are left
         out, `length_field` where members are to be longer.
     """
     asked = _Asked.of(settings, cloud.origin)
@@ -146,12 +147,12 @@ def is_graded(surface: Surface) -> bool:
 
 
 def local_field(surface: Surface, place: np.ndarray) -> float:
-    """Desired length at a place, in lengths: that of the nearest site."""
+    """Desired length at a place, in lengths: that of the nearest sample."""
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
 def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings) -> SurfaceSamples:
-    """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
+    """Return the samples of the same points and of made-up ones (F, 3) [scan unit]."""
     points = samples.surface.points
     both = np.concatenate([points, added])
     asked = _Asked.of(settings, samples.origin)._replace(outlier_distance=0.0, drop_duplicates=False)
@@ -172,7 +173,7 @@ def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings)
 def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
     """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
 
-    More points of each site count than while nodes are still on their way.
+    More points of each sample count than while nodes are still on their way.
     """
     surface = samples.surface
     radius = np.sqrt(points * samples.area / (np.pi * len(surface.points)))
@@ -188,7 +189,7 @@ def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
 
 
 def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_points: np.ndarray) -> Surface:
-    """Return the surface with all points near some of its points (R, 3), where it has only some: those of the rim tell where it is."""
+    """Return the surface with all points near some of its points (R, 3), where it has only some: those of the boundary tell where it is."""
     if samples.whole is None:
         return surface
     near = samples.whole.take(
@@ -232,7 +233,7 @@ def _prepare(
     asked: _Asked,
     measured: int | None = None,
 ) -> SurfaceSamples:
-    """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
+    """Return the samples of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
     if asked.drop_duplicates and has_repeats(points):
         kept = ~find_repeated(points)
@@ -268,7 +269,7 @@ def _prepare(
 
 
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
-    """Return larger sites where nobody said how large and the scan is dense, smooth and without strays; else None."""
+    """Return larger samples where nobody said how large and the scan is dense, smooth and without outliers; else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
     if asked.box_size is not None or spacing > SPARSE * length:
         return None
@@ -280,7 +281,7 @@ def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _
 
 
 def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
-    """Return the sites of any scan, without its strays; of a rough one moved to the middle of its sheets."""
+    """Return the samples of any scan, without its outliers; of a rough one moved to the middle of its sheets."""
     length, outliers = asked.length, 0
     radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
@@ -302,7 +303,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked sites, its normals smoothed and turned outside, and the connected piece of each site (S,)."""
+    """Return the local surface of linked samples, its normals smoothed and turned outside, and the connected piece of each sample (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     cut_steep_links(mean, normals, neighbors)
@@ -337,7 +338,7 @@ def _number(piece: np.ndarray) -> np.ndarray:
 
 
 def _sample_areas(surface: Surface) -> np.ndarray:
-    """Rough area around each site (S,): that of a disc through its neighbours over their number [scan unit^2]."""
+    """Rough area around each sample (S,): that of a disc through its neighbours over their number [scan unit^2]."""
     linked = surface.neighbors >= 0
     count = linked.sum(axis=1)
     last = surface.neighbors[np.arange(len(count)), np.maximum(count - 1, 0)]

@@ -15,13 +15,13 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..settings import Settings, shortest_and_longest
 
-RATIO = 1.2  # of the lengths desired for two members that follow each other, at most
+RATIO = 1.2  # largest ratio of the desired lengths of two members in a row
 SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per way; ways over the links, and members, may be longer
-FLAT = 0.002  # a member of the longest length that bulges by less than this, in its length, is flat
-BENT = 0.95  # share of the scan that bends less than where the shortest length is desired
+FLAT = 0.002  # a longest member that bulges by less than this share of its length is flat
+BENT = 0.95  # share of the scan that is less curved than where members have the shortest length
 NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature that may be noise
-FARTHEST_FROM_SCAN = 1.0  # a given length may be so far from the scan, in that length
-SAMPLES_PER_THREAD = 200  # fewest sites for a thread of their own
+FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan, in that length
+SAMPLES_PER_THREAD = 200  # fewest samples worth a thread of their own
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def wish_of(settings: Settings, origin: np.ndarray) -> Wish | None:
 
 
 def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
-    """Return the desired length at each site (S,), in shortest lengths; graded, so that members that follow each other differ little.
+    """Return the desired length at each sample (S,), in shortest lengths; graded, so that members that follow each other differ little.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
 
 
 def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
-    """Blend of the given lengths at each site (S,), in shortest lengths."""
+    """Blend of the given lengths at each sample (S,), in shortest lengths."""
     rows = np.array(wish.field, float)
     scale = wish.length / shortest
     places, values = np.ascontiguousarray(rows[:, :3] - wish.origin), rows[:, 3] / shortest
@@ -95,7 +95,7 @@ def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: f
 
 
 def _by_curvature(surface: Surface, most: float) -> np.ndarray:
-    """Length at each site (S,) of which members bulge alike over the scan, between 1 and `most` shortest lengths.
+    """Length at each sample (S,) of which members bulge alike over the scan, between 1 and `most` shortest lengths.
 
     A member over a curvature k bulges by k l^2 / 8. The most bent twentieth of the scan gets the shortest length, unless even the
     longest member would be flat there.
@@ -108,7 +108,7 @@ def _by_curvature(surface: Surface, most: float) -> np.ndarray:
 
 
 def measured_bends(surface: Surface, most: float) -> np.ndarray:
-    """Return the largest curvature of the scan at each site (S,), less what may be noise [1 / scan unit].
+    """Return the largest curvature of the scan at each sample (S,), less what may be noise [1 / scan unit].
 
     Measured by patches as wide as the members may become, where those bend as narrow ones do, but for what may be noise (Lepski).
     """
@@ -124,11 +124,11 @@ def measured_bends(surface: Surface, most: float) -> np.ndarray:
     bends[samples] = best
     bends = _spread(surface.neighbors, bends, chosen)
     everywhere = np.ones_like(chosen)
-    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one site alone is noise
+    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one sample alone is noise
 
 
 def _bends(surface: Surface, samples: np.ndarray, wider: float) -> np.ndarray:
-    """Curvature and its doubt at some sites, (P, 2) [1 / scan unit], by patches so many times wider."""
+    """Curvature and its doubt at some samples, (P, 2) [1 / scan unit], by patches so many times wider."""
     from .scratch import with_own_scratch
 
     scaled = surface._replace(
@@ -144,7 +144,7 @@ def _bends(surface: Surface, samples: np.ndarray, wider: float) -> np.ndarray:
 
 
 def _spread(neighbors: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Values (S,) at all sites: the mean of those known at a site and its neighbours."""
+    """Values (S,) at all samples: the mean of those known at a sample and its neighbours."""
     weight = np.where(neighbors >= 0, known[neighbors], False)
     total = weight.sum(axis=1) + known
     summed = (weight * values[neighbors]).sum(axis=1) + known * values

@@ -14,10 +14,10 @@ from ..kernels.scan import streamline as kernels
 from ..runtime.parallel import in_parts, processors
 from ..scan.cloud import Bounds
 
-DENSE = 0.35  # spacing of the points, in sizes of a box, from which on a scan is streamlined
-POINTS_PER_THREAD = 200_000  # fewest points for a thread of their own
+DENSE = 0.35  # point spacing below which a scan is streamlined [boxes]
+POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
 ALL = np.zeros(0, np.int64)  # stands for all points
-MARKS = 1 << 20  # of boxes near a place: some thousands, which hardly ever share one with a box elsewhere
+MARKS = 1 << 20  # marks for boxes near a place; there are some thousands of these, so two hardly ever share a mark
 ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
 FILLED = 64  # of these, in a block of boxes
 

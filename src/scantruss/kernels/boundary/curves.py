@@ -1,4 +1,4 @@
-"""The smoothed boundary curves of the scan, on which the nodes of the rim slide."""
+"""The smoothed boundary curves of the scan, on which the nodes of the boundary slide."""
 
 from __future__ import annotations
 

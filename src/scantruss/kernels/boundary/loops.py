@@ -1,6 +1,6 @@
 """Boundary points and ordered boundary loops of a point cloud (Sec. 3.3).
 
-A disc is rolled along the edge of the sites in their tangent planes: it touches boundary sites one after the other, which gives
+A disc is rolled along the edge of the samples in their tangent planes: it touches boundary samples one after the other, which gives
 ordered loops directly. Gaps narrower than the disc do not let it in. Then a disc is slid from outside against the points at each
 place of a loop: what it touches are the boundary points.
 """
@@ -20,7 +20,7 @@ DIRECTIONS = 64
 BINS = 240
 OVER = 0.4  # sine of the angle over the mean plane of two places from which on they lie on two sheets
 ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
-FACING = 0.2  # sites whose normals have a smaller cosine are another sheet, or a plant
+FACING = 0.2  # samples whose normals have a smaller cosine are another sheet, or a plant
 
 
 @kernel
@@ -37,9 +37,9 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 @kernel
 def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
-    """Whether the directions to the neighbours of a site leave a gap wider than `widest` [rad]; False where there are none.
+    """Whether the directions to the neighbours of a sample leave a gap wider than `widest` [rad]; False where there are none.
 
-    widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the site, each with a number that
+    widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the sample, each with a number that
     grows as its angle does.
     """
     place, count = row(surface.mean, s), 0
@@ -87,7 +87,7 @@ def _block(
     reach: float,
     blocked: np.ndarray,
 ) -> int:
-    """Mark the directions in which a disc `reach` wide that touches a place would hold another site; how many are new."""
+    """Mark the directions in which a disc `reach` wide that touches a place would hold another sample; how many are new."""
     if dot(row(surface.normals, other), normal) < FACING:
         return 0
     angle, distance = _polar(place, normal, u, v, row(surface.mean, other), noise)
@@ -104,9 +104,9 @@ def _block(
 
 @kernel
 def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
-    """For each site from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
+    """For each sample from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
 
-    Sites whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
+    Samples whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
     the middle of the widest free range, counted from `across(normal)`, less than a turn.
     """
     blocked = np.zeros(DIRECTIONS, np.bool_)
@@ -142,7 +142,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
 
 @kernel
 def sample_disc(surface: Surface, sample: int, direction: float, radius: float) -> Vector:
-    """Centre of the disc that touches a site from its free direction."""
+    """Centre of the disc that touches a sample from its free direction."""
     normal = row(surface.normals, sample)
     u = across(normal)
     place = along(row(surface.mean, sample), radius * math.cos(direction), u)
@@ -176,15 +176,15 @@ def roll_disc(
     visit: np.ndarray,
     banned: np.ndarray,
 ) -> tuple[int, int]:
-    """Roll an empty disc along the boundary from a site that it touches, the surface to its left.
+    """Roll an empty disc along the boundary from a sample that it touches, the surface to its left.
 
     Parameters
     ----------
-    radii : (S,) radius of the disc at each site
-    path : (M,) int64, filled with the touched sites
-    seen : (S,) int64, for each site the site that followed it on an earlier loop, -1: none
+    radii : (S,) radius of the disc at each sample
+    path : (M,) int64, filled with the touched samples
+    seen : (S,) int64, for each sample the sample that followed it on an earlier loop, -1: none
     visit : (S,) int64 scratch, index in `path` of the last visit
-    banned : (S,) bool, sites that the disc does not feel
+    banned : (S,) bool, samples that the disc does not feel
 
     Returns
     -------
@@ -250,7 +250,7 @@ def roll_disc(
 
 @kernel
 def come_nearer(surface: Surface, places: np.ndarray, samples: np.ndarray) -> None:
-    """Go from the site near each place (M,) on to the nearest one."""
+    """Go from the sample near each place (M,) on to the nearest one."""
     for m in range(len(places)):
         samples[m] = walk(surface, samples[m], row(places, m))
 
@@ -271,7 +271,7 @@ def touch_points(
     Parameters
     ----------
     places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
-    samples : (M,) site near each place
+    samples : (M,) sample near each place
     touched : (M, 3) filled with the point that the disc touches first
     """
     noise = 0.35 * surface.length
@@ -300,7 +300,7 @@ def touch_points(
 
 @kernel
 def normals_along(surface: Surface, curve: np.ndarray, sample: int, normals: np.ndarray) -> None:
-    """Normal of the scan at each place of a curve, from site to site on its sheet; `sample` is near the first place."""
+    """Normal of the scan at each place of a curve, from sample to sample on its sheet; `sample` is near the first place."""
     for m in range(len(curve)):
         sample = walk(surface, sample, row(curve, m))
         normals[m, 0], normals[m, 1], normals[m, 2] = row(surface.normals, sample)
@@ -371,7 +371,7 @@ def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
 def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, sample: int, radius: float) -> float:
     """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
 
-    places : (M, 3) boundary points in order, the surface to their left. site : one near the first place.
+    places : (M, 3) boundary points in order, the surface to their left. sample : one near the first place.
     """
     found = np.empty(8, np.int64)
     free, count = 0, len(places)

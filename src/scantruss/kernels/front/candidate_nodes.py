@@ -20,7 +20,7 @@ class CandidateNodes(NamedTuple):
 
     places: np.ndarray  #: (K, 3)
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
-    samples: np.ndarray  #: (K,) int64 a site near each
+    samples: np.ndarray  #: (K,) int64 a sample near each
     length: float
 
 

@@ -28,7 +28,7 @@ SHEET = 0.45  # what is farther from a triangle than this is another sheet, in l
 
 @kernel
 def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) -> bool:
-    """Whether two nodes lie on the same sheet of the surface: plainly side by side, or linked over the sites between them."""
+    """Whether two nodes lie on the same sheet of the surface: plainly side by side, or linked over the samples between them."""
     d = subtract(row(front.nodes, q), row(front.nodes, a))
     far = norm(d)
     na, nq = row(front.normals, a), row(front.normals, q)

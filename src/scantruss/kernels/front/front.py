@@ -66,7 +66,7 @@ class Front(NamedTuple):
 
     nodes: np.ndarray  #: (C, 3)
     normals: np.ndarray  #: (C, 3) outer normals of the surface at the nodes
-    sample: np.ndarray  #: (C,) site nearest to each node
+    sample: np.ndarray  #: (C,) sample nearest to each node
     on_boundary: np.ndarray  #: (C,) bool
     out: np.ndarray  #: (C,) a front segment that starts at the node, -1: none
     tail: np.ndarray  #: (F,)

@@ -13,7 +13,7 @@ from ...runtime.jit import kernel
 
 
 class SearchBoxes(NamedTuple):
-    """Items (points, sites or nodes) by box."""
+    """Items (points, samples or nodes) by box."""
 
     lower: np.ndarray  #: (3,) float64 lower bounds
     size: np.ndarray  #: (3,) float64, D of Eq. 3

@@ -1,6 +1,6 @@
 """A tree of points that are as close together here and as far apart there as they like: the nearest of a place, all near a place.
 
-Search boxes suit what is spread evenly (sites, nodes). A scan as it comes is thousands of times denser beside the scanner than far
+Search boxes suit what is spread evenly (samples, nodes). A scan as it comes is thousands of times denser beside the scanner than far
 from it; a tree of halves does not mind.
 """
 

@@ -253,7 +253,7 @@ def collapse(net: Net, a: int, b: int) -> None:
     right, left = wings(net, a, b)
     d = net.degree[b]
     line = net.line[b]
-    if net.is_open[b] == 1:  # along the rim: the ring of b without a stands in order
+    if net.is_open[b] == 1:  # along the boundary: the ring of b without a stands in order
         begin = 1 if left < 0 else 0
         others = d - 1
     else:

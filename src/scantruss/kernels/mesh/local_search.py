@@ -40,7 +40,7 @@ FLIPS = 4  # most of these flips
 
 @kernel
 def place_between(net: Net, curves: Curves, v: int, a: int, b: int) -> None:
-    """Put node v halfway between a and b: along their curve if it is on the rim."""
+    """Put node v halfway between a and b: along their curve if it is on the boundary."""
     if slides_on_line(net, v):
         first = arc_on_line(net, curves, v, a, b)
         middle = halfway(curves, net.curve[v], first, arc_on_line(net, curves, v, b, a))

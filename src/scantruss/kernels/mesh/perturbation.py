@@ -1,4 +1,4 @@
-"""Kicks: moves at random, after which the grid around settles and is searched; what has lowered the energy is kept."""
+"""Perturbations: moves at random, after which the grid around settles and is searched; what has lowered the energy is kept."""
 
 from __future__ import annotations
 
@@ -15,10 +15,14 @@ from .grid import LOCKED, Net, place_of, target_length, wings
 from .local_search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
 from .trial import Scratch, gather, local_energy
 
-WIDE, SEARCHED, PERTURBED = 5, 2, 1  # rings around the kicked node that may change, are searched, get the random moves
+WIDE, SEARCHED, PERTURBED = (
+    5,
+    2,
+    1,
+)  # rings around the perturbed node that may change, are searched, get the random moves
 MOST_NODES = 400  # nodes of an area
 KEPT = 32  # free nodes at the top of the stack that are written down
-MOVES = 3  # most random moves of a kick
+MOVES = 3  # most random moves of a perturbation
 SEARCH_ROUNDS = 2  # of settling and searching
 CALM = 2  # sweeps of settling in a round
 ALLOWANCE_SETTLED = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
@@ -27,10 +31,10 @@ LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
 
 
 class Area(NamedTuple):
-    """The nodes that a kick may change, as they were before it."""
+    """The nodes that a perturbation may change, as they were before it."""
 
-    mark: np.ndarray  #: (C,) int64 number of the kick that has the node in its area
-    away: np.ndarray  #: (C,) int64 rings away from the kicked node
+    mark: np.ndarray  #: (C,) int64 number of the perturbation that has the node in its area
+    away: np.ndarray  #: (C,) int64 rings away from the perturbed node
     out: np.ndarray  #: (C,) int64, 1 where the node is out of bounds
     around: np.ndarray  #: (A,) int64 the nodes
     nodes: np.ndarray  #: (A, 3) their places
@@ -47,10 +51,10 @@ class Area(NamedTuple):
     free: np.ndarray  #: (KEPT,) int64 the top of the stack of free nodes
     saved: np.ndarray  #: (1,) int64 how many of these there are
     spare: np.ndarray  #: (1,) int64 how many nodes were free
-    number: np.ndarray  #: (1,) int64 number of the kick
+    number: np.ndarray  #: (1,) int64 number of the perturbation
     gathered: np.ndarray  #: (1,) int64 nodes of the area
     seed: np.ndarray  #: (1,) int64 state of the random numbers
-    paid: np.ndarray  #: (1,) int64 kicks that paid
+    paid: np.ndarray  #: (1,) int64 perturbations that paid
 
 
 @kernel
@@ -107,7 +111,7 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
 
 @kernel
 def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
-    """Undo a kick."""
+    """Undo a perturbation."""
     free = area.spare[0]
     net.spare[0] = free
     for k in range(area.saved[0]):
@@ -168,7 +172,7 @@ def is_within(net: Net, area: Area, a: int, b: int) -> bool:
 
 @kernel
 def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, area: Area) -> int:
-    """Make some random moves near the kicked node; returns how many."""
+    """Make some random moves near the perturbed node; returns how many."""
     made = 0
     for _ in range(1 + random_choice(area, MOVES)):
         near = 1
@@ -253,7 +257,7 @@ def forget_trials(scratch: Scratch, area: Area) -> None:
 
 @kernel
 def is_as_before(net: Net, area: Area) -> bool:
-    """Whether each node of the area has the neighbours that it had before the kick."""
+    """Whether each node of the area has the neighbours that it had before the perturbation."""
     if net.spare[0] != area.spare[0]:
         return False
     for k in range(area.gathered[0]):
@@ -280,7 +284,7 @@ def perturb(
     temperature: float,
     allowance: float,
 ) -> bool:
-    """Kick the grid in the area that is listed; True if that has paid, else all is as before.
+    """Perturb the grid in the area that is listed; True if that has paid, else all is as before.
 
     worth, bend : n more nodes may cost worth n - bend n^2
     allowance : what still costs more once it is searched is given up; below ALLOWANCE_SETTLED, so is what the search has undone
@@ -327,7 +331,7 @@ def perturb_all(
     temperature: float,
     allowance: float,
 ) -> int:
-    """Kick the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
+    """Perturb the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ OFF_SHEET = 0.5  # a patch that passes a node at this distance is none of its sh
 
 @kernel
 def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
-    """Site of the scan nearest to a place, by trying all."""
+    """Sample of the scan nearest to a place, by trying all."""
     best, sample = np.inf, 0
     for s in range(len(surface.mean)):
         dx, dy, dz = surface.mean[s, 0] - x, surface.mean[s, 1] - y, surface.mean[s, 2] - z
@@ -30,7 +30,7 @@ def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
 def locate_nodes(
     net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, located: np.ndarray
 ) -> None:
-    """Find the site under every node; from node to node over the members, so that each stays on its sheet of the scan.
+    """Find the sample under every node; from node to node over the members, so that each stays on its sheet of the scan.
 
     `queue` and `located` (C,) int64 are scratch, zero at the start.
     """

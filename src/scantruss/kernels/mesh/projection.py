@@ -15,7 +15,7 @@ EQUAL_PATCH_RATIO = 0.85  # patches of radii nearer to each other are as good as
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
 TERMS = 6.0  # of a quadric: so many points it passes through
 FEWEST_FOR_WIDE_PATCH = (
-    24  # a patch of fewer points, as there are at a rim, has an edge that their noise moves too much
+    24  # a patch of fewer points, as there are at a boundary, has an edge that their noise moves too much
 )
 
 
@@ -72,7 +72,7 @@ def project_nodes(
     ----------
     fine, middle, broad : Surface
         The same scan with narrow patches, which follow it, and with wider ones, which average its noise.
-    patches : (C, PATCH), scratch; column 15 is the site near each node
+    patches : (C, PATCH), scratch; column 15 is the sample near each node
     fixed : (C,) bool, nodes that stay where they are
     deviation : (C,), filled with the distance of each node from the narrow patch fitted at its place or close by [scan unit]
     begin, end : the nodes from `begin` to `end` - 1

@@ -12,9 +12,9 @@ from ..surface.local_surface import Surface, flood
 
 @kernel
 def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach: float, nearest: np.ndarray) -> None:
-    """The node (V, 3) nearest to each site among those within `reach` on its own sheet, going over the links; -1 where there is none.
+    """The node (V, 3) nearest to each sample among those within `reach` on its own sheet, going over the links; -1 where there is none.
 
-    boxes : of the sites. nearest : (S,) int64, filled.
+    boxes : of the samples. nearest : (S,) int64, filled.
     """
     nearest[:] = -1
     distance = np.empty(len(nearest))
@@ -40,12 +40,12 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
 def first_disconnected(
     links: np.ndarray, nearest: np.ndarray, first: np.ndarray, ends: np.ndarray, most: int, enough: int
 ) -> int:
-    """The first site whose node is far in the grid from that of a site linked to it; -1 where there are fewer than `enough` such links.
+    """The first sample whose node is far in the grid from that of a sample linked to it; -1 where there are fewer than `enough` such links.
 
     Parameters
     ----------
-    links : (S, K) int64, linked sites, -1 for none
-    nearest : (S,) int64, node of each site, -1 for none
+    links : (S, K) int64, linked samples, -1 for none
+    nearest : (S,) int64, node of each sample, -1 for none
     first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of each node's members
     most : members one after the other that still lead from node to node
     """

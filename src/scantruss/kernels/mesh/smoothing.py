@@ -14,7 +14,7 @@ from .grid import INTERIOR, ON_CURVE, Net, slides_on_line
 
 @kernel
 def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
-    """Move every free node by `factor` of the way to the middle of its neighbours; on the rim or a line, of its two neighbours there.
+    """Move every free node by `factor` of the way to the middle of its neighbours; on the boundary or a line, of its two neighbours there.
 
     Neighbours weigh as much as their members are long beside what is desired there, so that long members become shorter: with equal
     weights a grid keeps the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from

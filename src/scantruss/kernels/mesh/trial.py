@@ -96,7 +96,7 @@ def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: V
     """Whether triangle (v, a, b) of this normal is folded over a-b, a member with no end in the neighbourhood that v is of."""
     beyond = wings(net, a, b)[0]
     if beyond < 0 or (beyond < v and scratch.held[beyond] == scratch.trial[0]):
-        return False  # the rim, or counted from the other side
+        return False  # the boundary, or counted from the other side
     p = row(net.nodes, a)
     other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
     return dot(normal, other) < 0.0

@@ -12,7 +12,7 @@ from .overlap import moved, turned
 
 @kernel
 def depths(places: np.ndarray, boundary_points: np.ndarray, boxes: SearchBoxes, most: float, depth: np.ndarray) -> None:
-    """Distance of each place (S, 3) from the nearest place at a rim (R, 3), at most `most`; boxes : of the rims."""
+    """Distance of each place (S, 3) from the nearest place at a boundary (R, 3), at most `most`; boxes : of the boundaries."""
     for s in range(len(places)):
         n = nearest(boxes, boundary_points, places[s, 0], places[s, 1], places[s, 2], most)
         depth[s] = most

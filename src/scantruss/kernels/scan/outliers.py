@@ -68,7 +68,7 @@ def stand_off(
     """How far some points (P,) stand off the surface of those around them, in what is to be expected of a point there; off (P,), filled.
 
     A point itself is left out of its surface. What is expected grows with the thickness of the points there and with the doubt
-    about the surface, large at a rim. least : part of the radius that counts as thickness in any case.
+    about the surface, large at a boundary. least : part of the radius that counts as thickness in any case.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
     buffer, matrix, patch = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)

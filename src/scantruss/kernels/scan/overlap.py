@@ -24,7 +24,7 @@ def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, rea
 
 @kernel
 def mark_boundary(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, aside: np.ndarray) -> None:
-    """How far the mean of its neighbours lies aside of each place, in the reach of the farthest; near 0.4 at a straight rim."""
+    """How far the mean of its neighbours lies aside of each place, in the reach of the farthest; near 0.4 at a straight boundary."""
     for s in range(len(places)):
         o = row(places, s)
         x = y = z = far = 0.0

@@ -18,9 +18,9 @@ FARTHEST = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
 LARGEST_INTEGER = 9223372036854775807  # int64
 ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
-WIDE = 2  # boxes to every side that tell whether a box is at the rim
+WIDE = 2  # boxes to every side that tell whether a box is at the boundary
 BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
-ASIDE = 0.25  # it is at the rim where their middle lies farther aside than this [box]
+ASIDE = 0.25  # it is at the boundary where their middle lies farther aside than this [box]
 
 
 class BoxTable(NamedTuple):
@@ -193,10 +193,10 @@ def take_nearest(
 
 @kernel
 def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
-    """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the rim that lie on its outer side.
+    """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the boundary that lie on its outer side.
 
-    Returns their number. A box is at the rim where the middle of the points around it, the nearer the more they count, lies
-    aside of its own mean: the extremes on the other side stand for the rim, which a mean misses by up to half a box.
+    Returns their number. A box is at the boundary where the middle of the points around it, the nearer the more they count, lies
+    aside of its own mean: the extremes on the other side stand for the boundary, which a mean misses by up to half a box.
     """
     count = 0
     for row in range(begin, end):

@@ -3,7 +3,7 @@
 Nodes are kept on it while they move. Each node caches one quadric patch, a row of `patches`:
 
     0:3 centre   3:6 unit normal (oriented)   6:9 tangent u (v = normal x u)   9:15 coefficients of 1 u v uu uv vv
-    15 site nearest to the centre   16 fitted (1) or not (0)   17 mean distance of the points from the patch
+    15 sample nearest to the centre   16 fitted (1) or not (0)   17 mean distance of the points from the patch
 """
 
 from __future__ import annotations
@@ -22,33 +22,35 @@ HEIGHTS = 9  # first of its coefficients
 
 
 class Surface(NamedTuple):
-    """The scan at the scale of a member: sites, their links and points."""
+    """The scan at the scale of a member: samples, their links and points."""
 
-    points: np.ndarray  #: (N, 3) the points, grouped by site
-    start: np.ndarray  #: (S + 1,) points of site s are start[s]:start[s + 1]
-    mean: np.ndarray  #: (S, 3) mean of the points of each site
+    points: np.ndarray  #: (N, 3) the points, grouped by sample
+    start: np.ndarray  #: (S + 1,) points of sample s are start[s]:start[s + 1]
+    mean: np.ndarray  #: (S, 3) mean of the points of each sample
     normals: np.ndarray  #: (S, 3) oriented unit normals
-    neighbors: np.ndarray  #: (S, K) nearest sites on the same sheet, -1 at the end
+    neighbors: np.ndarray  #: (S, K) nearest samples on the same sheet, -1 at the end
     length: float  #: desired member length [scan unit]
-    radius: float  #: thinning radius: no two sites are nearer [scan unit]
+    radius: float  #: thinning radius: no two samples are nearer [scan unit]
     patch_radius: float  #: [scan unit]
-    patch_points: float  #: most points of a site that a patch is fitted to
-    step: float  #: from site to site [scan unit]
+    patch_points: float  #: most points of a sample that a patch is fitted to
+    step: float  #: from sample to sample [scan unit]
     stamp: np.ndarray  #: (S,) int64 scratch of `flood`
     queue: np.ndarray  #: (S,) int64 scratch of `flood`
     counter: np.ndarray  #: (1,) int64 number of the last flood
-    field: np.ndarray  #: (S,) desired member length at each site, in units of `length`: ones where there is one length
+    field: (
+        np.ndarray
+    )  #: (S,) desired member length at each sample, in units of `length`: ones where there is one length
 
 
 @kernel
 def walk(surface: Surface, sample: int, place: Vector) -> int:
-    """Site nearest to a place, reached by going downhill over the links: never leaves the sheet."""
+    """Sample nearest to a place, reached by going downhill over the links: never leaves the sheet."""
     return descend(surface, sample, place, place, math.inf)
 
 
 @kernel
 def descend(surface: Surface, sample: int, target: Vector, place: Vector, reach: float) -> int:
-    """Site reached over links by steps that each come nearer to a target, to sites within `reach` of a place only."""
+    """Sample reached over links by steps that each come nearer to a target, to samples within `reach` of a place only."""
     best = _square(row(surface.mean, sample), target)
     while True:
         to = -1
@@ -74,7 +76,7 @@ def _square(a: Vector, b: Vector) -> float:
 
 @kernel
 def flood(surface: Surface, sample: int, place: Vector, reach: float) -> int:
-    """Sites within `reach` of a place that are linked to `sample` within that reach, into surface.queue; returns their number."""
+    """Samples within `reach` of a place that are linked to `sample` within that reach, into surface.queue; returns their number."""
     surface.counter[0] += 1
     mark = surface.counter[0]
     surface.queue[0] = sample
@@ -98,7 +100,7 @@ def flood(surface: Surface, sample: int, place: Vector, reach: float) -> int:
 
 @kernel
 def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> bool:
-    """Whether site b can be reached from site a over links within `reach` of a place."""
+    """Whether sample b can be reached from sample a over links within `reach` of a place."""
     target = row(surface.mean, b)
     if a == b:
         return True
@@ -112,7 +114,7 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
 
 @kernel
 def _queued(surface: Surface, sample: int, count: int) -> bool:
-    """Whether a site is among those the last flood found (it stamps the sites just outside too)."""
+    """Whether a sample is among those the last flood found (it stamps the samples just outside too)."""
     found = False
     for i in range(count):
         found = found or surface.queue[i] == sample
@@ -132,7 +134,7 @@ def gather_points(
 ) -> int:
     """Points around a place, relative to it, with their weights, into the buffer of a fit; returns their number.
 
-    Taken are the points of the first `count` sites in surface.queue whose normal has a cosine over `least` to `facing`, of each at most
+    Taken are the points of the first `count` samples in surface.queue whose normal has a cosine over `least` to `facing`, of each at most
     about `most`. They weigh (1 - d^2 / R^2)^2.
     """
     taken = 0
@@ -161,7 +163,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -
     facing = row(surface.normals, sample)
     local = surface.field[
         sample
-    ]  # a patch is as wide as the members there; the wider, the fewer points of a site suffice
+    ]  # a patch is as wide as the members there; the wider, the fewer points of a sample suffice
     radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
     patch[15] = sample
     taken = 0
@@ -194,7 +196,7 @@ def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -
 
 @kernel
 def _points_at_most(surface: Surface, count: int, most: int) -> int:
-    """Points of the first `count` sites in surface.queue, of each about `most` at most."""
+    """Points of the first `count` samples in surface.queue, of each about `most` at most."""
     points = 0
     for i in range(count):
         s = surface.queue[i]
@@ -204,7 +206,7 @@ def _points_at_most(surface: Surface, count: int, most: int) -> int:
 
 @kernel
 def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray) -> None:
-    """Normal and tangent of the weighted least-squares plane, turned to face as the site does."""
+    """Normal and tangent of the weighted least-squares plane, turned to face as the sample does."""
     normal = facing
     patch[18] = 0.0
     if taken >= 4:

@@ -1,4 +1,4 @@
-"""Normals of the sites: planes through their neighbours, all turned to one side of the sheet."""
+"""Normals of the samples: planes through their neighbours, all turned to one side of the sheet."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..geometry.vectors import Vector, dot, row, smallest_eigenvector, spread_al
 
 @kernel
 def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, float]:
-    """Unit normal of the least-squares plane of a site and its neighbours, and their rms distance from it."""
+    """Unit normal of the least-squares plane of a sample and its neighbours, and their rms distance from it."""
     cx = cy = cz = 0.0
     count = 1
     o = row(mean, s)
@@ -39,7 +39,7 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
 def sample_normals(
     mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray, begin: int, end: int
 ) -> None:
-    """Normal of the least-squares plane of each site from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
+    """Normal of the least-squares plane of each sample from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
 
     The sign is not settled yet.
     """
@@ -52,9 +52,9 @@ def sample_normals(
 def trust_thin_samples(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
 ) -> None:
-    """Drop the links of a thick site to thin ones over whose plane it stands, and fit its normal anew.
+    """Drop the links of a thick sample to thin ones over whose plane it stands, and fit its normal anew.
 
-    At the rim of a sheet the nearest sites may be those of the next sheet; they tilt the plane of the one, not of the other.
+    At the boundary of a sheet the nearest samples may be those of the next sheet; they tilt the plane of the one, not of the other.
     """
     for s in range(len(mean)):
         if thickness[s] <= rough:
@@ -79,7 +79,7 @@ def trust_thin_samples(
 def cut_steep_links(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
 ) -> None:
-    """Drop neighbours that stand over a site from `begin` to `end` - 1 rather than beside it: they lie on another sheet."""
+    """Drop neighbours that stand over a sample from `begin` to `end` - 1 rather than beside it: they lie on another sheet."""
     for s in range(begin, end):
         held = 0
         for k in range(neighbors.shape[1]):
@@ -96,7 +96,7 @@ def cut_steep_links(
 
 @kernel
 def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
-    """Cosine between the normal of site n and that of site s mirrored at the plane half-way; of either sign.
+    """Cosine between the normal of sample n and that of sample s mirrored at the plane half-way; of either sign.
 
     It follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
     """
@@ -109,7 +109,7 @@ def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
 def mark_uneven(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, least: float, uneven: np.ndarray, begin: int, end: int
 ) -> None:
-    """Mark the sites from `begin` to `end` - 1, (S,) bool, with a link along which the scan is no arc.
+    """Mark the samples from `begin` to `end` - 1, (S,) bool, with a link along which the scan is no arc.
 
     There the normals, one mirrored to the other, have a cosine below `least`.
     """
@@ -142,7 +142,7 @@ def link_weights(
 
 @kernel
 def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
-    """Root of a site in the union, and its sign against that root; shortens the path."""
+    """Root of a sample in the union, and its sign against that root; shortens the path."""
     total = 1
     while piece[s] != s:
         parent = piece[s]
@@ -160,7 +160,7 @@ def orient_normals(
 ) -> None:
     """Turn all normals of a connected piece to the same side, along the spanning tree of the most certain links.
 
-    order : links as s * K + k, most certain first. piece : (S,) filled with the smallest site of each connected piece.
+    order : links as s * K + k, most certain first. piece : (S,) filled with the smallest sample of each connected piece.
     """
     k_most = neighbors.shape[1]
     sign, joined = np.ones(len(mean), np.int64), 1
@@ -197,7 +197,7 @@ def orient_normals(
 def smooth_normals(
     normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray, begin: int, end: int
 ) -> None:
-    """Mean normal of each site from `begin` to `end` - 1 and of those neighbours whose normals have a cosine over `facing` with its own."""
+    """Mean normal of each sample from `begin` to `end` - 1 and of those neighbours with normals of a cosine over `facing` to it."""
     for s in range(begin, end):
         a = row(normals, s)
         x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
@@ -214,7 +214,7 @@ def smooth_normals(
 def head_on_links(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, smooth: float
 ) -> int:
-    """Number of links between sites thinner than `smooth` that lie side by side and yet face opposite sides."""
+    """Number of links between samples thinner than `smooth` that lie side by side and yet face opposite sides."""
     count = 0
     for s in range(len(mean)):
         for k in range(neighbors.shape[1]):

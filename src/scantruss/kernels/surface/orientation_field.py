@@ -1,6 +1,6 @@
 """Rows of the front: a smooth 6-fold direction field of the surface, and the triangular lattice that follows it.
 
-Both live on posts, places of the scan a part of a member apart, and are smoothed from coarse posts to fine ones: every post turns its
+Both live on samples, places of the scan a part of a member apart, and are smoothed from coarse samples to fine ones: every sample turns its
 direction to the mean of its neighbours' (each up to sixths of a turn), then moves its lattice to the mean of theirs (each up to steps
 of the lattice). After Jakob, Tarini, Panozzo, Sorkine-Hornung: Instant Field-Aligned Meshes (2015), 6-fold, extrinsic.
 """
@@ -19,13 +19,13 @@ HALF_ROOT = 0.5 * math.sqrt(3.0)
 
 
 class Level(NamedTuple):
-    """Posts of one level and the lattice at each."""
+    """Samples of one level and the lattice at each."""
 
     mean: np.ndarray  #: (P, 3)
     normals: np.ndarray  #: (P, 3)
-    neighbors: np.ndarray  #: (P, K) int64 posts beside, -1 at the end
+    neighbors: np.ndarray  #: (P, K) int64 samples beside, -1 at the end
     direction: np.ndarray  #: (P, 3) unit, of one of the six rows
-    node: np.ndarray  #: (P, 3) the node of the lattice that is nearest to the post
+    node: np.ndarray  #: (P, 3) the node of the lattice that is nearest to the sample
     mark: np.ndarray  #: (P,) int64 scratch
 
 
@@ -33,10 +33,10 @@ class Level(NamedTuple):
 def choose_level(
     mean: np.ndarray, neighbors: np.ndarray, radius: float, owner: np.ndarray, chosen: np.ndarray, queue: np.ndarray
 ) -> int:
-    """Choose posts so that every place has one within `radius` over the links; returns their number.
+    """Choose samples so that every place has one within `radius` over the links; returns their number.
 
-    owner : (S,) int64, -1 at the start, filled with the post of each place
-    chosen : (S,) int64, filled with the place of each post
+    owner : (S,) int64, -1 at the start, filled with the sample of each place
+    chosen : (S,) int64, filled with the place of each sample
     queue : (2, S) int64 scratch, -1 at the start
     """
     count = 0
@@ -69,7 +69,7 @@ def choose_level(
 
 @kernel
 def link_level(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, level: Level) -> None:
-    """Fill in means, normals and links of posts, all zero at the start: posts are linked whose places are."""
+    """Fill in means, normals and links of samples, all zero at the start: samples are linked whose places are."""
     for s in range(len(mean)):
         p = owner[s]
         level.mark[p] += 1
@@ -141,7 +141,7 @@ def flat(direction: Vector, normal: Vector) -> Vector:
 
 @kernel
 def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
-    """Of the six directions of a post that which is nearest to another direction."""
+    """Of the six directions of a sample that which is nearest to another direction."""
     turned = sixth(direction, normal)
     third = subtract(turned, direction)
     best = direction
@@ -159,7 +159,7 @@ def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
 
 @kernel
 def smooth_directions(level: Level, some: np.ndarray) -> None:
-    """Turn the direction of some posts (K,) to the mean of those beside."""
+    """Turn the direction of some samples (K,) to the mean of those beside."""
     for i in range(len(some)):
         p = some[i]
         normal = row(level.normals, p)
@@ -214,7 +214,7 @@ def nearest_node(node: Vector, direction: Vector, normal: Vector, place: Vector,
 
 @kernel
 def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
-    """A place between two posts, on the line where their planes meet (half way where they are parallel)."""
+    """A place between two samples, on the line where their planes meet (half way where they are parallel)."""
     np_, nq, mp, mq, nm = dot(n, p), dot(n, q), dot(m, p), dot(m, q), dot(n, m)
     share = 1.0 / (1.0 - nm * nm + 1e-4)
     s = 2.0 * (nq - np_ - nm * (mp - mq)) * share
@@ -228,7 +228,7 @@ def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
 
 @kernel
 def agree(level: Level, p: int, q: int, node: Vector, length: float) -> tuple[Vector, Vector]:
-    """The nodes of the lattices of two posts that lie nearest to each other between them; node is of the lattice of p."""
+    """The nodes of the lattices of two samples that lie nearest to each other between them; node is of the lattice of p."""
     n, m = row(level.normals, p), row(level.normals, q)
     middle = between(row(level.mean, p), n, row(level.mean, q), m)
     u, x = row(level.direction, p), row(level.direction, q)
@@ -248,7 +248,7 @@ def agree(level: Level, p: int, q: int, node: Vector, length: float) -> tuple[Ve
 
 @kernel
 def smooth_lattice(level: Level, length: float, some: np.ndarray) -> None:
-    """Move the lattice of some posts (K,) to the mean of those beside."""
+    """Move the lattice of some samples (K,) to the mean of those beside."""
     for i in range(len(some)):
         p = some[i]
         mean, normal = row(level.mean, p), row(level.normals, p)
@@ -274,7 +274,7 @@ def smooth_lattice(level: Level, length: float, some: np.ndarray) -> None:
 
 @kernel
 def lay_first(level: Level, first: int, direction: Vector, node: Vector, length: float, queue: np.ndarray) -> None:
-    """Lay a direction and a lattice at one post and carry them on from post to post, over all that are linked to it.
+    """Lay a direction and a lattice at one sample and carry them on from sample to sample, over all that are linked to it.
 
     queue : (P,) int64 scratch
     """
@@ -313,7 +313,7 @@ def lay_first(level: Level, first: int, direction: Vector, node: Vector, length:
 
 @kernel
 def put_lattice(level: Level, p: int, direction: Vector, node: Vector, length: float) -> None:
-    """Give a post a direction and a lattice that has a node at (or straight above) a place."""
+    """Give a sample a direction and a lattice that has a node at (or straight above) a place."""
     mean, normal = row(level.mean, p), row(level.normals, p)
     direction = flat(direction, normal)
     node = along(node, -dot(subtract(node, mean), normal), normal)
@@ -325,7 +325,7 @@ def put_lattice(level: Level, p: int, direction: Vector, node: Vector, length: f
 
 @kernel
 def hand_down(coarse: Level, owner: np.ndarray, fine: Level, length: float) -> None:
-    """Give the posts of a finer level the directions and the lattice of their posts of the coarser level."""
+    """Give the samples of a finer level the directions and the lattice of their samples of the coarser level."""
     for p in range(len(fine.mean)):
         q = owner[p]
         put_lattice(fine, p, row(coarse.direction, q), row(coarse.node, q), length)
@@ -335,9 +335,9 @@ def hand_down(coarse: Level, owner: np.ndarray, fine: Level, length: float) -> N
 def list_nodes(
     level: Level, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
 ) -> int:
-    """Choose posts whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
+    """Choose samples whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
 
-    order : (P,) int64 the order in which posts are asked
+    order : (P,) int64 the order in which samples are asked
     chosen : (P,) int64, filled
     scratch : (3, P) int64: whether chosen (0 at the start); mark (-1 at the start); queue
     """

@@ -25,12 +25,12 @@ FOUND = (
 )
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
 FOLD_FITS = 3
-POINTS_OF_FIRST_LOOK = 2  # points of a site that tell at first sight
+POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
 
 
 @kernel
 def bends_of_samples(surface: Surface, bends: np.ndarray) -> None:
-    """Least cosine between the normal of each site and those of its neighbours, (S,)."""
+    """Least cosine between the normal of each sample and those of its neighbours, (S,)."""
     for s in range(len(surface.mean)):
         least = 1.0
         n = row(surface.normals, s)
@@ -44,7 +44,7 @@ def bends_of_samples(surface: Surface, bends: np.ndarray) -> None:
 
 @kernel
 def mean_normal(surface: Surface, sample: int, place: Vector, radius: float) -> tuple[Vector, Vector]:
-    """Mean of the normals of the sites around a place, and the direction at right angles to it in which they differ most."""
+    """Mean of the normals of the samples around a place, and the direction at right angles to it in which they differ most."""
     count = flood(surface, sample, place, radius)
     n = (0.0, 0.0, 0.0)
     for i in range(count):
@@ -123,7 +123,7 @@ def jump_of(matrix: np.ndarray) -> float:
 
 @kernel
 def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer: np.ndarray) -> bool:
-    """Whether a few points around a site look as if they were folded by an angle of at least `least` [radian]."""
+    """Whether a few points around a sample look as if they were folded by an angle of at least `least` [radian]."""
     place = row(surface.mean, sample)
     n, c = mean_normal(surface, sample, place, radius)
     count = flood(surface, sample, place, radius + 0.5 * surface.step)
@@ -144,7 +144,7 @@ def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer
 def keep_folded(
     surface: Surface, seeds: np.ndarray, radius: float, least: float, apart: float, buffer: np.ndarray, note: np.ndarray
 ) -> int:
-    """Keep, in front, the seeds (sites) that look folded, of those nearer than `apart` to each other the first; returns their number.
+    """Keep, in front, the seeds (samples) that look folded, of those nearer than `apart` to each other the first; returns their number.
 
     note : (K,) int64 scratch, zero at the start
     """

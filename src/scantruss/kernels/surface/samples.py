@@ -1,7 +1,7 @@
-"""Sites: the scan at the scale of a member.
+"""Samples: the scan at the scale of a member.
 
-A site stands for the points around it: greedy disc thinning in the order of the points, so that the result does not depend on how
-the boxes lie; then each point belongs to the site nearest to it. Sites know their neighbours on the same sheet of the surface, which
+A sample stands for the points around it: greedy disc thinning in the order of the points, so that the result does not depend on how
+the boxes lie; then each point belongs to the sample nearest to it. Samples know their neighbours on the same sheet of the surface, which
 makes every later look-up safe against a second sheet nearby.
 """
 
@@ -20,7 +20,7 @@ TIE_TOLERANCE = 1e-6  # squared distances that differ by less are the same, as a
 def _sample_within(
     boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
 ) -> int:
-    """A site of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
+    """A sample of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
     item = boxes.first[slot_of(boxes, i, j, k)]
     while item >= 0:
         dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
@@ -41,15 +41,15 @@ def choose_samples(
     begin: int,
     count: int,
 ) -> tuple[int, int]:
-    """Choose sites from points[begin:] so that every point has one within `radius`; sites keep that distance.
+    """Choose samples from points[begin:] so that every point has one within `radius`; samples keep that distance.
 
     Parameters
     ----------
     points : (N, 3) array
-    boxes : SearchBoxes of the sites, about as large as `radius`
-    owner : (N,) int64, filled with a site within the radius of each point
-    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each site and where it is
-    begin, count : where to go on, and the sites so far
+    boxes : SearchBoxes of the samples, about as large as `radius`
+    owner : (N,) int64, filled with a sample within the radius of each point
+    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each sample and where it is
+    begin, count : where to go on, and the samples so far
 
     Returns
     -------
@@ -85,9 +85,9 @@ def choose_samples(
 def settle_points(
     points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, begin: int, end: int
 ) -> None:
-    """Give each point from `begin` to `end` - 1 to the nearest site: from its own (N,) on over the links, as long as one is nearer.
+    """Give each point from `begin` to `end` - 1 to the nearest sample: from its own (N,) on over the links, as long as one is nearer.
 
-    Of sites as near but for rounding, as regular points have many, the first. Then neither the site that a point had at first makes a
+    Of samples as near but for rounding, as regular points have many, the first. Then neither the sample that a point had at first makes a
     difference, nor where the scan lies.
     """
     for p in range(begin, end):
@@ -116,7 +116,7 @@ def settle_points(
 def group_points(
     points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, mean: np.ndarray
 ) -> None:
-    """Sort the points by site (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each site's points."""
+    """Sort the points by sample (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each sample's points."""
     samples = len(start) - 1
     for p in range(len(points)):
         start[owner[p] + 1] += 1
@@ -141,7 +141,7 @@ def group_points(
 def nearest_samples(
     positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
 ) -> None:
-    """The K nearest sites of each site from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
+    """The K nearest samples of each sample from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
 
     The search starts with `near`. Where there are not even six, the scan is sparse: the search goes on to twice as far.
     """
@@ -176,7 +176,7 @@ def nearest_samples(
 
 @kernel
 def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
-    """Let dense sites see the sparse ones that have them among their six nearest: the farthest neighbours make room.
+    """Let dense samples see the sparse ones that have them among their six nearest: the farthest neighbours make room.
 
     Otherwise a sparse part of the scan, linked one way only, would look like a gap from the dense part beside it.
     """
@@ -203,10 +203,10 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 def settle_samples(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
-    """Move each rough site (thickness over `rough`) to the plane of the sites linked to it within a wider radius.
+    """Move each rough sample (thickness over `rough`) to the plane of the samples linked to it within a wider radius.
 
-    Noise, plants and doubled layers thicker than a site leave a cloud of sites instead of a sheet; this gives the sheet back.
-    Sites far off the plane weigh less.
+    Noise, plants and doubled layers thicker than a sample leave a cloud of samples instead of a sheet; this gives the sheet back.
+    Samples far off the plane weigh less.
     """
     count = len(mean)
     stamp = np.full(count, -1, np.int64)

@@ -1,4 +1,4 @@
-"""The length field: the member length that is desired at each site of the scan, and between the sites."""
+"""The length field: the member length that is desired at each sample of the scan, and between the samples."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..geometry.boxes import SearchBoxes, put, search
 from ..geometry.vectors import Vector, dot, norm, row, subtract
 from .local_surface import PATCH, Surface, fit_patch, flood, walk
 
-BLEND_STEPS = 2.2  # sites farther than so many steps do not count at a place
+BLEND_STEPS = 2.2  # samples farther than so many steps do not count at a place
 SPREAD, ASIDE = (
     14.4,
     14.0,
-)  # of a curvature: by noise in the middle of a patch, and how it grows towards the rim of the scan
+)  # of a curvature: by noise in the middle of a patch, and how it grows towards the boundary of the scan
 NEAREST = 12  # given lengths that count at a place; the next one says how far away a length counts
 
 
 @kernel
 def length_at(surface: Surface, sample: int, place: Vector) -> float:
-    """Desired length at a place near a site: the mean of the site and its neighbours, the nearer the weightier."""
+    """Desired length at a place near a sample: the mean of the sample and its neighbours, the nearer the weightier."""
     sample = walk(surface, sample, place)
     reach = BLEND_STEPS * surface.step
     total = mean = 0.0
@@ -39,7 +39,7 @@ def length_at(surface: Surface, sample: int, place: Vector) -> float:
 
 @kernel
 def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> None:
-    """Desired length (P,) at places (P, 3) each of which lies near the one before; the site of the first is looked for in all."""
+    """Desired length (P,) at places (P, 3) each of which lies near the one before; the sample of the first is looked for in all."""
     sample, least = 0, np.inf
     for s in range(len(surface.mean)):
         d = subtract(row(surface.mean, s), row(places, 0))
@@ -53,7 +53,7 @@ def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> 
 
 @kernel
 def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: float) -> int:
-    """Shorten lengths (S,) that grow by more than `slope` per way over the links of the sites; returns the sweeps made.
+    """Shorten lengths (S,) that grow by more than `slope` per way over the links of the samples; returns the sweeps made.
 
     What is left is the largest field below the given one of which no place is longer than another by more than the slope times
     the way between them: the least of all lengths each grown by its way, whatever the order of the sweeps.
@@ -83,7 +83,7 @@ def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: f
 def blend_lengths(
     places: np.ndarray, given: np.ndarray, values: np.ndarray, boxes: SearchBoxes, reach: float, lengths: np.ndarray
 ) -> None:
-    """Blend lengths given at some places (K, 3) into one at each site (S,), by the inverse square of the distance (Shepard).
+    """Blend lengths given at some places (K, 3) into one at each sample (S,), by the inverse square of the distance (Shepard).
 
     Of more than `NEAREST` the nearest count, each less the nearer its distance comes to that of the next one, so that the blend
     has no steps (Franke and Little). `boxes` is empty, with room for K; `reach` the radius with which the first look-up begins.
@@ -137,7 +137,7 @@ def _bend(patch: np.ndarray) -> float:
 
 @kernel
 def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
-    """Choose sites (S,) bool no two of which are linked, so that every other one is linked to one of them; returns their number."""
+    """Choose samples (S,) bool no two of which are linked, so that every other one is linked to one of them; returns their number."""
     count = 0
     for s in range(len(neighbors)):
         free = True
@@ -153,7 +153,7 @@ def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
 
 @kernel
 def measure_bends(surface: Surface, samples: np.ndarray, found: np.ndarray, begin: int, end: int) -> None:
-    """Measure how much the scan bends at some sites (P,), from `begin` to `end` - 1.
+    """Measure how much the scan bends at some samples (P,), from `begin` to `end` - 1.
 
     found : (P, 2), filled: largest curvature without sign, and its standard deviation by the noise: that of least squares with the
     weights of a patch, which grows where the scan lies to one side only

@@ -1,4 +1,4 @@
-"""Noise and doubled layers: points go to the surface that those around them form, along its normal, so that rims stay."""
+"""Noise and doubled layers: points go to the surface that those around them form, along its normal, so that boundaries stay."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NARROW = 28.0  # points of the narrowest patch
 WIDEST = 2.0  # radius of the widest in that of the narrowest
 WORSE = 1.1  # how much worse than the narrowest a wider patch may fit
 SPARSE = 8  # of so many nearest one has a patch
-SOME = 0.02  # part of the points that must lie in layers, as a few seem to by chance
+SOME = 0.02  # part of the points that must lie in layers, as a few seem to at random
 FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
 BROAD = 3.0  # radius of a patch that holds as much of two layers, in the distance up to which they are looked for
 FOLLOWED = 0.5  # a narrower patch that fits so much better shows that the surface is one

@@ -1,6 +1,6 @@
-"""Stray points: measured points that belong to no surface, and loose small pieces.
+"""Outliers: measured points that belong to no surface, and loose small pieces.
 
-`surface.samples` calls this by itself where sites stand alone, `scan.clean.steps` where it was asked for.
+`surface.samples` calls this by itself where samples stand alone, `scan.clean.steps` where it was asked for.
 """
 
 from __future__ import annotations
@@ -11,37 +11,37 @@ from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts
 from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
 
-MOST_ROUNDS = 5  # strays near each other hide each other: after a round some more stand out
+MOST_ROUNDS = 5  # outliers near each other hide each other: after a round some more stand out
 FARTHEST_REACH = (
-    4.5  # reach, in those of which a quarter of the points have more, at which a point is a stray whatever is near it
+    4.5  # reach, in those of which a quarter of the points have more, at which a point is an outlier whatever is near it
 )
 CLOUD = 2.5  # ... where the points around form no surface
 THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
-MUCH = 0.1  # part of the points that form none from which on it is no cloud of strays but the scan
+MUCH = 0.1  # part of the points that form none from which on it is no cloud of outliers but the scan
 CLOUD_SHARE = 0.18  # share of the spread across the plane from which on points are no crease but a cloud
 SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
 CLOUD_NEIGHBORS = 4  # neighbours in a cloud from which on a point is looked at with it
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
 TOO_FAR = 1.1  # the same in member lengths
 LONELY = (
-    0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is a stray
+    0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 )
 DENSE = 4  # ... the reach of the densest but so many around it
 PATCH = 28  # points of the surface that a point may stand off
 STANDS_OFF = 5.0  # distance from it, in what is to be expected, from which on it does
 THIN = 0.01  # what is to be expected in any case, in radii of that surface
-LONE = 3e-4  # share of sites without neighbours from which on strays are looked for
+LONE = 3e-4  # share of samples without neighbours from which on outliers are looked for
 
 
 def has_outliers(neighbors: np.ndarray) -> bool:
-    """Whether so many sites stand alone that it is worth looking for strays; neighbors (S, K) as `kernels.nearest_samples`."""
+    """Whether so many samples stand alone that it is worth looking for outliers; neighbors (S, K) as `kernels.nearest_samples`."""
     return bool((neighbors[:, 5] < 0).mean() > LONE)
 
 
 def find_outliers(points: np.ndarray, distance: float, length: float = np.inf) -> np.ndarray:
-    """Return which points are strays (N,) bool.
+    """Return which points are outliers (N,) bool.
 
-    Points are strays if their reach is more than `distance` times that of their neighbours, if there are hardly any around them
+    Points are outliers if their reach is more than `distance` times that of their neighbours, if there are hardly any around them
     in what is a full neighbourhood for those, or if they stand off the surface by far more than the points there do.
 
     Parameters

@@ -26,7 +26,7 @@ Progress = Callable[[str, float], None]
 class Step:
     """What a step did."""
 
-    name: str  #: duplicates, near_duplicates, strays, pieces, layers, noise, spacing, normals
+    name: str  #: duplicates, near_duplicates, outliers, pieces, layers, noise, spacing, normals
     count: int  #: points it was done to
     words: str  #: one line for people
 

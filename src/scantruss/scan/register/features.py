@@ -1,7 +1,7 @@
 """Features of a scan: for every place, how the surface bends around it, told without regard to where the scan lies.
 
 Fast point feature histograms (Rusu, Blodow and Beetz 2009) with two changes that smooth shells need. The bins are quantiles of the
-values of all scans together: on a shell with little relief most values are near zero and equal bins would hold them all. And near and
+values of all scans together: on a shell with little working mesh most values are near zero and equal bins would hold them all. And near and
 far pairs are counted apart.
 """
 

@@ -37,7 +37,7 @@ class Fit:
 
     @property
     def score(self) -> float:
-        """What counts when poses are compared: agreeing places, less where others are against or it is by chance.
+        """What counts when poses are compared: agreeing places, less where others are against or it is at random.
 
         Surfaces that only cross are anywhere within `near`: the mean squared distance is then a third of its square.
         """

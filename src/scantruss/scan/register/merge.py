@@ -1,7 +1,7 @@
 """From scans in one frame to one cloud: one layer where they overlap, as dense as one scan.
 
 Where several scans see a spot, its points are moved across the surface to the mean of their layers, each scan counting less towards
-its rim, so that nothing jumps where one ends. Only the points of the scan that sees the spot farthest from its rim are kept.
+its boundary, so that nothing jumps where one ends. Only the points of the scan that sees the spot farthest from its boundary are kept.
 """
 
 from __future__ import annotations

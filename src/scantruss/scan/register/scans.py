@@ -39,7 +39,7 @@ class Scan:
 
 
 def typical_diagonal(clouds: Sequence[PointCloud]) -> float:
-    """Return the median over the scans of the diagonal of the box that holds all but a few stray points [scan unit]."""
+    """Return the median over the scans of the diagonal of the box that holds all but a few outliers [scan unit]."""
     sizes = []
     for cloud in clouds:
         lower, upper = bulk_of(cloud.points)

@@ -16,7 +16,7 @@ from ..normals import face_one_side, mean_normals
 
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
 FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out: it lies on no surface
-BOUNDARY_OFFSET = 0.32  # how far the mean of its neighbours lies aside of a place at the rim, in their reach
+BOUNDARY_OFFSET = 0.32  # how far the mean of its neighbours lies aside of a place at the boundary, in their reach
 PIECE = 0.02  # share of the places that a loose piece must have to vote for the side it faces
 
 
@@ -26,7 +26,7 @@ class View:
 
     points: np.ndarray  #: (S, 3) places [scan unit], in the frame of the scan
     normals: np.ndarray  #: (S, 3) unit normals, all to one side
-    on_boundary: np.ndarray  #: (S,) bool, places at the rim of what the scan sees
+    on_boundary: np.ndarray  #: (S,) bool, places at the boundary of what the scan sees
     boxes: SearchBoxes  #: of the places
     spacing: float  #: distance the places keep [scan unit]
     noise: float  #: typical distance of a place from the plane of its neighbours [scan unit]
@@ -106,7 +106,7 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
             points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
         ),
     )
-    far = 3.3 * spacing  # the kernel looks farther where there are few; here those are strays
+    far = 3.3 * spacing  # the kernel looks farther where there are few; here those are outliers
     off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
     neighbors[off] = -1
     return neighbors

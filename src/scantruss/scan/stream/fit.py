@@ -96,9 +96,9 @@ def _guess(path: Path) -> int:
 
 
 def read_thinned(names: Names, settings: Settings, progress: Progress | None = None) -> tuple[PointCloud, int]:
-    """Return a scan thinned to `settings.thin_spacing` with its rim kept, and how many points were read.
+    """Return a scan thinned to `settings.thin_spacing` with its boundary kept, and how many points were read.
 
-    The mean of a box has less noise than its points, but lies up to half a box inside at the rim; so the outermost points there stay.
+    The mean of a box has less noise than its points, but lies up to half a box inside at the boundary; so the outermost points there stay.
     """
     thinned = thin_scan(
         names,

@@ -32,11 +32,11 @@ TILES = 4  # for each worker at least, so that all end at about the same time
 class Thinned:
     """A scan with one point a box."""
 
-    #: (C, 3) float64 in the scan's own frame [unit], by the number of their boxes; then those at the rim
+    #: (C, 3) float64 in the scan's own frame [unit], by the number of their boxes; then those at the boundary
     points: np.ndarray
     read: int  #: points that were taken
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
-    boundary: int  #: points that stand for the rim, the last of `points`
+    boundary: int  #: points that stand for the boundary, the last of `points`
     unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
 
@@ -65,7 +65,7 @@ def thin_scan(
     keep : str
         "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
     boundary : bool
-        Also keep the outermost points of boxes at the rim.
+        Also keep the outermost points of boxes at the boundary.
     unit, selection
         As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
     workers : Workers, optional

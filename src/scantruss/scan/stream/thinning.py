@@ -57,7 +57,7 @@ class Thinning:
     spacing : float
         Side of a box [scan unit].
     boundary : bool
-        Keep the extremes of each box too, so that `points_at_boundary` can tell the rim.
+        Keep the extremes of each box too, so that `points_at_boundary` can tell the boundary.
     """
 
     def __init__(self, spacing: float, *, boundary: bool = False) -> None:
@@ -138,7 +138,7 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", bound
     keep : str
         "mean" of the points in a box, or the one "nearest" to it.
     boundary : bool
-        Also keep the outermost points of boxes at the rim.
+        Also keep the outermost points of boxes at the boundary.
     """
     thinning = Thinning(spacing, boundary=boundary)
     thinning.add(points)
@@ -165,9 +165,9 @@ def means_of(rows: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def points_at_boundary(rows: Rows, spacing: float) -> np.ndarray:
-    """Return the points that stand for the rim of the scan, each once, (R, 3) [scan unit].
+    """Return the points that stand for the boundary of the scan, each once, (R, 3) [scan unit].
 
-    The mean of a box at the rim lies up to half a box inside; its outermost points do not.
+    The mean of a box at the boundary lies up to half a box inside; its outermost points do not.
     """
     kept = np.zeros((len(rows.rows), 6), np.int64)
     counters = np.array([len(rows.rows), 0, 0])
