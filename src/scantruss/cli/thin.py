@@ -81,11 +81,9 @@ def thin(values: Namespace) -> None:
 
 def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:
     """Return the workers of the command line, and say who they are where they are several."""
-    from ..runtime.cluster import NEEDS_DASK, Processes, open_workers
+    from ..runtime.cluster import open_workers
 
     workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
-    if isinstance(workers, Processes):
-        bars.note(f"{workers.words}; a cluster {NEEDS_DASK}")
-    elif workers.count > 1 or values.scheduler:
+    if not workers.alone:
         bars.note(workers.words)
     return workers
