@@ -20,8 +20,9 @@ from ..formats.paths import files_of, name_of_files
 from ..formats.reading import PACKED, read_points
 from .chunks import Reading, count_unread, read_chunks
 from .opened import open_scan
+from .source import Source
 from .thin_scan import Share, thin_scan
-from .tiles import Source, find_source, tiles_of
+from .tiles import find_source, tiles_of
 
 if TYPE_CHECKING:
     from ...settings import Settings

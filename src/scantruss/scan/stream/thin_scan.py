@@ -19,8 +19,9 @@ from ..formats.paths import name_of_files
 from ..formats.reading import add_counts, left_out_note
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
+from .source import Source, Tile
 from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
-from .tiles import TILE, Source, Tile, tiles_of
+from .tiles import TILE, tiles_of
 
 KEEP = ("mean", "nearest")
 SMALLEST = 500_000  # points of a tile that is worth a worker
