@@ -48,8 +48,8 @@ def add_workers(parser: Parser) -> None:
 
 def thin(values: Namespace) -> None:
     """Thin a scan and write it."""
-    from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
     from ..scan.formats.writing import write_points
     from ..scan.stream.opened import open_scan
     from ..scan.stream.thin_scan import thin_open_scan
