@@ -36,7 +36,7 @@ import numpy as np
 if __name__ == "__main__":
     name, spacing, workers, keep, rim = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5] == "rim"
     for way in ("mean", "nearest"):
-        thin_points(np.eye(3), 1.0, keep=way, rim=True)  # compiled beforehand
+        thin_points(np.eye(3), 1.0, keep=way, boundary=True)  # compiled beforehand
     with open_workers(workers) as crew:
         begun = time.perf_counter()
         found = thin_scan([name], spacing, keep=keep, boundary=rim, workers=crew)

@@ -9,7 +9,7 @@ import numpy as np
 
 from scantruss.grid.grid import Grid
 
-from .measure import right_topology
+from ..measure import right_topology
 
 if TYPE_CHECKING:
     from shapes import Shape

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
+from ..page import FILE, Section
 from . import tables
 from .clouds import Cloud
-from .page import FILE, Section
 from .plots import draw
 from .runs import REPEATS, Row, all_rows
 from .ways import WAYS, Way

@@ -70,7 +70,7 @@ def warm_ours(effort: str) -> None:
 
 def spline(scan: Scan) -> Mesh:
     """The paper's own comparison: a bicubic B-spline surface, then our front on it; the choice of knots is not timed."""
-    from . import table3
+    from .. import table3
 
     local = table3.frame_of(scan.points)[0]
     triangles_over = np.ptp(local[0]) * np.ptp(local[1])

@@ -1,9 +1,49 @@
-"""From a 3D scan straight to a free-form grid truss (Ding, Xu and Luo 2017)."""
+"""From a 3D scan straight to a free-form grid truss (Ding, Xu and Luo 2017).
+
+In one call: `grid_from_scan(path, settings)` or `grid_from_points(points, settings)`, with `Settings(length=...)`; then `write`.
+Step by step: `read_points` (and `clean_points`), `sample_surface`, `find_boundary`, `find_constraints`, `orientation_fields`,
+`advance_fronts`, `optimize_fronts`. A `Grid` has nodes, triangles, members, `quality` and, if it was checked, a `certificate`.
+`print_model` writes a solid for printing. What cannot be done raises a `ScanTrussError`: `InputError`, `FormatError`, `FrontError`
+or `CertificateError`.
+"""
 
 from __future__ import annotations
 
 import importlib
-from typing import Any
+import sys
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # a name is imported when it is first used, so that the command line starts quickly
+    from .boundary.find import Boundary as Boundary
+    from .boundary.find import find_boundary as find_boundary
+    from .candidates import advance_fronts as advance_fronts
+    from .candidates import optimize_fronts as optimize_fronts
+    from .check.certify import certify as certify
+    from .constraints.find import find_constraints as find_constraints
+    from .errors import CertificateError as CertificateError
+    from .errors import FormatError as FormatError
+    from .errors import FrontError as FrontError
+    from .errors import InputError as InputError
+    from .errors import ScanTrussError as ScanTrussError
+    from .export.formats import write as write
+    from .export.json import read_grid as read_grid
+    from .export.solid import print_model as print_model
+    from .front.advance import advance_front as advance_front
+    from .front.orientation_field import orientation_fields as orientation_fields
+    from .grid.certificate import Certificate as Certificate
+    from .grid.grid import Grid as Grid
+    from .grid.quality import GridQuality as GridQuality
+    from .grid.topology import Topology as Topology
+    from .improve.optimize import optimize_grid as optimize_grid
+    from .pipeline import grid_from_points as grid_from_points
+    from .pipeline import grid_from_scan as grid_from_scan
+    from .scan.clean.steps import CleanCloud as CleanCloud
+    from .scan.clean.steps import clean_points as clean_points
+    from .scan.cloud import PointCloud as PointCloud
+    from .scan.formats.reading import read_points as read_points
+    from .settings import Settings as Settings
+    from .surface.samples import sample_surface as sample_surface
 
 __version__ = "0.1.0"
 
@@ -18,7 +58,7 @@ _HOMES = {
     "find_constraints": "constraints.find",
     "orientation_fields": "front.orientation_field",
     "advance_front": "front.advance", "advance_fronts": "candidates", "optimize_fronts": "candidates",
-    "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.quality",
+    "Grid": "grid.grid", "GridQuality": "grid.quality", "Topology": "grid.topology",
     "optimize_grid": "improve.optimize",
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
@@ -33,7 +73,15 @@ def __getattr__(name: str) -> Any:
     """Import a public name on first use, so that the command line starts quickly."""
     if name not in _HOMES:
         raise AttributeError(f"module 'scantruss' has no attribute {name!r}")
+    _show_in_notebooks()
     return getattr(importlib.import_module(f"scantruss.{_HOMES[name]}"), name)
+
+
+@cache
+def _show_in_notebooks() -> None:
+    """Show grids and clouds as pictures where a notebook or IPython runs us."""
+    if "IPython" in sys.modules and (shell := sys.modules["IPython"].get_ipython()) is not None:
+        importlib.import_module("scantruss.report.notebook").show_pictures(shell)
 
 
 def __dir__() -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Certificate, Fault, Place, place_of
-from ..grid.quality import labels, pinched_nodes
+from ..grid.topology import labels, pinched_nodes
 from .crossings import MOST_CROSSINGS
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..grid.quality import labels
+from ..grid.topology import labels
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid

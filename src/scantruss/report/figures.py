@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import words_of_place
-from ..grid.quality import labels
+from ..grid.topology import labels
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary

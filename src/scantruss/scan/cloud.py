@@ -34,6 +34,13 @@ class PointCloud:
     name: str = ""  #: file the points came from
     notes: tuple[str, ...] = ()  #: what a user should know of how it was read
 
+    def __repr__(self) -> str:
+        """Say how many points there are and how far they reach."""
+        sides = " x ".join(f"{side:.4g}" for side in self.bounds[1] - self.bounds[0])
+        unit = f" {self.unit}" if self.unit else ""
+        name = f"{self.name}: " if self.name else ""
+        return f"PointCloud({name}{len(self.points):,} points, {sides}{unit})"
+
     @cached_property
     def bounds(self) -> Bounds:
         """Smallest and largest coordinates, (3,) each [scan unit]."""

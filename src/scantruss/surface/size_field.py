@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ SAMPLES_PER_THREAD = 200  # fewest sites for a thread of their own
 class Wish:
     """What the settings say of the lengths, in the frame of the cloud."""
 
-    field: str | tuple[tuple[float, float, float, float], ...]
+    field: str | Sequence[Sequence[float]]
     length: float  #: the shortest [scan unit]
     origin: tuple[float, float, float]  #: of the cloud, which the given places have not [scan unit]
 

@@ -17,7 +17,18 @@ from ...grid.grid import Grid
 from ...runtime.files import check_place, write_files
 from ...scan.cloud import PointCloud
 from .camera import choose_camera
-from .strokes import INK, PAPER, Strokes, dot_strokes, framed, grid_strokes, look, shadow_strokes, solid_strokes
+from .strokes import (
+    INK,
+    PAPER,
+    Strokes,
+    cloud_strokes,
+    dot_strokes,
+    framed,
+    grid_strokes,
+    look,
+    shadow_strokes,
+    solid_strokes,
+)
 
 SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS = (2400, 800)  #: of three panels [pixel]
@@ -42,6 +53,11 @@ def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool
         camera = framed(grid.nodes, grid.triangles, camera, (90, 90, wide - 90, tall - 80))
         strokes = grid_strokes(grid, cloud, look(grid.nodes, grid.triangles, camera, SIZE))
     return _paint(SIZE, strokes, [(wide / 2, 40, caption_of(grid), 15)] if caption else [])
+
+
+def encode_cloud(cloud: PointCloud) -> bytes:
+    """Return a picture of a scan, PNG: its points seen from obliquely above."""
+    return _paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
 
 
 def caption_of(grid: Grid) -> str:

@@ -203,6 +203,21 @@ def dot_strokes(cloud: PointCloud, grid: Grid, view: View, *, over: bool) -> Str
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
 
 
+def cloud_strokes(cloud: PointCloud, size: tuple[int, int]) -> Strokes:
+    """Return the points of a scan as dots seen from obliquely above, the higher the lighter, in a picture of a size [pixel]."""
+    points = cloud.points[:: max(len(cloud.points) // MOST_POINTS[False], 1)]
+    turn, tilt = np.radians(-35.0), np.radians(35.0)
+    across = np.cos(turn) * points[:, 0] - np.sin(turn) * points[:, 1]
+    depth = np.sin(turn) * points[:, 0] + np.cos(turn) * points[:, 1]
+    flat = np.column_stack([across, np.sin(tilt) * depth + np.cos(tilt) * points[:, 2]])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    scale = 0.9 * float((np.array(size) / np.maximum(high - low, 1e-300)).min())
+    flat = (flat - 0.5 * (low + high)) * scale + 0.5 * np.array(size)
+    height = points[:, 2] - points[:, 2].min()
+    colour = _mix(CLAY, height / max(float(height.max()), 1e-300), 0.8)
+    return Strokes(-depth, _dots(flat), np.zeros_like(colour), colour, np.full(len(flat), 2.0))
+
+
 def _dots(flat: np.ndarray) -> np.ndarray:
     """Return (N, 3, 2) lines so short that their round ends make a dot; a line of no length is not painted."""
     shape: np.ndarray = flat[:, None] + np.array([[-0.05, 0.0], [0.05, 0.0], [0.05, 0.0]])

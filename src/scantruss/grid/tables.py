@@ -1,0 +1,106 @@
+"""The tables that follow from the nodes and triangles of a grid."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..kernels.mesh import figures
+
+
+class GridTables:
+    """Edges, boundary loops, lengths and angles of a grid, each computed when it is first asked for."""
+
+    nodes: np.ndarray  #: (V, 3) float64 [scan unit]
+    triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
+    lines: np.ndarray  #: (K, 2) members along fixed lines, ridges
+    deviation: np.ndarray | None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
+    desired: np.ndarray | None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
+    unit: str
+
+    @cached_property
+    def _half_edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        key = low * max(len(self.nodes), 1) + high
+        _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+        return ends, np.stack([low[first], high[first]], axis=1), inverse.ravel()
+
+    @property
+    def measured_deviation(self) -> np.ndarray:
+        """(K,) distances from the scan of all nodes that are not over closed holes; none before they are measured."""
+        return np.zeros(0) if self.deviation is None else self.deviation[~np.isnan(self.deviation)]
+
+    @property
+    def half_edge_edges(self) -> np.ndarray:
+        """(3 T,) the edge of each half-edge; half-edge k of triangle t (from its node k on) stands at k T + t."""
+        return self._half_edges[2]
+
+    @cached_property
+    def edge_uses(self) -> np.ndarray:
+        """(E,) the number of triangles at each member."""
+        return np.bincount(self.half_edge_edges, minlength=len(self.edges))
+
+    @cached_property
+    def edge_on_line(self) -> np.ndarray:
+        """(E,) bool, the members along fixed lines and ridges."""
+        count = max(len(self.nodes), 1)
+        low, high = np.sort(self.lines, axis=1).T
+        found: np.ndarray = np.isin(self.edges[:, 0] * count + self.edges[:, 1], low * count + high)
+        return found
+
+    @property
+    def edges(self) -> np.ndarray:
+        """(E, 2) the members, smaller node first, sorted."""
+        return self._half_edges[1]
+
+    @cached_property
+    def edge_triangles(self) -> np.ndarray:
+        """(E, 2) the triangles at each member, -1 where the boundary is; (E, 2) needs a manifold grid."""
+        _, edges, inverse = self._half_edges
+        triangle = np.tile(np.arange(len(self.triangles)), 3)
+        order = np.argsort(inverse, kind="stable")
+        count = self.edge_uses
+        start = np.cumsum(count) - count
+        table = np.full((len(edges), 2), -1, np.int64)
+        table[:, 0] = triangle[order[start]]
+        two = count > 1
+        table[two, 1] = triangle[order[start[two] + 1]]
+        return table
+
+    @cached_property
+    def boundary_loops(self) -> list[np.ndarray]:
+        """Ordered node ids of each boundary loop, in the direction of its triangles."""
+        ends, _, inverse = self._half_edges
+        single = self.edge_uses[inverse] == 1
+        following: dict[int, list[int]] = {}
+        for a, b in ends[single].tolist():
+            following.setdefault(a, []).append(b)
+        loops = []
+        for start in sorted(following):
+            while following.get(start):
+                loop, node = [start], following[start].pop()
+                while node != start and following.get(node):
+                    loop.append(node)
+                    node = following[node].pop()
+                loops.append(np.array(loop, np.int64))
+        return loops
+
+    @cached_property
+    def lengths(self) -> np.ndarray:
+        """(E,) length of each member [scan unit]."""
+        return np.linalg.norm(self.nodes[self.edges[:, 0]] - self.nodes[self.edges[:, 1]], axis=1)
+
+    @cached_property
+    def angles(self) -> np.ndarray:
+        """(T, 3) angle of each triangle at each of its nodes [degree]."""
+        angles = np.empty((len(self.triangles), 3))
+        figures.angles_of(self.nodes, self.triangles, angles)
+        return angles
+
+    def stretches(self, length: float) -> np.ndarray:
+        """(E,) length of each member over the desired one: the mean of that at its nodes, or `length` where it is the same for all."""
+        if self.desired is None:
+            return self.lengths / length
+        return self.lengths / self.desired[self.edges].mean(axis=1)

@@ -1,0 +1,40 @@
+"""What a grid, a cloud and settings say of themselves, and their pictures in notebooks."""
+
+import numpy as np
+from shapes import make
+from small_grids import dome
+
+import scantruss as st
+from scantruss.report.notebook import cloud_picture, grid_picture, show_pictures
+
+
+def test_they_say_in_one_line_what_they_are():
+    grid, points = dome().replace(unit="mm"), np.random.default_rng(0).uniform(0, [10.0, 20.0, 5.0], (3000, 3))
+    said = repr(grid)
+    assert f"{len(grid.nodes):,} nodes" in said and f"{len(grid.edges):,} members of" in said and " mm" in said
+    cloud = repr(st.PointCloud.from_array(points, unit="m", name="roof.ply"))
+    assert cloud.startswith("PointCloud(roof.ply: 3,000 points, ") and cloud.endswith(" m)")
+    assert repr(st.Settings(length=4.7, effort="best")) == "Settings(length=4.7, effort='best')"
+    assert all("\n" not in words and len(words) < 100 for words in (said, cloud))
+
+
+def test_notebooks_show_a_picture_of_each():
+    kept = {}
+
+    class Formatter:
+        def for_type_by_name(self, module, name, function):
+            kept[module, name] = function
+
+    class Shell:
+        class display_formatter:  # noqa: N801
+            formatters = {"image/png": Formatter()}  # noqa: RUF012
+
+    show_pictures(Shell())
+    for value, picture in (
+        (dome(), grid_picture),
+        (st.PointCloud.from_array(make("cloth", 5000).points), cloud_picture),
+    ):
+        kind = type(value)
+        assert kept[kind.__module__, kind.__name__] is picture
+        assert picture(value).startswith(b"\x89PNG")
+    assert grid_picture(dome().replace(triangles=np.zeros((0, 3), np.int64))) is None

@@ -1,0 +1,66 @@
+"""The public face: every name has its type for whoever writes against it, and is imported when it is first used."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import scantruss as st
+
+ROOT = Path(__file__).resolve().parents[1]
+STEPS = """
+import scantruss as st
+
+cloud = st.read_points("shell.ply", unit="mm")
+settings = st.Settings(length=4.7, fixed=[(0, 0, 12)])
+surface = st.sample_surface(cloud, settings)
+surface, boundary = st.find_boundary(surface, settings)
+boundary, constraints = st.find_constraints(surface, boundary, settings)
+fields = st.orientation_fields(surface, boundary, settings)
+fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
+grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)
+st.write(grid, "grid.obj")
+reveal_type(st.Settings)
+reveal_type(grid)
+reveal_type(grid.quality.length_mean)
+reveal_type(grid.certificate)
+"""
+
+
+def typed_names():
+    """Names that type checkers find in the package."""
+    tree = ast.parse((ROOT / "src" / "scantruss" / "__init__.py").read_text(encoding="utf-8"))
+    guarded = [node for node in tree.body if isinstance(node, ast.If)]
+    return {alias.asname for node in ast.walk(guarded[0]) if isinstance(node, ast.ImportFrom) for alias in node.names}
+
+
+def test_each_public_name_is_there_and_has_a_type():
+    assert typed_names() == set(st.__all__) - {"__version__"}
+    for name in st.__all__:
+        value = getattr(st, name)
+        assert isinstance(value, str) or value.__doc__, f"{name} has no docstring"
+    assert dir(st) == st.__all__
+
+
+def test_other_names_are_refused():
+    with pytest.raises(AttributeError, match="has no attribute 'no_such_name'"):
+        st.no_such_name  # noqa: B018
+
+
+@pytest.mark.parametrize("part", ["steps", "examples"])
+def test_what_a_user_writes_is_checked_strictly(part, tmp_path):
+    """The steps of the README, and the examples: no Any comes out of the package."""
+    pytest.importorskip("mypy")
+    path = tmp_path / "user.py"
+    path.write_text(STEPS)
+    files = [str(path)] if part == "steps" else [str(file) for file in sorted((ROOT / "examples").glob("0*.py"))]
+    words = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), "--no-incremental"]
+    words += ["--follow-imports=silent", "--config-file", str(ROOT / "pyproject.toml")]
+    found = subprocess.run([*words, *files], capture_output=True, text=True, cwd=ROOT / "examples")
+    assert found.returncode == 0, found.stdout
+    if part == "steps":
+        revealed = [line.split("Revealed type is ")[1] for line in found.stdout.splitlines() if "Revealed type" in line]
+        assert len(revealed) == 4 and not any("Any" in line and "Grid" not in line for line in revealed), revealed
+        assert "scantruss.grid.grid.Grid" in revealed[1] and "float" in revealed[2]
