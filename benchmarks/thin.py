@@ -39,7 +39,7 @@ if __name__ == "__main__":
         thin_points(np.eye(3), 1.0, keep=way, boundary=True)  # compiled beforehand
     with open_workers(workers) as crew:
         begun = time.perf_counter()
-        found = thin_scan([name], spacing, keep=keep, rim=rim, workers=crew)
+        found = thin_scan([name], spacing, keep=keep, boundary=rim, workers=crew)
         spent = time.perf_counter() - begun
     np.save(sys.argv[6], found.points)
     print(found.read, len(found.points), spent, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

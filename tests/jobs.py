@@ -15,15 +15,6 @@ def refuse(job, shared):
     raise FormatError(f"job {job} is refused")
 
 
-def die_once(job, folder):
-    """Die in the first worker that is asked for job 2."""
-    marker = Path(folder) / "died"
-    if job == 2 and not marker.exists():
-        marker.touch()
-        os._exit(1)
-    return job, os.getpid()
-
-
 def leave_once(job, folder):
     """End the first worker of a cluster within this process that is asked for job 2."""
     from distributed import get_worker
@@ -37,7 +28,7 @@ def leave_once(job, folder):
     return job
 
 
-def die_always(job, shared):
+def die(job, shared):
     os._exit(1)
 
 

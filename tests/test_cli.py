@@ -263,14 +263,14 @@ def test_a_full_disk_leaves_nothing_behind(ready, capsys):
 
 @pytest.mark.parametrize(("stop", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_stopped_run_leaves_nothing_behind(ready, capsys, monkeypatch, stop, status):
-    monkeypatch.setattr("scantruss.report.saving.SaveTogether.json", lambda *_: os.kill(os.getpid(), stop))
+    monkeypatch.setattr("scantruss.runtime.files.SaveTogether.json", lambda *_: os.kill(os.getpid(), stop))
     refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=status)
 
 
 def test_a_failing_run_keeps_the_files_of_the_run_before(ready, capsys, monkeypatch):
     (ready / "a.obj").write_text("before")
     error = FrontError("the front stopped", where=(1.0, 2.0, 3.0))
-    monkeypatch.setattr("scantruss.report.saving.SaveTogether.json", lambda *_: (_ for _ in ()).throw(error))
+    monkeypatch.setattr("scantruss.runtime.files.SaveTogether.json", lambda *_: (_ for _ in ()).throw(error))
     assert "near 1, 2, 3" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH)
     assert (ready / "a.obj").read_text() == "before"
 

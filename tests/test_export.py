@@ -5,6 +5,7 @@ import io
 import json
 import os
 import tempfile
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, rich, two
 
 import scantruss as st
 from scantruss.export.formats import FORMATS, check_output
-from scantruss.runtime.files import write_files
+from scantruss.runtime.files import SaveTogether, write_files
 
 GRIDS = [fan, icosahedron, two_pieces, rich, dome]
 NOBODY = 65534  # user
@@ -318,6 +319,28 @@ def test_a_link_stays_a_link(tmp_path):
     (tmp_path / "a.obj").symlink_to(tmp_path / "true.obj")
     write_files({tmp_path / "a.obj": b"new"})
     assert (tmp_path / "a.obj").is_symlink() and (tmp_path / "true.obj").read_bytes() == b"new"
+
+
+def test_a_link_to_another_folder_is_written_through_with_nothing_left_beside_either(tmp_path):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    (tmp_path / "here" / "a.obj").symlink_to(tmp_path / "there" / "true.obj")
+    with SaveTogether() as save:
+        save.beside(tmp_path / "here" / "a.obj").write_bytes(b"new")
+        save.json(tmp_path / "here" / "b.json", {})
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["a.obj", "b.json", "here", "there", "true.obj"]
+    assert (tmp_path / "here" / "a.obj").is_symlink() and (tmp_path / "there" / "true.obj").read_bytes() == b"new"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_stays_a_pipe_and_gets_the_file(tmp_path):
+    os.mkfifo(tmp_path / "a.obj")
+    received = []
+    reader = threading.Thread(target=lambda: received.append((tmp_path / "a.obj").read_bytes()))
+    reader.start()
+    write_files({tmp_path / "a.obj": b"new"})
+    reader.join()
+    assert received == [b"new"] and (tmp_path / "a.obj").is_fifo() and len(list(tmp_path.iterdir())) == 1
 
 
 def test_files_get_the_usual_permissions(tmp_path):

@@ -11,7 +11,6 @@ import pytest
 from steps import boundary_of
 
 import scantruss as st
-from scantruss.cli import thin
 from scantruss.cli.main import main
 from scantruss.cli.options import size_of_memory
 from scantruss.runtime.memory import available_memory
@@ -298,16 +297,13 @@ def test_a_sweep_into_a_file_is_refused(place, capsys):
     assert "is a file" in refused(capsys, "sweep", "scan.npy", "--length", "5", "-o", "scan.npy")
 
 
-def test_several_workers_are_announced(capsys, monkeypatch):
-    from argparse import Namespace
-
-    from scantruss.report.terminal import Bars
-    from scantruss.runtime import cluster as crew
-
-    monkeypatch.setattr(crew, "has_dask", lambda: False)
-    with Bars() as bars:
-        thin.workers_of(Namespace(workers=3, scheduler=""), bars, None)
-    assert "on 3 processes of this machine; a cluster needs dask" in capsys.readouterr().out
+def test_several_workers_are_announced_and_change_no_byte(place, capsys):
+    words = ["thin", "scan.npy", "--spacing", "2", "--keep", "nearest", "--boundary"]
+    assert main([*words, "-o", "alone.npy", "--workers", "1"]) == 0
+    assert "processes" not in capsys.readouterr().out
+    assert main([*words, "-o", "shared.npy", "--workers", "2"]) == 0
+    assert "on 2 processes of this machine" in capsys.readouterr().out
+    assert (place / "shared.npy").read_bytes() == (place / "alone.npy").read_bytes()
 
 
 def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(place, capsys):

@@ -18,7 +18,7 @@ from scantruss.scan.cloud import measure_spacing
 from scantruss.scan.formats.e57_pages import checksums, to_pages
 from scantruss.scan.formats.las_writer import las_scale
 from scantruss.scan.formats.reading import read_points
-from scantruss.scan.formats.writing import WRITERS, check_cloud_output, write_points
+from scantruss.scan.formats.writing import WRITERS, Cloud, check_cloud_output, write_points
 
 UTM = np.array([500_000.0, 4_500_000.0, 100.0])
 POINTS = plate(500) + UTM + np.random.default_rng(3).random((500, 3)) * 1e-4  # more digits than a millimetre
@@ -94,6 +94,24 @@ def test_what_las_cannot_hold_is_refused_or_given_a_coarser_step() -> None:
     pair = np.array([[0, 0, 0], [1e-7, 0, 0], [0, 1e-7, 0]])
     with pytest.raises(InputError, match="LAS cannot hold points"):
         las_scale(np.concatenate([pair + [x, y, 0] for x in (0, 3e5, 6e5) for y in (0, 3e5)]))
+
+
+@pytest.mark.parametrize("suffix", sorted(WRITERS))
+def test_a_cloud_that_cannot_be_written_whole_leaves_the_one_before(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"before")
+    whole = WRITERS[suffix]
+
+    def on_a_full_disk(path: Path, cloud: Cloud) -> None:
+        whole(path, cloud)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(WRITERS, suffix, on_a_full_disk)
+    with pytest.raises(FormatError, match=r"cannot write .*: No space left on device"):
+        write_points(path, POINTS)
+    assert list(tmp_path.iterdir()) == [path] and path.read_bytes() == b"before"
 
 
 def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:

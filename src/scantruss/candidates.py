@@ -17,6 +17,7 @@ from .front.orientation_field import Field, FieldStart
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .runtime.parallel import processors
+from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
 from .surface.samples import sample_surface
 from .surface.scratch import with_own_scratch
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from .settings import Settings
     from .surface.samples import SurfaceSamples
 
-Progress = Callable[[str, float], None]
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 
@@ -14,13 +13,12 @@ from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
+from .runtime.progress import Progress
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
 from .settings import Settings
 from .surface.samples import sample_surface
-
-Progress = Callable[[str, float], None]  #: progress(stage, share done); may raise to cancel
 
 
 def grid_from_points(

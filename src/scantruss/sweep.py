@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import FrontError, InputError
 from .pipeline import grid_from_cloud
+from .runtime.progress import Progress
 
 if TYPE_CHECKING:
     from .runtime.cluster import Workers
     from .scan.cloud import PointCloud
     from .settings import Settings
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface, walk
 from ..kernels.surface.size_field import lengths_along
 from ..runtime.parallel import in_parts
+from ..runtime.progress import Progress
 from ..scan.normals import check_two_sided
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with, with_whole_boundary
@@ -23,8 +24,6 @@ from .curves import cut_spikes, length_around, resample, smooth_turns
 from .holes import fill_holes
 from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
-
-Progress = Callable[[str, float], None]
 
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
 SPIKES = (0.6, 0.3, 0.16)

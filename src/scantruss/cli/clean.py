@@ -69,8 +69,8 @@ def clean_parser() -> Parser:
 
 def clean(values: Namespace) -> None:
     """Clean a scan and save it."""
-    from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
     from ..scan.formats.writing import write_points
     from .options import READING, settings_of
 

@@ -43,7 +43,7 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
     from ..export.formats import write
     from ..export.solid import print_model
     from ..report.figures import report_of
-    from ..report.saving import SaveTogether
+    from ..runtime.files import SaveTogether
 
     names = ("grid.obj", "grid.json", "grid.png", "grid.settings.json", "report.json", "model.3mf")
     with SaveTogether() as save:

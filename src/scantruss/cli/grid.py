@@ -50,8 +50,8 @@ def grid_parser() -> Parser:
 def grid(values: Namespace) -> None:
     """Make a grid and save it with its settings."""
     from ..report.figures import report_of
-    from ..report.saving import SaveTogether
     from ..report.terminal import Bars
+    from ..runtime.files import SaveTogether
     from .options import settings_of
 
     settings = settings_of(values)

@@ -29,9 +29,8 @@ def print_parser() -> Parser:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
-    from ..report.saving import SaveTogether
     from ..report.terminal import print_lines
-    from ..runtime.files import check_place
+    from ..runtime.files import SaveTogether, check_place
 
     out = check_place(values.out, (".3mf", ".stl"))
     if not Path(values.grid).exists():

@@ -43,8 +43,8 @@ def splice_parser() -> Parser:
 
 def splice(values: Namespace) -> None:
     """Splice scans and save the whole with its poses."""
-    from ..report.saving import SaveTogether
     from ..report.terminal import Bars
+    from ..runtime.files import SaveTogether
     from ..scan.formats.writing import write_points
 
     files = scan_files(values.scans)

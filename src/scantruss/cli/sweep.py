@@ -151,7 +151,7 @@ def _save(
     """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
     from ..export.drawing.sheet import encode_sheet
     from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
-    from ..report.saving import SaveTogether
+    from ..runtime.files import SaveTogether
 
     with SaveTogether() as save:
         save.make_folder(folder)

@@ -48,8 +48,8 @@ def add_workers(parser: Parser) -> None:
 
 def thin(values: Namespace) -> None:
     """Thin a scan and write it."""
-    from ..report.saving import SaveTogether
     from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
     from ..scan.formats.writing import write_points
     from ..scan.stream.opened import open_scan
     from ..scan.stream.thin_scan import thin_open_scan
@@ -81,11 +81,9 @@ def thin(values: Namespace) -> None:
 
 def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:
     """Return the workers of the command line, and say who they are where they are several."""
-    from ..runtime.cluster import NEEDS_DASK, Processes, open_workers
+    from ..runtime.cluster import open_workers
 
     workers = open_workers(count if values.workers is None else values.workers, values.scheduler)
-    if isinstance(workers, Processes):
-        bars.note(f"{workers.words}; a cluster {NEEDS_DASK}")
-    elif workers.count > 1 or values.scheduler:
+    if not workers.alone:
         bars.note(workers.words)
     return workers

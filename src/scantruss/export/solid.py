@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,35 +12,10 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from ..runtime.files import check_place, write_files
-from .solid_files import encode_3mf, encode_stl
+from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
 PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
-
-
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """A closed surface around the members and nodes of a grid."""
-
-    vertices: np.ndarray  #: (N, 3) float64 [printed unit], relative to the grid's origin
-    triangles: np.ndarray  #: (M, 3) int64, anticlockwise seen from outside
-    unit: str  #: unit of the grid, "" where it is not known
-    volume: float  #: [printed unit cubed]
-    components: int  #: bodies that do not touch
-    genus: int  #: openings one could pull a thread through, of all components together
-    expected_components: int  #: pieces of the grid
-    expected_genus: int  #: E - V + 1 summed over the pieces of the grid
-
-    @property
-    def notes(self) -> list[str]:
-        """What a user should know of it, in words; empty where the solid has every opening of the grid."""
-        lines = []
-        if self.components < self.expected_components:
-            lines.append(f"pieces of the grid touch: {self.expected_components} pieces became {self.components} bodies")
-        if (lost := self.expected_genus - self.genus) != 0:
-            what = f"{abs(lost)} of {self.expected_genus} openings are {'closed' if lost > 0 else 'added'}"
-            lines.append(f"{what} where parts touch; thinner members and nodes keep the openings of the grid")
-        return lines
 
 
 def print_model(

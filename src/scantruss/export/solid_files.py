@@ -11,15 +11,12 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from .. import __version__
 from ..errors import FormatError
-
-if TYPE_CHECKING:
-    from .solid import Solid
 
 #: 3MF's words for our units; millimeter where it is not known
 UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
@@ -52,6 +49,31 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <build><item objectid="1"/></build>
 </model>
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed surface around the members and nodes of a grid."""
+
+    vertices: np.ndarray  #: (N, 3) float64 [printed unit], relative to the grid's origin
+    triangles: np.ndarray  #: (M, 3) int64, anticlockwise seen from outside
+    unit: str  #: unit of the grid, "" where it is not known
+    volume: float  #: [printed unit cubed]
+    components: int  #: bodies that do not touch
+    genus: int  #: openings one could pull a thread through, of all components together
+    expected_components: int  #: pieces of the grid
+    expected_genus: int  #: E - V + 1 summed over the pieces of the grid
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know of it, in words; empty where the solid has every opening of the grid."""
+        lines = []
+        if self.components < self.expected_components:
+            lines.append(f"pieces of the grid touch: {self.expected_components} pieces became {self.components} bodies")
+        if (lost := self.expected_genus - self.genus) != 0:
+            what = f"{abs(lost)} of {self.expected_genus} openings are {'closed' if lost > 0 else 'added'}"
+            lines.append(f"{what} where parts touch; thinner members and nodes keep the openings of the grid")
+        return lines
 
 
 def lattice_step(vertices: np.ndarray) -> float:

@@ -29,11 +29,10 @@ from ..kernels.geometry.boxes import new_boxes
 from ..kernels.geometry.triangles import quality
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..runtime.progress import Progress
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
-
-Progress = Callable[[str, float], None]
 
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no room waits for the next, more tolerant one
 GAP = 60  # most segments of a gap that is filled; larger gaps stay open

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..grid.grid import Grid
 from ..runtime.parallel import side_by_side
+from ..runtime.progress import Progress
 from ..surface.samples import narrow_surface
 from ..surface.scratch import with_own_scratch
 from .equalize import equalize, finish
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-Progress = Callable[[str, float], None]
 Report = Callable[[float], None]
 
 

@@ -1,25 +1,25 @@
-"""Work that is the same wherever it is done: in this process, in processes of our own, or on a Dask cluster.
+"""Run the same work in this process, in processes on this machine, or on a Dask cluster.
 
-``workers.run(work, jobs, shared)`` yields ``(number, work(job, shared))`` in the order in which they are done; `shared` goes to each
-worker once. A worker that dies is made good: what it had is done again.
+``workers.run(work, jobs, shared)`` yields ``(number, work(job, shared))`` as jobs are done; `shared` goes to each worker once.
 """
 
 from __future__ import annotations
 
-import gc
-import logging
 import multiprocessing
 import os
+import pickle
 import signal
+import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from functools import lru_cache
 from importlib.util import find_spec
+from itertools import islice
 from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -31,22 +31,22 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 Work = Callable[[Job, Any], Result]
 
-AHEAD = 2  # jobs that wait for each worker: results must not pile up faster than they are taken
-EACH = 4  # most workers for each processor: more only take memory
-DEATHS = 3  # times that a worker may die before anything else is done
-PATIENCE = 10.0  # for a scheduler to answer [s]
+AHEAD = 2  # jobs submitted per worker; more would let results pile up in memory
+MOST_PER_PROCESSOR = 4  # workers; more only take memory
+PATIENCE = 10.0  # time a scheduler has to answer [s]
 NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[cluster]"'
+DIED = "a worker died, perhaps for lack of memory; use fewer workers"
 
 
 class Workers(AbstractContextManager["Workers"]):
-    """Nobody but this process; the others build on it."""
+    """Work in this process alone; base class of the others."""
 
     count = 1
-    alone = True  #: nobody else works, so that a job may use all processors
+    alone = True  #: nobody else works, so a job may use all processors
     words = "in this process"
 
     def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
-        """Yield the number of each job and its result, in the order in which they are done."""
+        """Yield the number of each job and its result, in the order in which jobs are done."""
         for number, job in enumerate(jobs):
             yield number, work(job, shared)
 
@@ -62,312 +62,189 @@ def open_workers(count: int | None = None, scheduler: str = "") -> Workers:
     Parameters
     ----------
     count : int, optional
-        How many on this machine; the number of processors by default.
+        Processes on this machine; the number of processors by default.
     scheduler : str
-        Address of the scheduler of a Dask cluster, as ``tcp://10.0.0.5:8786``, to work there.
+        Address of the scheduler of a running Dask cluster, for example ``tcp://10.0.0.5:8786``.
 
     Raises
     ------
     InputError
-        No such number, no such cluster, or dask is not installed where a cluster is named.
+        The number is out of range, the cluster does not answer, or Dask is not installed.
     """
     if scheduler:
-        if not has_dask():
-            raise InputError(f"--scheduler {NEEDS_DASK}")
-        return Cluster(0, scheduler)
+        return Cluster(scheduler)
     count = processors() if count is None else count
     if count < 1:
         raise InputError(f"workers must be 1 or more, got {count}")
-    if count > (most := EACH * max(processors(), 2)):
+    if count > (most := MOST_PER_PROCESSOR * max(processors(), 2)):
         raise InputError(f"{count:,} workers are too many for this machine; use at most {most}")
-    if count == 1:
-        return Workers()
-    return Cluster(count) if has_dask() else Processes(count)
-
-
-def has_dask() -> bool:
-    """Whether a Dask cluster can be used."""
-    return find_spec("distributed") is not None
+    return Processes(count) if count > 1 else Workers()
 
 
 class Processes(Workers):
-    """Processes of our own on this machine, for want of Dask."""
+    """A pool of processes on this machine, each a fresh interpreter."""
 
     alone = False
 
     def __init__(self, count: int) -> None:
         self.count = count
         self.words = f"on {count} processes of this machine"
-        self._begun: list[_Process] = []
+        self._others = set(multiprocessing.active_children())
+        self._folder = tempfile.TemporaryDirectory(prefix="scantruss-", ignore_cleanup_errors=True)
+        resource_tracker.ensure_running()  # started later, it would let signals through again
+        self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_begin)
 
     def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
-        """Yield the number of each job and its result, in the order in which they are done."""
+        """Yield the number of each job and its result, in the order in which jobs are done."""
+        path = self._share(shared)
         coming = enumerate(jobs)
-        waiting: dict[int, Job] = {}
-        deaths = 0
-        while True:
-            with _undisturbed():
-                pool = ProcessPoolExecutor(self.count, _Spawn(shared, self._begun))
-            with pool:
-                try:
-                    for number, result in _in_pool(pool, work, coming, waiting, AHEAD * self.count):
-                        deaths = 0
-                        yield number, result
+        running: dict[Future[Result], int] = {}
+        try:
+            while True:
+                for number, job in islice(coming, AHEAD * self.count - len(running)):
+                    with _signals_held():  # a process that is half started can be neither used nor ended
+                        running[self._pool.submit(_with_shared, work, job, path)] = number
+                if not running:
                     return
-                except BrokenProcessPool:
-                    deaths += 1
-                    if deaths > DEATHS:
-                        raise _keeps_dying() from None
-                except BaseException:
-                    self._end()  # or leaving the pool waits for jobs that nobody wants
-                    raise
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    yield running.pop(future), future.result()
+        except BrokenProcessPool:
+            raise ScanTrussError(DIED) from None
 
-    def _end(self) -> None:
-        """End all processes, whatever they do."""
-        with _undisturbed():
-            while self._begun:
-                self._begun.pop().kill()
+    def _share(self, shared: Any) -> str:
+        """Write what all jobs need to a file: a worker that dies while it is sent data would block the sender."""
+        if shared is None:
+            return ""
+        try:
+            with tempfile.NamedTemporaryFile(dir=self._folder.name, delete=False) as file:
+                pickle.dump(shared, file, pickle.HIGHEST_PROTOCOL)
+        except OSError as error:
+            raise ScanTrussError(
+                f"cannot write to the temporary folder {self._folder.name}: {error.strerror or error}; use --workers 1"
+            ) from None
+        return file.name
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the processes, also where who took their results was interrupted between two of them."""
-        self._end()
+        """End the processes, whatever they do."""
+        with _signals_held():
+            if kind:
+                for process in set(multiprocessing.active_children()) - self._others:
+                    process.kill()
+            self._pool.shutdown(cancel_futures=True)
+            self._folder.cleanup()
 
 
-class _Spawn(SpawnContext):
-    """How processes of a pool begin: afresh, and noted in a list."""
-
-    def __init__(self, shared: Any, begun: list[_Process]) -> None:
-        super().__init__()
-        self._shared, self._begun = shared, begun
-
-    def Process(self, *words: Any, **options: Any) -> _Process:  # type: ignore[override]  # noqa: N802
-        return _Process(self._shared, self._begun, *words, **options)
+def _begin() -> None:
+    """Prepare a new process: it ends with its parent, not by Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-class _Process(SpawnProcess):
-    """A process that is told what all jobs need when it has begun, and ends with who began it, not by ctrl-C.
-
-    Told while it begins, as by the initializer of a pool, one that dies would leave its parent waiting for ever.
-    """
-
-    def __init__(self, shared: Any, begun: list[_Process], *words: Any, **options: Any) -> None:
-        super().__init__(*words, **options)
-        self._common, self._teller = multiprocessing.Pipe(duplex=False)
-        self._shared, self._begun = shared, begun
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what the process gets while it begins."""
-        return {name: value for name, value in vars(self).items() if name not in ("_teller", "_shared", "_begun")}
-
-    def start(self) -> None:
-        """Begin."""
-        super().start()
-        self._begun.append(self)
-        self._common.close()  # so that telling ends when the process does
-        threading.Thread(target=_tell, args=(self._teller, self._shared), daemon=True).start()
-        self._shared = None  # it may be large
-
-    def run(self) -> None:
-        """Work; this is the other process."""
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # on Windows nobody has held it
-        threading.Thread(target=_leave_with_parent, daemon=True).start()
-        with self._common:
-            _SHARED[0] = self._common.recv()
-        super().run()
-
-
-def _tell(teller: Connection, shared: Any) -> None:
-    """Send to a process what all jobs need, unless it dies."""
-    with teller, suppress(OSError):
-        teller.send(shared)
-
-
-def _leave_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
+def _end_with_parent() -> None:
+    if (parent := multiprocessing.parent_process()) is not None:
         parent.join()
         os._exit(1)
 
 
-def _in_pool(
-    pool: ProcessPoolExecutor,
-    work: Work[Job, Result],
-    coming: Iterator[tuple[int, Job]],
-    waiting: dict[int, Job],
-    ahead: int,
-) -> Iterator[tuple[int, Result]]:
-    """Run jobs in a pool; `waiting` holds those that are begun and not done, also when the pool breaks."""
-    running: dict[Future[Result], int] = {}
-    for number, job in waiting.items():
-        running[_submit(pool, work, job)] = number
-    while True:
-        while len(running) < ahead and (new := next(coming, None)) is not None:
-            waiting[new[0]] = new[1]
-            running[_submit(pool, work, new[1])] = new[0]
-        if not running:
-            return
-        done, _ = wait(running, return_when=FIRST_COMPLETED)
-        for future in done:
-            result = future.result()
-            number = running.pop(future)
-            del waiting[number]
-            yield number, result
+def _with_shared(work: Callable[[Any, Any], Any], job: Any, path: str) -> Any:
+    return work(job, _read_shared(path) if path else None)
 
 
-def _submit(pool: ProcessPoolExecutor, work: Work[Job, Result], job: Job) -> Future[Result]:
-    """Give a job to a pool, which may start a process for it."""
-    with _undisturbed():
-        return pool.submit(_with_shared, work, job)
-
-
-_SHARED: list[Any] = [None]  # of this process
-
-
-def _with_shared(work: Callable[[Any, Any], Any], job: Any) -> Any:
-    return work(job, _SHARED[0])
-
-
-def _keeps_dying() -> ScanTrussError:
-    return ScanTrussError("the workers die again and again, perhaps for want of memory; use fewer of them")
-
-
-class Cluster(Workers):
-    """A Dask cluster: the user's, or one on this machine for as long as the work takes."""
-
-    alone = False
-
-    def __init__(self, count: int, scheduler: str = "") -> None:
-        from distributed import Client
-
-        self._ends = ExitStack()
-        failure: ScanTrussError | None = None
-        try:
-            cluster = scheduler or self._ends.enter_context(_local_cluster(count))
-            self._client = self._ends.enter_context(Client(cluster, timeout=PATIENCE))
-            versions = self._client.run(_version)
-        except ModuleNotFoundError:
-            versions = {scheduler: ""}
-        except Exception as error:  # what answers may be anything, and its first bytes a length
-            failure = _no_cluster(scheduler, error)
-        except BaseException:
-            self._ends.close()
-            raise
-        if failure is not None:  # out of reach of the error, which holds a client that came up by half
-            self._ends.close()
-            gc.collect()  # or that one is closed while the next one starts, and each waits for the other
-            raise failure
-        other = sorted({version or "none" for version in versions.values() if version != __version__})
-        if other or not versions:
-            self._ends.close()
-            raise InputError(
-                f"the workers at {scheduler} have scantruss {other[0]}, this is {__version__}; install the same there"
-                if other
-                else f"the cluster at {scheduler} has no workers; start some"
-            )
-        self.count = len(versions)
-        self.words = f"on {self.count} workers " + (f"at {scheduler}" if scheduler else "of this machine (dask)")
-
-    def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
-        """Yield the number of each job and its result, in the order in which they are done."""
-        from concurrent.futures import CancelledError
-
-        from distributed import as_completed
-        from distributed.scheduler import KilledWorker
-
-        coming = enumerate(jobs)
-        done = as_completed()
-        running: dict[str, tuple[int, Job]] = {}
-        common = self._share(shared)
-        deaths = 0
-
-        def submit(number: int, job: Job) -> None:
-            future = self._client.submit(work, job, common, pure=False)
-            running[future.key] = number, job
-            done.add(future)
-
-        while True:
-            while len(running) < AHEAD * self.count and (new := next(coming, None)) is not None:
-                submit(*new)
-            if not running:
-                return
-            future = next(done)
-            number, job = running.pop(future.key)
-            try:
-                result = future.result()
-            except (CancelledError, KilledWorker):  # what was shared may have died with its workers
-                deaths += 1
-                if deaths > DEATHS:
-                    raise _keeps_dying() from None
-                common = self._share(shared)
-                submit(number, job)
-                continue
-            deaths = 0
-            yield number, result
-
-    def _share(self, shared: Any) -> Any:
-        """Send to all workers what all jobs need."""
-        return None if shared is None else self._client.scatter(shared, broadcast=True, hash=False)
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Let go of the cluster; end it where it is our own."""
-        self._ends.close()
-
-
-def _local_cluster(count: int) -> Any:
-    """Return a cluster on this machine; interrupted while it starts it is ended first, as half of one cannot be."""
-    from distributed import LocalCluster
-
-    made: list[Any] = []
-    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-    try:
-        with _undisturbed():
-            made.append(LocalCluster(n_workers=count, **options))
-    except BaseException:  # ctrl-C, or the command line's word for a polite end
-        for cluster in made:
-            with suppress(Exception):
-                cluster.close()
-        raise
-    return made[0]
+@lru_cache(1)
+def _read_shared(path: str) -> Any:
+    return pickle.loads(Path(path).read_bytes())
 
 
 @contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Put off ctrl-C and a polite end until a block is done, as what is started by half can neither be used nor ended.
-
-    Threads and processes that it starts do not get ctrl-C at all, or they would die of it with a traceback: who started them ends them.
-    """
+def _signals_held() -> Iterator[None]:
+    """Hold Ctrl-C and a polite end back until the block is done; processes started in it never receive Ctrl-C."""
     came: list[int] = []
     with ExitStack() as stack:
-        stack.callback(_send_on, came)
+        stack.callback(_raise_all, came)
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):  # any other thread may take what is held here
+            for number in (signal.SIGINT, signal.SIGTERM):
                 if callable(kept := signal.getsignal(number)):
                     signal.signal(number, lambda number, frame: came.append(number))
                     stack.callback(signal.signal, number, kept)
-        if hasattr(signal, "pthread_sigmask"):
-            resource_tracker.ensure_running()  # would lift it again
+        if hasattr(signal, "pthread_sigmask"):  # processes and threads inherit the mask
             stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, signal.pthread_sigmask(signal.SIG_BLOCK, []))
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
 
 
-def _send_on(came: list[int]) -> None:
-    """Let signals have the effect that was put off."""
-    for number in came:
+def _raise_all(numbers: list[int]) -> None:
+    for number in numbers:
         signal.raise_signal(number)
 
 
-def _no_cluster(scheduler: str, error: Exception) -> InputError:
-    """Return what to say where a cluster cannot be used."""
-    said = " ".join(str(error).split())[:80] or type(error).__name__
-    if scheduler:
+class Cluster(Workers):
+    """A Dask cluster that the user has started."""
+
+    alone = False
+
+    def __init__(self, scheduler: str) -> None:
+        if find_spec("distributed") is None:
+            raise InputError(f"--scheduler {NEEDS_DASK}")
+        with ExitStack() as stack:
+            self._client = stack.enter_context(_connect(scheduler))
+            try:
+                versions = self._client.run(_version)
+            except ModuleNotFoundError:
+                versions = {scheduler: ""}
+            if not versions:
+                raise InputError(f"the cluster at {scheduler} has no workers; start some")
+            if other := sorted({version or "none" for version in versions.values() if version != __version__}):
+                raise InputError(
+                    f"the workers at {scheduler} have scantruss {other[0]}, this is {__version__}; install the same there"
+                )
+            self._ends = stack.pop_all()
+        self.count = len(versions)
+        self.words = f"on {self.count} workers at {scheduler}"
+
+    def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
+        """Yield the number of each job and its result, in the order in which jobs are done; Dask repeats lost jobs."""
+        from concurrent.futures import CancelledError
+
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        common = None if shared is None else self._client.scatter(shared, broadcast=True, hash=False)
+        coming = enumerate(jobs)
+        done = as_completed()
+        running: dict[str, int] = {}
+        while True:
+            for number, job in islice(coming, AHEAD * self.count - len(running)):
+                future = self._client.submit(work, job, common, pure=False)
+                running[future.key] = number
+                done.add(future)
+            if not running:
+                return
+            future = next(done)
+            try:
+                result = future.result()
+            except (CancelledError, KilledWorker):
+                raise ScanTrussError(DIED) from None
+            yield running.pop(future.key), result
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Let go of the cluster."""
+        self._ends.close()
+
+
+def _connect(scheduler: str) -> Any:
+    """Return a client of a scheduler; whatever answers there may be something else."""
+    from distributed import Client
+
+    try:
+        return Client(scheduler, timeout=PATIENCE)
+    except Exception as error:
+        said = " ".join(str(error).split())[:80] or type(error).__name__
         said = said if isinstance(error, OSError | ValueError) else "something else answers there"
-        return InputError(f"no scheduler answers at {scheduler} ({said}); check the address")
-    return InputError(f"the workers of this machine do not start ({said}); use --workers 1")
+    raise InputError(f"no scheduler answers at {scheduler} ({said}); check the address")
 
 
 def _version() -> str:

@@ -1,17 +1,19 @@
-"""Writing files so that nothing half-written is ever left behind.
+"""Write files whole: beside their place first, renamed when all are complete.
 
-A file is written beside its place under another name and renamed when it is whole, so that a full disk or a killed run
-leaves what was there before.
+A full disk, an error or an interrupted run leaves what was there before. A link stays a link, a pipe stays a pipe.
 """
 
 from __future__ import annotations
 
-import contextlib
 import errno
+import json
 import os
-import secrets
+import shutil
+import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from types import TracebackType
+from typing import Any
 
 from ..errors import FormatError
 
@@ -56,13 +58,105 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     return path
 
 
+class SaveTogether:
+    """Write several files, all or none.
+
+    ::
+
+        with SaveTogether() as save:
+            write(grid, save.beside("out/grid.obj"))
+            save.json("out/report.json", values)
+
+    Whatever a writer makes in the folder it is given moves along, so the two files of a format stay together.
+    """
+
+    def __init__(self) -> None:
+        self._folders: dict[Path, Path] = {}  # place -> temporary folder in it
+        self._made: list[Path] = []  # folders of results that did not exist before
+
+    def __enter__(self) -> SaveTogether:
+        """Start."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Move the files into place, or leave nothing behind."""
+        try:
+            if kind is None:
+                self._move()
+                self._made.clear()
+            elif isinstance(error, FormatError):
+                raise FormatError(self._in_place(str(error))) from None
+        finally:
+            for folder in (*self._folders.values(), *reversed(self._made)):
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def make_folder(self, folder: str | Path) -> Path:
+        """Make a folder for results; it is removed again if the run fails."""
+        folder = Path(folder)
+        missing = [place for place in (folder, *folder.parents) if not place.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        self._made.extend(reversed(missing))
+        return folder
+
+    def beside(self, path: str | Path) -> Path:
+        """Return where to write the file that is to end up at `path`."""
+        path = Path(path)
+        return self._folder(path.parent) / path.name
+
+    def json(self, path: str | Path, values: dict[str, Any]) -> None:
+        """Save plain values as readable JSON."""
+        text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
+        self.beside(path).write_text(text + "\n", encoding="utf-8", newline="\n")
+
+    def _folder(self, place: Path) -> Path:
+        """Return the temporary folder in a place."""
+        if place not in self._folders:
+            self._folders[place] = Path(tempfile.mkdtemp(prefix=".scantruss-", dir=place))
+        return self._folders[place]
+
+    def _in_place(self, message: str) -> str:
+        """Name the places that the user knows in a message of a writer."""
+        for place, folder in self._folders.items():
+            message = message.replace(str(folder), str(place))
+        return message
+
+    def _move(self) -> None:
+        """Put all files into place: into pipes first, as these can fail, then by renaming."""
+        written = [
+            (file, place / file.name) for place, folder in self._folders.items() for file in sorted(folder.iterdir())
+        ]
+        moves, pipes = [], []
+        for file, target in written:
+            if target.is_dir():
+                raise FormatError(f"cannot write {target}: it is a folder; name a file")
+            if target.exists() and not target.is_file():
+                pipes.append((file, target))
+            elif target.is_symlink():
+                moves.append(self._beside_linked(file, target))
+            else:
+                moves.append((file, target))
+        for file, target in pipes:
+            with file.open("rb") as source, target.open("wb") as pipe:
+                shutil.copyfileobj(source, pipe)
+        for file, target in moves:
+            file.replace(target)
+
+    def _beside_linked(self, file: Path, link: Path) -> tuple[Path, Path]:
+        """Return a copy of a file beside what a link points to, which may be on another disk, and that place."""
+        linked = Path(os.path.realpath(link))
+        folder = Path(tempfile.mkdtemp(prefix="linked-", dir=self._folder(linked.parent)))
+        return Path(shutil.copyfile(file, folder / file.name)), linked
+
+
 def write_files(contents: Mapping[Path, bytes]) -> list[Path]:
-    """Write files that belong together: all of them or none.
+    """Write files that belong together, all or none.
 
     Parameters
     ----------
     contents : mapping of Path to bytes
-        What each file is to hold.
+        Content of each file.
 
     Returns
     -------
@@ -74,23 +168,13 @@ def write_files(contents: Mapping[Path, bytes]) -> list[Path]:
     FormatError
         A file could not be written (full disk, no permission); no half-written file is left.
     """
-    waiting: dict[Path, Path] = {}  # temporary file -> its final place
     path = Path()
     try:
-        for path, content in contents.items():
-            place = Path(os.path.realpath(path))  # a link stays a link
-            temporary = place.with_name(f".scantruss-{os.getpid()}-{secrets.token_hex(4)}.part")
-            waiting[temporary] = place
-            with temporary.open("xb") as stream:
-                stream.write(content)
-        for temporary, place in waiting.items():
-            path = place
-            temporary.replace(place)
+        with SaveTogether() as save:
+            for path, content in contents.items():
+                with save.beside(path).open("xb") as stream:
+                    stream.write(content)
     except OSError as error:
         words = error.strerror or error
         raise FormatError(f"cannot write {path.name}: {words}; make room or choose another folder") from None
-    finally:
-        for temporary in waiting:
-            with contextlib.suppress(OSError):  # the first error is the one to tell
-                temporary.unlink(missing_ok=True)
     return list(contents)

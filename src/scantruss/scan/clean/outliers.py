@@ -12,9 +12,7 @@ from ...runtime.parallel import in_parts
 from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
 
 MOST_ROUNDS = 5  # outliers near each other hide each other: after a round some more stand out
-FARTHEST_REACH = (
-    4.5  # reach, in those of which a quarter of the points have more, at which a point is an outlier whatever is near it
-)
+FARTHEST_REACH = 4.5  # reach, in those of which a quarter of the points have more, at which a point is an outlier whatever is near it
 CLOUD = 2.5  # ... where the points around form no surface
 THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
 MUCH = 0.1  # part of the points that form none from which on it is no cloud of outliers but the scan

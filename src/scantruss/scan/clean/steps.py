@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import InputError
+from ...runtime.progress import Progress
 from ..cloud import PointCloud
 from .duplicates import find_near_duplicates, find_repeated
 from .facing import face_one_way
@@ -19,7 +19,6 @@ from .thinning import thin_to
 
 FEWEST_POINTS_OF_A_SURFACE = 24  # points of a surface
 LAYERS = 3  # rounds of merging layers: what lies farther apart comes together step by step
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

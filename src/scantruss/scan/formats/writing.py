@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import FormatError, InputError
+from ...runtime.files import SaveTogether, check_place
 from ...settings import UNITS
 from ..units import check_unit
 from .las_writer import write_las
@@ -42,7 +43,7 @@ def write_points(
     unit: str = "",
     origin: np.ndarray | None = None,
 ) -> None:
-    """Write a cloud to exactly this path; the format is that of the suffix.
+    """Write a cloud to exactly this path, whole or not at all; the format is that of the suffix.
 
     Parameters
     ----------
@@ -72,7 +73,8 @@ def write_points(
         raise InputError(f"{len(cloud.points):,} points need as many normals, got {len(cloud.normals):,}")
     check_unit(unit)
     try:
-        writer(path, cloud)
+        with SaveTogether() as save:
+            writer(save.beside(path), cloud)
     except OSError as error:
         raise FormatError(f"cannot write {path}: {error.strerror or CUT_SHORT}") from None
 
@@ -81,13 +83,7 @@ def check_cloud_output(path: str | Path) -> Path:
     """Return the path of a cloud to be written; FormatError where its suffix or its folder will not do."""
     path = Path(path)
     _writer(path)
-    if path.is_dir():
-        raise FormatError(f"cannot write {path}: it is a folder; name a file")
-    if not path.parent.exists():
-        raise FormatError(f"cannot write {path}: the folder {path.parent} does not exist")
-    if not path.parent.is_dir():
-        raise FormatError(f"cannot write {path}: {path.parent} is a file, not a folder")
-    return path
+    return check_place(path, WRITERS)
 
 
 def _writer(path: Path) -> Callable[[Path, Cloud], None]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import InputError
+from ...runtime.progress import Progress
 from ..cloud import PointCloud
 from .doubt import leave_out_doubtful
 from .features import find_features
@@ -29,8 +30,6 @@ from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
 from .pose_file import poses_for
 from .poses import invert, make_pose
 from .scans import Scan, prepare_scans
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)

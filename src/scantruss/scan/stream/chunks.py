@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..formats.layout import Layout
-    from .tiles import Source, Tile
+    from .source import Source, Tile
 
 POINTS_PER_CHUNK = 1_000_000  # points
 POINTS_DESCRIBED = 10_000  # points that are described where none is taken

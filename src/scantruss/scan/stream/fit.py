@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.memory import available_memory
+from ...runtime.progress import Progress
 from ..cloud import LARGEST_COORDINATE, PointCloud
 from ..degrees import degrees_note
 from ..extent import BULK, usual_extent
@@ -19,8 +20,9 @@ from ..formats.paths import files_of, name_of_files
 from ..formats.reading import PACKED, read_points
 from .chunks import Reading, count_unread, read_chunks
 from .opened import open_scan
-from .thin_scan import Progress, Share, thin_scan
-from .tiles import Source, find_source, tiles_of
+from .source import Source
+from .thin_scan import Share, thin_scan
+from .tiles import find_source, tiles_of
 
 if TYPE_CHECKING:
     from ...settings import Settings

@@ -15,7 +15,8 @@ from ..formats.paths import files_of
 from ..formats.reading import check_systems, joint_notes
 from ..units import check_unit
 from .chunks import Reading
-from .tiles import Source, find_source
+from .source import Source
+from .tiles import find_source
 
 
 class OpenScan(NamedTuple):

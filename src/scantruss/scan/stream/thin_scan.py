@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...errors import FormatError, InputError
 from ...runtime.cluster import Workers
+from ...runtime.progress import Progress
 from ...selection import Selection
 from ..extent import extent_note, extent_of, joined
 from ..formats.content import surplus_note
@@ -18,10 +19,9 @@ from ..formats.paths import name_of_files
 from ..formats.reading import add_counts, left_out_note
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
+from .source import Source, Tile
 from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
-from .tiles import TILE, Source, Tile, tiles_of
-
-Progress = Callable[[str, float], None]
+from .tiles import TILE, tiles_of
 
 KEEP = ("mean", "nearest")
 SMALLEST = 500_000  # points of a tile that is worth a worker

@@ -7,14 +7,14 @@ a COPC file is one tile too, but read a million points at a time, and only near 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...errors import FormatError
-from ..formats.content import NAMES, Content, find_attributes
+from ..formats.content import NAMES, find_attributes
 from ..formats.kinds import kind_of, read_head, unreadable, wrong_kind
 from ..formats.las_header import LASZIP, check_header
 from ..formats.layout import ANY, Layout, find_layout
@@ -28,6 +28,8 @@ from ..formats.reading import PACKED, READERS
 from ..formats.rising import first_column_note, has_unnamed_first, is_number_of_point
 from ..formats.systems import system_of
 from ..units import metres_of
+from .chunks import text_rows
+from .source import Source, Tile
 
 TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
@@ -35,53 +37,6 @@ MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
 BYTES_LOOKED_AT = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
-
-
-@dataclass(frozen=True)
-class Source:
-    """A file of points as its header describes it."""
-
-    path: Path
-    kind: str  #: las, rows (of fixed size), text, or whole
-    points: int  #: points that the header promises; a guess for text, or for a file that is read whole
-    begin: int = 0  #: byte at which points begin: rows, text
-    end: int = 0  #: byte behind the points: text
-    rows: np.dtype[np.void] | None = None  #: layout of a row
-    columns: tuple[int, ...] = ()  #: of the coordinates, or of the number of a point and them: text
-    layout: Layout | None = None  #: of a text
-    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
-    z_metres: float | None = None  #: ... of z
-    system: str = ""  #: reference system
-    degrees: bool = False  #: x and y are longitude and latitude
-    in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
-    notes: tuple[str, ...] = ()  #: what a user should know
-
-    @property
-    def whole(self) -> bool:
-        """Whether it can only be read whole, with memory for all of its points."""
-        return self.kind == "whole"
-
-    def said_of(self, content: Content) -> Content:
-        """Return some of its points with what the header says of their units."""
-        said = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
-        return replace(said, notes=(*content.notes, *self.notes)) if self.notes else said
-
-
-@dataclass(frozen=True)
-class Tile:
-    """A part of a file: points, or bytes of a text."""
-
-    source: Source
-    begin: int
-    end: int
-
-    @property
-    def points(self) -> int:
-        """About how many points are in it."""
-        if self.source.kind != "text":
-            return self.end - self.begin
-        share = (self.end - self.begin) / max(self.source.end - self.source.begin, 1)
-        return max(round(share * self.source.points), 1)
 
 
 def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
@@ -263,8 +218,6 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
 
 def _first_column(path: Path, layout: Layout, start: int, size: int) -> list[np.ndarray]:
     """Return the first of the columns at the start, in the middle and at the end of a text."""
-    from .chunks import text_rows
-
     parts, end = [], start
     for place in (start, size // 2, size - BYTES_LOOKED_AT):
         with path.open("rb") as file:
