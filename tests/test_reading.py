@@ -352,14 +352,6 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
         read_points(path)
 
 
-def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(1000))
-    with pytest.raises(FormatError, match=r'needs the package pyarrow; python -m pip install "scantruss\[parquet\]"'):
-        read_points(tmp_path / "a.parquet")
-
-
 def test_copc_is_read_as_another_reader_reads_it(tmp_path: Path) -> None:
     path = tmp_path / "a.copc.laz"
     points = plate(3000)

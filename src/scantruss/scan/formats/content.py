@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from .columns import clean_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,25 +25,6 @@ class Content:
         default_factory=dict
     )  #: points that a reader passed over as they lie outside a part of the selection, by words for them
     feet: str = ""  #: ... unless heights are in feet, or their unit is said
-
-
-#: attribute -> names that columns and properties have for it, in lower case, letters and digits only
-NAMES = {
-    "class": ("classification", "class", "scalarclassification", "classid"),
-    "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
-    "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
-    "confidence": ("confidence", "scalarconfidence", "conf"),
-}
-
-
-def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, int]:
-    """Return the columns that hold the wanted attributes, by their names; those that are not there are left out."""
-    clean = [clean_name(name) for name in names]
-    return {
-        attribute: column
-        for attribute in wanted
-        if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
-    }
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import FormatError
-from .content import Content, find_attributes
+from .columns import find_attributes
+from .content import Content
 from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
 from .e57_pages import logical
 from .kinds import read_head, wrong_kind

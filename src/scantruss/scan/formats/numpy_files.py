@@ -14,7 +14,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of
-from .content import Content, find_attributes
+from .columns import find_attributes
+from .content import Content
 from .kinds import read_head, unreadable, wrong_kind
 from .packed import check_size
 

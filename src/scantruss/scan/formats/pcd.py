@@ -16,7 +16,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import PATTERN, metres_of
-from .content import Content, find_attributes, surplus_note
+from .columns import find_attributes
+from .content import Content, surplus_note
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 
 LONGEST_HEADER = 1 << 16  # bytes

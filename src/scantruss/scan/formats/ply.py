@@ -12,7 +12,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of
-from .content import Content, find_attributes
+from .columns import find_attributes
+from .content import Content
 from .kinds import read_head, wrong_kind
 from .ply_header import PLY, Element, Header, ends_early, read_header
 from .ply_text import read_ascii

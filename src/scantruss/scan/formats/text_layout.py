@@ -1,4 +1,4 @@
-"""How a text file of points is laid out: separator, decimal sign, header, columns. Found from a part of the file."""
+"""The layout of a text file of points, found from a part of it: separator, decimal sign, header, columns."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of_columns, metres_of_comments
-from .columns import check_not_degrees, fit_columns
-from .content import find_attributes
+from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
 
 BYTES_LOOKED_AT = 1 << 16  # bytes looked at, at the start and in the middle
 LINES = 1000  # lines looked at in each part
+BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
+LINE_BREAK = re.compile(r"\r\n|\n|\r")
 ANY = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
@@ -66,6 +67,11 @@ class Layout:
     def plain(self) -> bool:
         """Whether one sign, which is no decimal sign too, stands between two numbers."""
         return self.separator != ANY and not (self.separator == "," and self.comma)
+
+    @property
+    def has_unnamed_first(self) -> bool:
+        """Whether the first of four or more columns may be a number, a time or x, as no header names it."""
+        return not self.named and self.width > 3 and self.columns[0] == 0
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -159,7 +165,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
 def _encoding(head: bytes) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    return "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "latin-1"
+    return "utf-8-sig" if head.startswith(BOM) else "latin-1"
 
 
 def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
@@ -169,8 +175,8 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
         raw = file.read(BYTES_LOOKED_AT)
         file.seek(size // 2)
         later = file.read(BYTES_LOOKED_AT // 4) if size > 2 * BYTES_LOOKED_AT and encoding != "utf-16" else b""
-    start = re.split(r"\r\n|\n|\r", raw.decode(encoding, errors="replace"))
-    middle = re.split(r"\r\n|\n|\r", later.decode("latin-1"))[1:-1]
+    start = LINE_BREAK.split(raw.decode(encoding, errors="replace"))
+    middle = LINE_BREAK.split(later.decode("latin-1"))[1:-1]
     return (start[:-1] if size > BYTES_LOOKED_AT and len(start) > 1 else start), middle
 
 
