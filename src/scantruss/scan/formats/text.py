@@ -194,10 +194,12 @@ def _with_single_separators(block: bytes, layout: Layout) -> bytes:
     if b"\r" in block:
         block = block.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if layout.separator is None:
-        block = block.replace(b"\t", b" ")
-        while b"  " in block:
-            block = block.replace(b"  ", b" ")
-        block = block.replace(b" \n", b"\n").replace(b"\n ", b"\n").strip(b" ")
+        block = block.replace(b"\t", b" ").strip(b" ")
+        codes = np.frombuffer(block, np.uint8)
+        surplus = (codes[1:] == ord(" ")) & (codes[:-1] <= ord(" "))  # behind another blank or a line's end
+        if surplus.any():
+            block = codes[np.append(True, ~surplus)].tobytes()
+        block = block.replace(b" \n", b"\n")
     return block.lstrip(b"\n")
 
 
