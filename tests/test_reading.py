@@ -15,7 +15,8 @@ from copc_file import copc
 from scan_files import plate, text
 
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.formats.reading import READERS, read_points
+from scantruss.scan.formats.reading import read_points
+from scantruss.scan.formats.table import READERS
 from scantruss.scan.stream.tiles import find_source
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

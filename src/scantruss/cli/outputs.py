@@ -42,7 +42,8 @@ def claim(path: Path, what: str, taken: Taken) -> None:
 def cloud_output(path: str | Path) -> Path:
     """Return the path of a cloud to be written, if its format is known and a file can be written there."""
     from ..runtime.files import check_place
-    from ..scan.formats.writing import WRITERS, check_cloud_output
+    from ..scan.formats.table import WRITERS
+    from ..scan.formats.writing import check_cloud_output
 
     return check_place(check_cloud_output(path), WRITERS)
 

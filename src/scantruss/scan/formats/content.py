@@ -1,8 +1,9 @@
-"""What a reader returns: points, the attributes that were asked for, and what the file says of its units."""
+"""What a reader returns and what a writer is given."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,24 @@ class Content:
         default_factory=dict
     )  #: points that a reader passed over as they lie outside a part of the selection, by words for them
     feet: str = ""  #: ... unless heights are in feet, or their unit is said
+
+
+class Cloud(NamedTuple):
+    """What a writer is given."""
+
+    points: np.ndarray  #: (N, 3) float64 [unit], in the scan's own frame
+    normals: np.ndarray | None  #: (N, 3)
+    unit: str
+    origin: np.ndarray | None  #: (3,) a place near the points
+
+    @property
+    def columns(self) -> np.ndarray:
+        """Coordinates and, where they are known, normals; (N, 3) or (N, 6)."""
+        return self.points if self.normals is None else np.column_stack([self.points, self.normals])
+
+    def names(self, *normal: str) -> list[str]:
+        """Names of the columns."""
+        return ["x", "y", "z", *(() if self.normals is None else normal)]
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:

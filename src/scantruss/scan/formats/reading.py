@@ -1,8 +1,8 @@
-"""From files to a PointCloud: the table of formats and `read_points`."""
+"""From files to a PointCloud."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,36 +19,11 @@ from .choose import check_attributes, choose, describe, places_in
 from .common_unit import to_common_unit
 from .content import Content
 from .copc import Place
-from .e57 import read_e57
 from .kinds import read_head
 from .las import Places, read_las
-from .numpy_files import read_npy, read_npz
 from .packed import unpacked
-from .parquet import read_parquet
 from .paths import Source, files_of, name_of_files
-from .pcd import read_pcd
-from .ply import read_ply
-from .solids import read_obj, read_off, read_stl
-from .text import read_text
-
-Reader = Callable[[Path, Sequence[str]], Content]
-
-
-def _plain(read: Callable[[Path], np.ndarray]) -> Reader:
-    """Return a reader of a format that holds points alone."""
-    return lambda path, wanted: Content(read(path))
-
-
-#: suffix -> function that returns what a file holds: its points and the wanted attributes
-READERS: dict[str, Reader] = {
-    ".ply": read_ply,
-    ".xyz": read_text, ".txt": read_text, ".csv": read_text, ".pts": read_text, ".asc": read_text,
-    ".las": read_las, ".laz": read_las,
-    ".obj": _plain(read_obj), ".stl": _plain(read_stl), ".off": _plain(read_off),
-    ".npy": read_npy, ".npz": read_npz,
-    ".e57": read_e57, ".pcd": read_pcd, ".parquet": read_parquet,
-}  # fmt: skip
-PACKED = ".gz"
+from .table import PACKED, READERS
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of_columns
 from .columns import find_attributes, find_columns, fit_columns
-from .content import Content, surplus_note
+from .content import Cloud, Content, surplus_note
 from .text_layout import (
     BOM,
     BYTES_LOOKED_AT,
@@ -34,9 +34,6 @@ from .text_layout import (
     number_of,
     split_line,
 )
-
-if TYPE_CHECKING:
-    from .writing import Cloud
 
 EMPTY = "without coordinates"  # what is said of lines whose fields are empty
 LARGE = 1 << 22  # bytes of text for which importing pyarrow pays

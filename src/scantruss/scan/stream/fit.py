@@ -16,7 +16,8 @@ from ..extent import BULK, usual_extent
 from ..formats.kinds import read_head
 from ..formats.paths import Source as Names
 from ..formats.paths import files_of, name_of_files
-from ..formats.reading import PACKED, read_points
+from ..formats.reading import read_points
+from ..formats.table import PACKED
 from .chunks import Reading, count_unread, read_chunks
 from .opened import open_scan
 from .thin_scan import Progress, Share, thin_scan

@@ -18,14 +18,14 @@ from ..formats.columns import NAMES, find_attributes
 from ..formats.content import Content
 from ..formats.kinds import kind_of, read_head, unreadable, wrong_kind
 from ..formats.las_header import LASZIP, check_header
-from ..formats.numpy_files import is_turned, metres_of_npz, read_array_header
+from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
 from ..formats.packed import unpacked
 from ..formats.parquet import metres_of_parquet
 from ..formats.pcd import read_pcd_header
 from ..formats.ply import row_type
 from ..formats.ply_header import PLY, read_header
-from ..formats.reading import PACKED, READERS
 from ..formats.systems import system_of
+from ..formats.table import PACKED, READERS
 from ..formats.text import first_column_note, is_number_of_point, read_lines
 from ..formats.text_layout import ANY, Layout, find_layout
 from ..units import metres_of
