@@ -250,7 +250,7 @@ def test_info_names_the_command_whose_options_keep_what_is_left_out(tmp_path, ca
     assert main(["info", str(tmp_path / "a.npy"), "--length", str(shape.length)]) == 0
     said = "".join(capsys.readouterr())
     assert "points are left out; scantruss grid --outlier-distance 0 keeps them" in said
-    assert "points are left out; scantruss grid --no-drop-repeated keeps them" in said
+    assert "points are left out; scantruss grid --no-drop-duplicates keeps them" in said
 
 
 def test_the_same_scan_gives_the_same_bytes():
@@ -326,7 +326,7 @@ def test_repeats_are_left_out_of_a_grid_where_there_are_many():
     shape = make("scallop", 10_000, duplicates=0.5)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)
     assert sample_surface(cloud, own).repeated == 5000
-    for kept in (own.replace(clean=False), own.replace(drop_repeated=False)):
+    for kept in (own.replace(clean=False), own.replace(drop_duplicates=False)):
         assert sample_surface(cloud, kept).repeated == 0
         assert len(sample_surface(cloud, kept).surface.points) == 15_000
 

@@ -109,7 +109,7 @@ def refused(capsys, *words, status=2):
         ("grid scan.xyz a.obj --length 4 --method best", "method must be one of default paper"),
         ("grid scan.xyz a.obj --length 4 --unit furlong", "unit must be one of mm cm m inch foot"),
         ("grid scan.xyz a.obj --length 4 --advance-from inside", "advance_from must be one of external all"),
-        ("grid scan.xyz a.obj --length 4 --max-deviation -1", "max_deviation must be positive"),
+        ("grid scan.xyz a.obj --length 4 --max-deviation -1", "max_deviation must be greater than 0"),
         ("info", "missing SCAN"),
         ("info scan.xyz other.xyz", "too many arguments: other.xyz"),
         ("print grid.json", "missing "),

@@ -1,6 +1,7 @@
-"""Every number that steers the method: symbol, unit, default, source.
+"""Settings: every number that steers the method, with its symbol, unit, bounds, default and source.
 
-The command line options, the table in the docs and the JSON saved beside every result all come from the fields of `Settings`.
+The options of the command line, the table in the docs and the JSON saved beside every result are made from the fields. Each stage
+has a small record of its own; `Settings` is all of them together.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ from .selection import FORMS, RETURNS, Selection
 SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING = (
     0.2,
     0.3,
-)  # distance of the sites of any scan, and of a dense and smooth one, in lengths
-HOLE = 4.0  # members around the smallest hole worth framing; the front runs over smaller ones
+)  # spacing of the surface samples of any scan, and of a dense and smooth one [member lengths]
+HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
-CURVATURE = "curvature:"  # a length field that follows the curvature begins so
-UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # metres
+CURVATURE = "curvature:"  # a length field that follows the curvature starts with this
+UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # [metre]
+RENAMED = {"stray_distance": "outlier_distance", "drop_repeated": "drop_duplicates"}  # names in settings files of 0.1.0
 
 
 class Lengths(tuple[tuple[float, float, float, float], ...]):
@@ -34,151 +36,251 @@ class Lengths(tuple[tuple[float, float, float, float], ...]):
 
 
 def _setting(
-    default: Any, help: str, *, symbol: str = "", unit: str = "", source: str = "", choices: tuple[str, ...] = ()
+    default: Any,
+    help: str,
+    *,
+    symbol: str = "",
+    unit: str = "",
+    source: str = "",
+    choices: tuple[str, ...] = (),
+    low: float | None = None,
+    high: float = math.inf,
+    above: float | None = None,
 ) -> Any:
-    """A field of the record with all that the docs and the command line say of it."""
-    return field(
-        default=default, metadata={"help": help, "symbol": symbol, "unit": unit, "source": source, "choices": choices}
-    )
+    """A field of a record with all that the docs and the command line say of it, and its bounds.
+
+    A number must lie between `low` and `high`, or be greater than `above`; without both it has no bounds.
+    """
+    about = {"help": help, "symbol": symbol, "unit": unit, "source": source, "choices": choices}
+    return field(default=default, metadata={**about, "low": low, "high": high, "above": above})
 
 
-def _line(line: Any) -> tuple[tuple[float, ...], ...]:
-    """Return a fixed line as tuples of numbers."""
-    try:
-        points = tuple(tuple(float(c) for c in position) for position in line)
-    except (TypeError, ValueError):
-        raise InputError(f"fixed_lines must be polylines of positions of three numbers, got {line!r}") from None
-    for position in points:
-        if len(position) != 3 or not all(map(math.isfinite, position)):
-            raise InputError(f"a fixed line needs points of three finite coordinates, got {position}")
-    points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
-    if len(points) < 2:
-        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
-    return points
+class _Checked:
+    """A record whose values are checked against its fields."""
+
+    def __post_init__(self) -> None:
+        """Check every value, with a message that says what is needed."""
+        for spec in fields(self):  # type: ignore[arg-type]
+            about, name, value = spec.metadata, spec.name, getattr(self, spec.name)
+            choices, low, high, above = (about[key] for key in ("choices", "low", "high", "above"))
+            if choices and value not in (*choices, spec.default):
+                raise InputError(f"{name} must be one of {' '.join(choices)}, got {value!r}")
+            if spec.type == "bool" and not isinstance(value, bool):
+                raise InputError(f"{name} must be true or false, got {value!r}")
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(f"{name} must be a finite number, got {value}")
+            if (low is None and above is None) or (value is None and spec.default is None):
+                continue
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise InputError(f"{name} must be a number, got {value!r}")
+            if above is not None and not value > above:
+                raise InputError(f"{name} must be greater than {above:g}, got {value}")
+            if low is not None and not low <= value <= high:
+                needed = f"between {low:g} and {high:g}" if math.isfinite(high) else f"{low:g} or more"
+                raise InputError(f"{name} must be {needed}, got {value}")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """One record of all settings; unknown or impossible values raise InputError."""
+class MemberSettings(_Checked):
+    """What the grid should be."""
 
     length: float = _setting(
         0.0,
-        "desired length of the members; of a length field the shortest, and all of it is scaled to this",
+        "desired member length; with a length field its shortest, and the whole field is scaled to it",
         symbol="l_e",
         unit="scan unit",
         source="Eq. 10",
     )
     length_field: str | Sequence[Sequence[float]] = _setting(
         "",
-        "desired lengths that differ over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
+        "member lengths that vary over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
         unit="scan unit",
     )
-    method: str = _setting("default", "the paper to the letter, or what we found better", choices=METHODS)
+    method: str = _setting("default", "the paper to the letter, or the improved method", choices=METHODS)
     effort: str = _setting(
-        "normal", "time for regularity, in the default method; best tries 24 fronts and anneals two", choices=EFFORTS
+        "normal",
+        "how much time to spend on regularity (default method only); best tries 24 fronts and anneals two",
+        choices=EFFORTS,
     )
     prefer: str = _setting(
-        "balance", "members of one length, or regular triangles, where not both can be had", choices=PREFER
+        "balance", "what matters more where both cannot be had: equal members or regular triangles", choices=PREFER
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingSettings(_Checked):
+    """Reading the scan."""
+
     unit: str = _setting(
-        "", "unit of the scan's coordinates, before what the file says", choices=tuple(u for u in UNITS if u)
+        "", "unit of the coordinates; overrides what the file says", choices=tuple(u for u in UNITS if u)
     )
     z_unit: str = _setting(
         "",
-        "unit of the heights, where x and y have another; they are brought to that",
+        "unit of the heights where it differs from that of x and y; they are converted",
         choices=tuple(u for u in UNITS if u),
     )
-    classes: tuple[int, ...] = _setting(
-        (), "only points of these classes, as 6 or 2,6; of LAS or a column classification"
-    )
-    returns: str = _setting(
-        "all", f"only these returns of the laser pulses: {', '.join(RETURNS)} or a number from 1 to 15"
-    )
-    confidence: float | None = _setting(
-        None, "only points of at least this confidence, a property or column of the scan"
-    )
+    classes: tuple[int, ...] = _setting((), "keep only these point classes, e.g. 6 or 2,6 (LAS, or a column named so)")
+    returns: str = _setting("all", f"keep only these laser returns: {', '.join(RETURNS)} or a number from 1 to 15")
+    confidence: float | None = _setting(None, "keep only points with at least this confidence (a property or column)")
     crop: tuple[str, ...] = _setting(
-        (), f"only points inside {FORMS}, in plan (GeoJSON, WKT, or x, y a line)", unit="scan unit"
+        (), f"keep only points inside {FORMS} in plan (GeoJSON, WKT, or x, y per line)", unit="scan unit"
     )
-    advance_from: str = _setting(
-        "external", "which boundaries the front starts from", source="Sec. 3.6", choices=ADVANCE_FROM
+    thin_spacing: float | None = _setting(
+        None,
+        "thin the file to this spacing while it is read; 0: never; none: length / 20 if it does not fit into memory",
+        unit="scan unit",
+        source="Sec. 2",
+        low=0.0,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CleaningSettings(_Checked):
+    """Cleaning the scan."""
+
+    clean: bool = _setting(
+        True, "leave out duplicates and outliers as set below; --no-clean keeps every point", source="Sec. 2"
+    )
+    drop_duplicates: bool = _setting(
+        True, "leave out duplicate points if they are a hundredth of the points or more", source="Sec. 2"
+    )
+    outlier_distance: float = _setting(
+        3.0,
+        "leave out points this many times farther from others than their neighbours are; 0 keeps all",
+        source="Sec. 2",
+        low=0.0,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceSettings(_Checked):
+    """Sampling the surface."""
+
+    box_size: float | None = _setting(
+        None,
+        "spacing of the surface samples, in member lengths; none:"
+        f" {SAMPLE_SPACING:g}, or {SMOOTH_SAMPLE_SPACING:g} for a dense, smooth scan",
+        source="Eq. 1",
+        low=0.05,
+        high=0.5,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundarySettings(_Checked):
+    """Finding the boundary."""
+
+    boundary_radius: float = _setting(
+        0.4, "radius of the disc rolled along the boundary, in member lengths", source="Sec. 3.3", low=0.1, high=1.0
+    )
+    corner_angle: float = _setting(
+        40.0, "the boundary has a corner where it turns by more than this", unit="degree", source="Sec. 3.3",
+        low=10.0, high=180.0,
+    )  # fmt: skip
+    fill_holes: float | None = _setting(
+        None,
+        f"close holes with a shorter boundary than this; 0 keeps all; none: {HOLE:g} member lengths",
+        unit="scan unit",
+        source="Sec. 3.6",
+        low=0.0,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstraintSettings(_Checked):
+    """Fixed nodes, fixed lines and ridges."""
+
     fixed: Sequence[Sequence[float]] = _setting(
-        (), "positions that must become nodes, in the scan's own frame", unit="scan unit", source="Sec. 4.2"
+        (), "positions that must become nodes, in the frame of the scan", unit="scan unit", source="Sec. 4.2"
     )
     fixed_lines: Sequence[Sequence[Sequence[float]]] = _setting(
         (),
-        "polylines that become chains of members, in the scan's own frame; closed where the last point is the first",
+        "polylines that must become chains of members, in the frame of the scan; closed if the last point is the first",
         unit="scan unit",
     )
     ridge_angle: float = _setting(
         40.0,
-        "where the scan bends by more than this at once it has a ridge, a chain of members; 0: none; default method only",
+        "a fold sharper than this is a ridge and becomes a chain of members; 0: no ridges (default method only)",
         unit="degree",
+        low=0.0,
+        high=180.0,
     )
-    max_deviation: float | None = _setting(
-        None,
-        "smoothing stops when the nodes have moved by more than this on average; none: length / 4",
-        unit="scan unit",
-        source="Sec. 4.1 (c)",
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontSettings(_Checked):
+    """Advancing the front."""
+
+    advance_from: str = _setting(
+        "external", "boundaries from which the front starts", source="Sec. 3.6", choices=ADVANCE_FROM
     )
-    shape_weight: float = _setting(1.0, "weight of the shape quality of a triangle", symbol="alpha_1", source="Eq. 5")
-    size_weight: float = _setting(1.0, "weight of the size quality of a triangle", symbol="alpha_2", source="Eq. 5")
+    shape_weight: float = _setting(
+        1.0, "weight of the shape quality of a triangle", symbol="alpha_1", source="Eq. 5", low=0.0
+    )
+    size_weight: float = _setting(
+        1.0, "weight of the size quality of a triangle", symbol="alpha_2", source="Eq. 5", low=0.0
+    )
     length_weight: float = _setting(
-        0.88, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10"
+        0.88, "weight of the desired length in the search radius", symbol="w_1", source="Eq. 10", low=0.0, high=1.0
     )
     search_range: float = _setting(
         0.5,
-        "half width of the search region in point spacings; doubled once if it holds no point",
+        "half the width of the search region, in point spacings; doubled once if it contains no point",
         symbol="b, h",
         source="Sec. 3.4 (1)",
+        low=0.1,
+        high=20.0,
     )
-    nearness: float = _setting(0.5, "a new node keeps this distance to the front, in lengths", source="Sec. 3.4 (2)")
+    nearness: float = _setting(
+        0.5, "least distance of a new node from the front, in member lengths", source="Sec. 3.4 (2)", low=0.1, high=1.0
+    )
     merge_angle: float = _setting(
-        90.0, "limit of the angles alpha and beta in the six cases", unit="degree", source="Table 1"
-    )
+        90.0, "limit of the angles alpha and beta in the six cases", unit="degree", source="Table 1",
+        low=60.0, high=120.0,
+    )  # fmt: skip
     case3: str = _setting(
         "merge", "case 3: merge the free nodes, or Foucault's quadrangle", source="Table 1, [30]", choices=CASE3
     )
-    box_size: float | None = _setting(
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmoothingSettings(_Checked):
+    """Smoothing (method paper)."""
+
+    max_deviation: float | None = _setting(
         None,
-        f"distance of the sites to which the scan is thinned, in lengths; none: {SAMPLE_SPACING:g}, where it is dense and smooth"
-        f" {SMOOTH_SAMPLE_SPACING:g}; search boxes are larger",
-        source="Eq. 1",
-    )
-    thin_spacing: float | None = _setting(
-        None,
-        "a scan file is thinned to this by search boxes while it is read; 0: never; none: to length / 20, where it is larger than memory",
+        "stop smoothing when the nodes have moved by more than this on average; none: length / 4",
         unit="scan unit",
-        source="Sec. 2",
+        source="Sec. 4.1 (c)",
+        above=0.0,
     )
-    clean: bool = _setting(
-        True, "leave out what does not belong to the scan, by the steps below; --no-clean keeps all", source="Sec. 2"
-    )
-    drop_repeated: bool = _setting(
-        True, "points that repeat another one are left out, where a hundredth of the points or more do", source="Sec. 2"
-    )
-    outlier_distance: float = _setting(
-        3.0, "points so many times farther from others than their neighbours are left out; 0 keeps all", source="Sec. 2"
-    )
-    boundary_radius: float = _setting(
-        0.4, "radius of the disc rolled along the boundary, in lengths", source="Sec. 3.3"
-    )
-    fill_holes: float | None = _setting(
-        None,
-        f"holes with a rim shorter than this are closed, 0 keeps all; none: {HOLE:g} lengths",
-        unit="scan unit",
-        source="Sec. 3.6",
-    )
-    corner_angle: float = _setting(
-        40.0, "a boundary that turns by more than this has a corner", unit="degree", source="Sec. 3.3"
-    )
-    smooth_forward: float = _setting(0.6, "forward factor of the smoothing", symbol="lambda", source="Sec. 4.1, [34]")
-    smooth_backward: float = _setting(-0.1, "backward factor of the smoothing", symbol="mu", source="Sec. 4.1, [34]")
-    smooth_passes: int = _setting(500, "most passes of the smoothing", source="Sec. 4.1")
+    smooth_forward: float = _setting(0.6, "forward factor", symbol="lambda", source="Sec. 4.1, [34]", low=0.0, high=1.0)
+    smooth_backward: float = _setting(-0.1, "backward factor", symbol="mu", source="Sec. 4.1, [34]", low=-1.0, high=0.0)
+    smooth_passes: int = _setting(500, "most passes", source="Sec. 4.1", low=0, high=10_000)
+
+
+#: the records in the order of the stages, from reading to smoothing
+RECORDS = (
+    MemberSettings, ReadingSettings, CleaningSettings, SurfaceSettings, BoundarySettings, ConstraintSettings, FrontSettings,
+    SmoothingSettings,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(
+    SmoothingSettings,
+    FrontSettings,
+    ConstraintSettings,
+    BoundarySettings,
+    SurfaceSettings,
+    CleaningSettings,
+    ReadingSettings,
+    MemberSettings,
+):
+    """All settings of a run; `length` is needed, all else has a default. Impossible values raise `InputError`."""
 
     def __post_init__(self) -> None:
-        """Check every value, with a message that says what is needed."""
+        """Check every value and bring positions, lines and lengths into their plainest form."""
         object.__setattr__(self, "length_field", check_length_field(self.length_field))
         taken = self.selection
         for name in ("classes", "returns", "crop"):
@@ -187,48 +289,9 @@ class Settings:
             object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
-        for spec in fields(self):
-            value = getattr(self, spec.name)
-            choices = spec.metadata["choices"]
-            if choices and value not in (*choices, spec.default):
-                raise InputError(f"{spec.name} must be one of {' '.join(choices)}, got {value!r}")
-            if spec.type == "bool" and not isinstance(value, bool):
-                raise InputError(f"{spec.name} must be true or false, got {value!r}")
-            if isinstance(value, float) and not math.isfinite(value):
-                raise InputError(f"{spec.name} must be a finite number, got {value}")
-        for name, low, high in (
-            ("shape_weight", 0, math.inf), ("size_weight", 0, math.inf), ("length_weight", 0, 1),
-            ("search_range", 0.1, 20), ("nearness", 0.1, 1), ("merge_angle", 60, 120), ("box_size", 0.05, 0.5),
-            ("outlier_distance", 0, math.inf),
-            ("boundary_radius", 0.1, 1), ("corner_angle", 10, 180), ("ridge_angle", 0, 180),
-            ("smooth_forward", 0, 1), ("smooth_backward", -1, 0), ("smooth_passes", 0, 10_000),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if value is None and type(self).__dataclass_fields__[name].default is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(f"{name} must be a number, got {value!r}")
-            if not low <= value <= high:
-                raise InputError(f"{name} must lie between {low} and {high}, got {value}")
-        if self.max_deviation is not None and not (
-            isinstance(self.max_deviation, int | float) and self.max_deviation > 0
-        ):
-            raise InputError(f"max_deviation must be positive, got {self.max_deviation}")
+        super().__post_init__()
+        object.__setattr__(self, "fixed", _positions(self.fixed))
         object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
-        if self.fill_holes is not None and not (isinstance(self.fill_holes, int | float) and self.fill_holes >= 0):
-            raise InputError(f"fill_holes must be a length of 0 or more, got {self.fill_holes}")
-        if self.thin_spacing is not None and not (
-            isinstance(self.thin_spacing, int | float) and self.thin_spacing >= 0
-        ):
-            raise InputError(f"thin_spacing must be a length of 0 or more, got {self.thin_spacing}")
-        try:
-            fixed = tuple(tuple(float(c) for c in position) for position in self.fixed)
-        except (TypeError, ValueError):
-            raise InputError(f"fixed must be positions of three numbers, got {self.fixed!r}") from None
-        for position in fixed:
-            if len(position) != 3 or not all(map(math.isfinite, position)):
-                raise InputError(f"a fixed node needs three finite coordinates, got {position}")
-        object.__setattr__(self, "fixed", fixed)
 
     def __repr__(self) -> str:
         """Name the settings that are not the default."""
@@ -243,12 +306,12 @@ class Settings:
 
     @property
     def closed_boundary_length(self) -> float:
-        """Holes with a rim shorter than this are closed [scan unit]."""
+        """Holes with a shorter boundary than this are closed [scan unit]."""
         return HOLE * self.length if self.fill_holes is None else self.fill_holes
 
     @property
     def bridged_boundary_length(self) -> float:
-        """Of these, the front just runs over those with a rim shorter than this; the others are filled [scan unit]."""
+        """Of these, the front runs over those with a shorter boundary than this; the others are filled [scan unit]."""
         return min(HOLE * self.length, self.closed_boundary_length)
 
     def replace(self, **changes: Any) -> Settings:
@@ -262,6 +325,7 @@ class Settings:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Settings:
         """Return settings from plain values; unknown names are refused."""
+        values = {RENAMED.get(name, name): value for name, value in values.items()}
         names = {spec.name for spec in fields(cls)}
         if unknown := sorted(set(values) - names):
             raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
@@ -285,6 +349,33 @@ class Settings:
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
         return cls.from_dict(values)
+
+
+def _positions(given: Any) -> tuple[tuple[float, ...], ...]:
+    """Return fixed positions as tuples of numbers."""
+    try:
+        found = tuple(tuple(float(c) for c in position) for position in given)
+    except (TypeError, ValueError):
+        raise InputError(f"fixed must be positions of three numbers, got {given!r}") from None
+    for position in found:
+        if len(position) != 3 or not all(map(math.isfinite, position)):
+            raise InputError(f"a fixed node needs three finite coordinates, got {position}")
+    return found
+
+
+def _line(line: Any) -> tuple[tuple[float, ...], ...]:
+    """Return a fixed line as tuples of numbers."""
+    try:
+        points = tuple(tuple(float(c) for c in position) for position in line)
+    except (TypeError, ValueError):
+        raise InputError(f"fixed_lines must be polylines of positions of three numbers, got {line!r}") from None
+    for position in points:
+        if len(position) != 3 or not all(map(math.isfinite, position)):
+            raise InputError(f"a fixed line needs points of three finite coordinates, got {position}")
+    points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
+    if len(points) < 2:
+        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
+    return points
 
 
 def check_length_field(given: Any) -> str | Lengths:

@@ -19,30 +19,30 @@ from ..errors import CertificateError, FrontError, InputError, ScanTrussError, w
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
 
-  scantruss info  SCAN                     points, extent, spacing, boundaries, a sensible --length
-  scantruss clean SCAN OUT                 without repeated and stray points, loose pieces, layers, noise
+  scantruss info  SCAN                     points, extent, spacing, boundaries and a suitable --length
+  scantruss clean SCAN OUT                 remove duplicates, outliers, loose pieces, doubled layers and noise
   scantruss grid  SCAN OUT [OUT ...] --length L
-                                           the grid; the suffix of each OUT names its format
+                                           make the grid; the suffix of each OUT names its format
   scantruss thin  SCAN... -o OUT --spacing S
-                                           a scan of any size, thinned to one point a box while it is read
+                                           thin a scan of any size while reading it, to one point per box
   scantruss sweep SCAN --length 3,4,5 --effort quick,normal -o FOLDER
-                                           many grids side by side: a table and pictures, for choosing
+                                           make many grids to choose from: a table and pictures
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
-                                           one watertight solid of a grid saved as .json
+                                           turn a grid saved as .json into one watertight solid
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
-                                           one cloud of overlapping scans in frames of their own
-  scantruss demo  [FOLDER]                 all of it on a bundled scan
+                                           align overlapping scans and merge them into one cloud
+  scantruss demo  [FOLDER]                 do all of it on a bundled scan
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.
 
-Exit status; one line says why it is not 0:
+Exit status (if it is not 0, one line says why):
   0    done
-  1    a fault of ScanTruss
-  2    refused: a scan, setting or file does not do
-  3    the grid fails its certificate; it is written only with --keep-failed
+  1    a bug in ScanTruss
+  2    the scan, a setting or a file cannot be used
+  3    the grid fails its checks; it is written only with --keep-failed
   130  interrupted (Ctrl-C)
-  141  the reader of the output has left, as in "| head -1"; no line
-  143  stopped (SIGTERM)
+  141  the reader of the output has gone, as in "| head -1" (no line)
+  143  terminated (SIGTERM)
 """
 
 

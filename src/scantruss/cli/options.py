@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from ..errors import FormatError, InputError
 from ..selection import Selection, read_crop
-from ..settings import CURVATURE, Settings
+from ..settings import CURVATURE, RECORDS, Settings
 
 Position = tuple[float, float, float]
 
@@ -220,10 +220,16 @@ def describe(spec: Field[Any]) -> str:
 
 def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
     """Add one option for every field of `Settings`, or for the named ones; only what is said explicitly is set."""
-    group = parser.add_argument_group("settings of the method")
-    for spec in fields(Settings):
-        if (names and spec.name not in names) or spec.name == "length_field":
-            continue
+    for record in RECORDS:
+        wanted = [spec for spec in fields(record) if spec.name != "length_field" and (not names or spec.name in names)]
+        if wanted:
+            title = (record.__doc__ or "").rstrip(".").lower()
+            _add_options(parser.add_argument_group(title), wanted)
+
+
+def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) -> None:
+    """Add one option for every field to a group of options."""
+    for spec in specs:
         choices = spec.metadata["choices"]
         options: dict[str, Any] = {"dest": spec.name, "default": argparse.SUPPRESS, "help": describe(spec)}
         if spec.name == "fixed":

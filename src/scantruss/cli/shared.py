@@ -93,7 +93,7 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
     samples = sample_surface(cloud, settings)
     say = f"{command} " if command else ""
     if samples.repeated:
-        bars.note(f"{samples.repeated:,} repeated points are left out; {say}--no-drop-repeated keeps them")
+        bars.note(f"{samples.repeated:,} repeated points are left out; {say}--no-drop-duplicates keeps them")
     if samples.outliers:
         bars.note(f"{samples.outliers:,} stray points are left out; {say}--outlier-distance 0 keeps them")
     pieces, share = samples.left_out

@@ -94,7 +94,7 @@ class _Asked(NamedTuple):
     length: float
     box_size: float | None
     outlier_distance: float
-    drop_repeated: bool
+    drop_duplicates: bool
     uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
     wish: Wish | None
 
@@ -102,7 +102,7 @@ class _Asked(NamedTuple):
     def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
         """Return it for a cloud with this origin."""
         outliers = settings.outlier_distance if settings.clean else 0.0
-        repeated = settings.clean and settings.drop_repeated
+        repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish_of(settings, origin))
 
@@ -128,7 +128,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart sites are, `clean`, `outlier_distance` and `drop_repeated` which points are left
+        `length` and `box_size` decide how far apart sites are, `clean`, `outlier_distance` and `drop_duplicates` which points are left
         out, `length_field` where members are to be longer.
     """
     asked = _Asked.of(settings, cloud.origin)
@@ -154,7 +154,7 @@ def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings)
     """Return the sites of the same points and of made-up ones (F, 3) [scan unit]."""
     points = samples.surface.points
     both = np.concatenate([points, added])
-    asked = _Asked.of(settings, samples.origin)._replace(outlier_distance=0.0, drop_repeated=False)
+    asked = _Asked.of(settings, samples.origin)._replace(outlier_distance=0.0, drop_duplicates=False)
     if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
@@ -234,7 +234,7 @@ def _prepare(
 ) -> SurfaceSamples:
     """Return the sites of points, of which those from the number `measured` on are made up: then none is left out."""
     length, repeated = asked.length, 0
-    if asked.drop_repeated and has_repeats(points):
+    if asked.drop_duplicates and has_repeats(points):
         kept = ~find_repeated(points)
         repeated = int(len(points) - kept.sum())
         points = np.ascontiguousarray(points[kept])
