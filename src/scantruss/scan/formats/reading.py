@@ -11,9 +11,8 @@ import numpy as np
 
 from ...errors import FormatError, InputError
 from ...selection import Selection
+from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
-from ..degrees import degrees_note
-from ..extent import extent_note, extent_of
 from ..units import check_unit
 from .choose import check_attributes, choose, describe, places_in
 from .common_unit import to_common_unit

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...runtime.memory import available_memory
+from ..checks import BULK, degrees_note, usual_extent
 from ..cloud import LARGEST_COORDINATE, PointCloud
-from ..degrees import degrees_note
-from ..extent import BULK, usual_extent
 from ..formats.kinds import read_head
 from ..formats.paths import Source as Names
 from ..formats.paths import files_of, name_of_files
