@@ -20,27 +20,14 @@ from ...errors import FormatError
 from ..units import metres_of_columns
 from .columns import find_attributes, find_columns, fit_columns
 from .content import Cloud, Content, surplus_note
-from .text_layout import (
-    BOM,
-    BYTES_LOOKED_AT,
-    COMMENT,
-    LINE_BREAK,
-    NUMBER,
-    NUMBER_COMMA,
-    Layout,
-    find_layout,
-    header_names,
-    is_number,
-    number_of,
-    split_line,
-)
+from .text_fields import COMMENT, header_names, holds_numbers, number_of, split_line
+from .text_layout import BOM, BYTES_LOOKED_AT, LINE_BREAK, Layout, find_layout
 
 EMPTY = "without coordinates"  # what is said of lines whose fields are empty
 LARGE = 1 << 22  # bytes of text for which importing pyarrow pays
 BYTES_PER_BLOCK = 1 << 24  # bytes read at a time
 ROWS_PER_WRITE = 1 << 16  # rows written at a time
 NAME_IT = "a first line that names the columns (time x y z ...) settles it"
-_BREAKS = re.compile(r"[,;|\s]+")
 _WORDS_IN_COMMENT = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
 
 
@@ -223,7 +210,7 @@ def read_ragged(
         except (ValueError, IndexError):
             if layout.promised is not None and len(row) == 1 and row[0].isdecimal():  # a PTS file of several scans
                 promised += int(row[0])
-            elif _holds_numbers(row, layout.comma):
+            elif holds_numbers(row, layout.comma):
                 raise _no_point(path, layout, count_before() + number, row) from None
             elif row and not any(row):
                 empty += 1
@@ -240,14 +227,6 @@ def read_ragged(
     if names and not names.in_comment:  # its points are in the next block
         _check_names(path, names, names.names, layout, count_before)
     return Rows(np.array(values).reshape(-1, len(columns)), promised, empty)
-
-
-def _holds_numbers(row: Sequence[str], comma: bool) -> bool:
-    """Whether a field is a number, or two are in the line when it is split by any separator: it may have another one."""
-    if any(is_number(field, comma) for field in row):
-        return True
-    words = [word for field in row for word in _BREAKS.split(field)]
-    return sum(bool(NUMBER.fullmatch(word) or NUMBER_COMMA.fullmatch(word)) for word in words) >= 2
 
 
 def _no_point(path: Path, layout: Layout, number: int, row: Sequence[str]) -> FormatError:
@@ -321,17 +300,12 @@ def first_column_note(name: str, layout: Layout, *parts: np.ndarray) -> tuple[st
     values = np.concatenate(parts) if parts else np.empty(0)
     if not layout.has_unnamed_first or len(values) < 3:
         return ()
-    four = len(layout.columns) == 4
-    if four and is_number_of_point(values):
-        if all((np.diff(part[np.isfinite(part)]) == 1).all() for part in parts):
-            return ()
-        how = "whole numbers that only rise, is taken as the number of a point"
-    elif four:
-        return (
-            f"the first column of {name} counts up at the start, but not all through, and is taken as x; {NAME_IT}",
-        )
+    how = ""
+    if len(layout.columns) == 4 and is_number_of_point(values):
+        if any((np.diff(part[np.isfinite(part)]) != 1).any() for part in parts):
+            how = ", whole numbers that only rise, is taken as the number of a point"
+    elif len(layout.columns) == 4:
+        how = " counts up at the start, but not all through, and is taken as x"
     elif _rises(values):
-        return (f"the first column of {name} only rises, as times do, and is taken as x; {NAME_IT}",)
-    else:
-        return ()
-    return (f"the first column of {name}, {how}; {NAME_IT}",)
+        how = " only rises, as times do, and is taken as x"
+    return (f"the first column of {name}{how}; {NAME_IT}",) if how else ()

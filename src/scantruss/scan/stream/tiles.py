@@ -27,7 +27,8 @@ from ..formats.ply_header import PLY, read_header
 from ..formats.systems import system_of
 from ..formats.table import PACKED, READERS
 from ..formats.text import first_column_note, is_number_of_point, read_lines
-from ..formats.text_layout import ANY, Layout, find_layout
+from ..formats.text_fields import ANY
+from ..formats.text_layout import Layout, find_layout
 from ..units import metres_of
 
 TILE = 8_000_000  # points of a tile
