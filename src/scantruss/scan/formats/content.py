@@ -47,5 +47,5 @@ class Cloud(NamedTuple):
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:
-    """Return what should be said of a file with more points than it promises."""
+    """Return a note on a file with more points than it promises."""
     return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

@@ -92,7 +92,7 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 
 def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return which array of an archive holds the points, and what should be said; by names and headers, as all may be large."""
+    """Return which array of an archive holds the points, and notes; by names and headers, as all may be large."""
     fitting, held = [], []
     for name in arrays.files:
         shape, kind = _shape_of(arrays, name, path)

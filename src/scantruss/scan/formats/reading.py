@@ -140,7 +140,7 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
 
 
 def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """Return the points of all files in one unit, the unit, and what should be said."""
+    """Return the points of all files in one unit, the unit, and notes."""
     check_systems(files, [part.system for part in parts])
     unit, notes = joint_notes(files, [part.unit for part in parts], [part.notes for part in parts])
     points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
@@ -151,7 +151,7 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
 def joint_notes(
     files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of all files of a scan, "" where none says one, and what should be said of them, each thing once."""
+    """Return the unit of all files of a scan, "" where none says one, and the notes on them, each once."""
     unit = next((unit for unit in units if unit), "")
     said: dict[str, None] = {}
     for file, own, words in zip(files, units, notes, strict=True):
@@ -162,7 +162,7 @@ def joint_notes(
 
 
 def left_out_note(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
-    """Return what should be said of the points that are left out of the parts of a scan."""
+    """Return a note on the points that are left out of the parts of a scan."""
     return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
 
 

@@ -26,6 +26,7 @@ from .text_layout import BOM, BYTES_LOOKED_AT, LINE_BREAK, Layout, find_layout
 EMPTY = "without coordinates"  # what is said of lines whose fields are empty
 LARGE = 1 << 22  # bytes of text for which importing pyarrow pays
 BYTES_PER_BLOCK = 1 << 24  # bytes read at a time
+BYTES_PER_THREAD = 1 << 22  # bytes that pyarrow gives to a thread
 ROWS_PER_WRITE = 1 << 16  # rows written at a time
 NAME_IT = "a first line that names the columns (time x y z ...) settles it"
 _WORDS_IN_COMMENT = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
@@ -133,7 +134,7 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
 
 def is_plain(block: bytes, layout: Layout) -> bool:
     """Whether a reader that knows one separator and skips what follows a # misses nothing."""
-    if not layout.plain or not block.strip():
+    if not layout.plain or block.isspace():
         return False
     if b"#" not in block:
         return True
@@ -156,7 +157,7 @@ def _read_by_pyarrow(block: bytes, layout: Layout, columns: Sequence[int]) -> np
     try:
         table = csv.read_csv(
             pyarrow.BufferReader(block),
-            csv.ReadOptions(column_names=names),
+            csv.ReadOptions(column_names=names, block_size=BYTES_PER_THREAD),
             csv.ParseOptions(delimiter=separator, quote_char=False),
             csv.ConvertOptions(
                 column_types=dict.fromkeys(wanted, pyarrow.float64()), include_columns=wanted, null_values=[]
@@ -180,10 +181,10 @@ def _with_single_separators(block: bytes, layout: Layout) -> bytes:
     if layout.separator is None:
         block = block.replace(b"\t", b" ").strip(b" ")
         codes = np.frombuffer(block, np.uint8)
-        surplus = (codes[1:] == ord(" ")) & (codes[:-1] <= ord(" "))  # behind another blank or a line's end
-        if surplus.any():
-            block = codes[np.append(True, ~surplus)].tobytes()
-        block = block.replace(b" \n", b"\n")
+        space = codes <= ord(" ")
+        if (space[1:] & space[:-1]).any():
+            surplus = (codes[1:] == ord(" ")) & space[:-1]  # behind another blank or a line's end
+            block = codes[np.append(True, ~surplus)].tobytes().replace(b" \n", b"\n")
     return block.lstrip(b"\n")
 
 
@@ -297,9 +298,9 @@ def is_number_of_point(values: np.ndarray) -> bool:
 
 def first_column_note(name: str, layout: Layout, *parts: np.ndarray) -> tuple[str, ...]:
     """Return a note on how the first column of a file, or of parts of it, is taken; () where it is plain."""
-    values = np.concatenate(parts) if parts else np.empty(0)
-    if not layout.has_unnamed_first or len(values) < 3:
+    if not layout.has_unnamed_first or sum(map(len, parts)) < 3:
         return ()
+    values = np.concatenate(parts)
     how = ""
     if len(layout.columns) == 4 and is_number_of_point(values):
         if any((np.diff(part[np.isfinite(part)]) != 1).any() for part in parts):

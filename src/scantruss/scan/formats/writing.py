@@ -57,7 +57,7 @@ def write_points(
 
 
 def check_cloud_output(path: str | Path) -> Path:
-    """Return the path of a cloud to be written; FormatError where its suffix or its folder will not do."""
+    """Return the path of a cloud to be written; FormatError where its suffix or its folder is not accepted."""
     path = Path(path)
     _writer(path)
     if path.is_dir():
