@@ -1,0 +1,47 @@
+"""The documentation: what it names exists, and its commands are understood."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from scantruss.cli.commands import COMMANDS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+SOURCE = DOCS.parent / "src" / "scantruss"
+
+
+def exists(name: str) -> bool:
+    """Whether a dotted name of the package is there: a module, or a name in one."""
+    parts = name.split(".")
+    for end in range(len(parts), 0, -1):
+        if (SOURCE.joinpath(*parts[:end])).with_suffix(".py").exists() or (
+            SOURCE.joinpath(*parts[:end]) / "__init__.py"
+        ).exists():
+            found = importlib.import_module(".".join(["scantruss", *parts[:end]]))
+            for part in parts[end:]:
+                found = getattr(found, part, None)
+            return found is not None
+    return False
+
+
+@pytest.mark.parametrize("page", ["paper-to-code.md", "api.md", "architecture.md", "choices.md", "limits.md"])
+def test_what_a_page_names_exists(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    packages = "|".join(path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py") and path.stem[0] != "_")
+    names = set(re.findall(rf"`((?:{packages})\.[\w.]+)`", text)) - {"pipeline.py", "candidates.py", "settings.py"}
+    names |= {name.removeprefix("scantruss.") for name in re.findall(r"^::: (\S+)", text, re.MULTILINE)}
+    assert [name for name in sorted(names) if not exists(name)] == []
+    for path in re.findall(r"`((?:\w+/)+\w+\.py)`", text):
+        assert (SOURCE / path).exists() or (DOCS.parent / path).exists(), path
+
+
+@pytest.mark.parametrize("page", sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")))
+def test_the_options_of_each_command_that_is_shown_exist(page):
+    for line in re.findall(r"^ +(scantruss \w+ .*)$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE):
+        words = line.split("#")[0].split()
+        if words[1] in COMMANDS:
+            known = COMMANDS[words[1]][0]().format_help()
+            for option in (word.partition("=")[0] for word in words if re.match("--?[a-z]", word)):
+                assert re.search(rf"(^|[\s,]){re.escape(option)}\b", known), f"{page}: {line}: {option}"
