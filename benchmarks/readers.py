@@ -1,7 +1,7 @@
 """Read big files, side by side with bare libraries: `python -m benchmarks.readers FOLDER [--points N] [--pandas PYTHON]`.
 
 Makes the files in FOLDER where they are not there yet. Each reading is a process of its own; figures are its cpu seconds
-without imports, the least of several rounds, both sides in turn. pandas and pyarrow run in another Python that has them.
+without imports, the least of several rounds, both sides in turn. pandas runs in another Python that has it.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from e57_file import Column, write_scans
+
+from scantruss.scan.formats.writing import write_points
 
 ROUNDS = 3
-OURS = "import scantruss.kernels.scan.decimals\nfrom scantruss.scan.formats.reading import read_content\n"
-OUR_CLOUD = "import scantruss.kernels.scan.decimals\nfrom scantruss.scan.formats.reading import read_points\n"
+OURS = "from scantruss.scan.formats.reading import read_content\n"
+OUR_CLOUD = "from scantruss.scan.formats.reading import read_points\n"
 CASES = (  # suffix, imports of the other, what it does, its name
     (
         ".ply",
@@ -74,11 +77,13 @@ def main() -> None:
 def made(path: Path, count: int) -> Path:
     """Return a file of so many points on a national grid, with three decimals."""
     if not path.exists():
-        from scantruss.scan.formats.writing import write_points
-
         path.parent.mkdir(parents=True, exist_ok=True)
         points = np.random.default_rng(0).random((count, 3)) * [400, 300, 30]
-        write_points(path, np.round(points + [500_000, 4_500_000, 100], 3), unit="m")
+        points = np.round(points + [500_000, 4_500_000, 100], 3)
+        if path.suffix == ".e57":
+            write_scans(path, [([Column(f"cartesian{axis}", points[:, i]) for i, axis in enumerate("XYZ")], "")])
+        else:
+            write_points(path, points, unit="m")
     return path
 
 

@@ -12,9 +12,9 @@ import laspy
 import lzf
 import numpy as np
 from copc_file import copc
+from e57_file import Column, write_scans
 from numpy.lib import recfunctions
 
-from scantruss.scan.formats.e57_writer import Column, write_scans
 from scantruss.scan.formats.writing import write_points
 
 COUNT = 120
@@ -135,7 +135,7 @@ def whole_files() -> dict[str, bytes]:
     p = plate()
     three = list(zip("xyz", ["f4", "f8", "f4"], p.T, strict=True))
     rows = recfunctions.unstructured_to_structured(p, np.dtype([(a, "f8") for a in "xyz"]))
-    files = {f"own{suffix}": written(suffix, p) for suffix in (".ply", ".laz", ".npz", ".e57", ".pcd", ".csv")}
+    files = {f"own{suffix}": written(suffix, p) for suffix in (".ply", ".laz", ".npz", ".pcd", ".csv")}
     files |= {
         "a.ply": ply_ascii(p), "a.las": las(p), "a.laz": las(p, ".laz"), "a.copc.laz": copc(p)[0],
         "a.xyz": text(p), "a.txt": text(p, "# x y z\n"), "a.asc": text(p, "", "\t"), "a.csv": text(p, "X;Y;Z\n", ";"),
@@ -143,7 +143,7 @@ def whole_files() -> dict[str, bytes]:
         "a.pcd": pcd(three, "ascii"), "b.pcd": pcd(three, "binary"),
         "c.pcd": pcd([*three, ("label", "u4", np.zeros(len(p)))], "binary_compressed"),
         "a.e57": e57((axes(p, "scaled", low=-10, high=60_000, scale=0.001), TURN), (axes(p), "")),
-        "a.stl": stl(p), "b.stl": stl_text(p), "a.npy": npy(p), "b.npy": npy(rows),
+        "a.stl": stl(p), "b.stl": stl_text(p), "a.npy": npy(p), "b.npy": npy(rows), "b.e57": e57((axes(p), "")),
         "a.obj": b"".join(b"v " + line + b"\n" for line in text(p).splitlines()) + b"f 1 2 3\n",
         "a.off": text(p, f"OFF\n{len(p)} 1 0\n") + b"3 0 1 2\n",
     }  # fmt: skip

@@ -322,15 +322,6 @@ def test_the_command_overwrites_no_file_of_the_scan_and_no_polygon(tmp_path, mon
     assert {path: path.read_bytes() for path in Path().iterdir()} == held
 
 
-def test_an_e57_file_of_an_unknown_unit_is_said_to_be_in_metres(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    np.savetxt("a.xyz", make("scallop", 2000).points)
-    for command in (["clean", "a.xyz", "o.e57"], ["thin", "a.xyz", "-o", "o.e57", "--spacing", "1"]):
-        for words, said in ((["--unit", "mm"], False), ([], True)):
-            assert main([*command, *words]) == 0
-            assert ("its numbers are written as metres" in capsys.readouterr().out) == said
-
-
 def test_repeats_are_left_out_of_a_grid_where_there_are_many():
     shape = make("scallop", 10_000, duplicates=0.5)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)

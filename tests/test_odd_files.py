@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from e57_file import Column, to_pages
 from hypothesis import given
 from hypothesis import strategies as st
 from scan_files import MOVED, TURN, TURNED, axes, e57, pcd, plate
 
 from scantruss.errors import FormatError, InputError
 from scantruss.scan.formats.e57 import e57_scans, read_e57
-from scantruss.scan.formats.e57_writer import Column
+from scantruss.scan.formats.e57_header import checksums
 from scantruss.scan.formats.pcd import read_pcd
 from scantruss.scan.formats.reading import read_points
 from scantruss.selection import Selection
@@ -170,3 +171,16 @@ def test_e57_over_many_packets(tmp_path: Path) -> None:
     path = tmp_path / "a.e57"
     path.write_bytes(e57((axes(many, "scaled", low=-100, high=50_000, scale=0.001), "")))
     assert np.allclose(read_e57(path).points, many, rtol=0, atol=1e-9)
+
+
+@given(st.binary(min_size=1, max_size=3000))
+def test_checksums_are_those_of_a_bit_by_bit_twin(data: bytes) -> None:
+    pages = to_pages(data)
+    assert pages[:, :1020].tobytes().startswith(data)
+    for page, found in zip(pages, checksums(pages).tolist(), strict=True):
+        state = 0xFFFFFFFF
+        for byte in page[:1020].tolist():
+            state ^= byte
+            for _ in range(8):
+                state = state >> 1 ^ (0x82F63B78 if state & 1 else 0)
+        assert found == state ^ 0xFFFFFFFF and page[1020:].tobytes() == found.to_bytes(4, "big")

@@ -12,7 +12,6 @@ from scan_files import pcd
 from scantruss.errors import FormatError, InputError
 from scantruss.scan.formats import text
 from scantruss.scan.formats.reading import add_counts, read_points
-from scantruss.scan.stream import chunks
 from scantruss.scan.stream.chunks import read_chunks
 from scantruss.scan.stream.thin_scan import thin_scan
 from scantruss.scan.stream.tiles import find_source, tiles_of
@@ -47,7 +46,6 @@ def every_way(path: Path, rows: list[str]) -> list:
     for large in (1 << 23, 0):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(text, "LARGE", large)
-            patch.setattr(chunks, "LARGE", large)
             for read in (in_memory, in_tiles):
                 try:
                     told.append(read(path))

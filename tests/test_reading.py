@@ -15,7 +15,8 @@ from copc_file import copc
 from scan_files import plate, text
 
 from scantruss.errors import FormatError, InputError
-from scantruss.scan.formats.reading import READERS, read_points
+from scantruss.scan.formats.reading import read_points
+from scantruss.scan.formats.table import READERS
 from scantruss.scan.stream.tiles import find_source
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -350,14 +351,6 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
         archive.writestr("points.npy", b"\x93NUMPY\x01\x00no array")
     with pytest.raises(FormatError, match="cannot be read as NPZ"):
         read_points(path)
-
-
-def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(1000))
-    with pytest.raises(FormatError, match=r'needs the package pyarrow; python -m pip install "scantruss\[parquet\]"'):
-        read_points(tmp_path / "a.parquet")
 
 
 def test_copc_is_read_as_another_reader_reads_it(tmp_path: Path) -> None:

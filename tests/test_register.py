@@ -359,7 +359,7 @@ def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(place, c
     assert "x.xyz fits nowhere" in capsys.readouterr().err and not Path("all.ply").exists()
 
 
-@pytest.mark.parametrize("suffix", [".las", ".laz", ".e57", ".ply"])
+@pytest.mark.parametrize("suffix", [".las", ".laz", ".ply"])
 def test_what_is_said_of_the_file_names_only_options_that_splice_has(place, capsys, scanned, monkeypatch, suffix):
     monkeypatch.setattr("scantruss.scan.register.splice_scans", lambda *_, **__: scanned[2])
     assert main(["splice", "*.xyz", "-o", f"out{suffix}"]) == 0
@@ -367,7 +367,6 @@ def test_what_is_said_of_the_file_names_only_options_that_splice_has(place, caps
     assert ("reference system are not kept" in said) == (suffix in (".las", ".laz"))
     options = set(re.findall(r"--[a-z][a-z-]*", said))
     assert options <= set(splice_parser()._option_string_actions)
-    assert options == ({"--unit"} if suffix == ".e57" else set())
 
 
 def test_it_can_be_stopped(scanned):

@@ -112,7 +112,7 @@ def test_the_user_goes_before_the_file(tmp_path: Path) -> None:
     path = scan(tmp_path, wkt(f'COMPD_CS["both",{plane(METRE)},{HEIGHT.format(FOOT)}]'))
     cloud = read_points(path, unit="foot")
     assert cloud.unit == "foot" and np.allclose(cloud.points + cloud.origin, P, atol=1e-9)
-    assert cloud.notes == ("a.las says that its unit is m; --unit foot goes before it",)
+    assert cloud.notes == ("a.las says that its unit is m; --unit foot overrides it",)
     cloud = read_points(path, selection=Selection(z_unit="m"))
     assert np.allclose(cloud.points + cloud.origin, P, atol=1e-9) and not cloud.notes
     (tmp_path / "a.xyz").write_bytes(text(P))

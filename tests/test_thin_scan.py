@@ -20,11 +20,12 @@ from scantruss.cli.main import main
 from scantruss.cli.sweep import sweep_parser, trials_of_words
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.runtime.cluster import Workers
-from scantruss.scan.formats.layout import find_layout
+from scantruss.scan.formats import text as text_format
 from scantruss.scan.formats.reading import read_points
-from scantruss.scan.stream import chunks, fit
+from scantruss.scan.formats.text import read_lines
+from scantruss.scan.formats.text_layout import find_layout
+from scantruss.scan.stream import fit
 from scantruss.scan.stream import thin_scan as streaming
-from scantruss.scan.stream.chunks import text_rows
 from scantruss.scan.stream.fit import read_thinned
 from scantruss.scan.stream.thin_scan import thin_scan
 from scantruss.scan.stream.thinning import thin_points
@@ -174,10 +175,10 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_
     layout = find_layout(path, ("class",))
     columns = (*layout.columns, layout.attributes[0][1])
     block = FILES["a.csv"].split(b"\n", 1)[1]
-    wanted = text_rows(path, block, layout, columns, 0).rows
-    monkeypatch.setattr(chunks, "LARGE", 100)
+    wanted = read_lines(path, block, layout, columns, 0).rows
+    monkeypatch.setattr(text_format, "LARGE", 100)
     monkeypatch.setattr(np, "loadtxt", None)
-    found = text_rows(path, block, layout, columns, 0).rows
+    found = read_lines(path, block, layout, columns, 0).rows
     assert found.tobytes() == wanted.tobytes() and np.array_equal(found[:, 3], CLASS)
 
 

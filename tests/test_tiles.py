@@ -6,7 +6,7 @@ from copc_file import copc
 
 import scantruss as st
 from scantruss.errors import FormatError
-from scantruss.scan.formats.reading import READERS
+from scantruss.scan.formats.table import READERS
 from scantruss.scan.stream import chunks
 from scantruss.scan.stream.chunks import read_ahead, read_chunks
 from scantruss.scan.stream.thin_scan import thin_scan

@@ -91,7 +91,7 @@ def clean(values: Namespace) -> None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [str(out), *([str(report)] if report else [])]
-    said = cloud_file_notes(out, result.unit)
+    said = cloud_file_notes(out)
     print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
 
 

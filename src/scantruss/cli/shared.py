@@ -52,8 +52,8 @@ def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> Non
         bars.note(note if name in note else f"{name}: {note}")
 
 
-def cloud_file_notes(out: Path, unit: str, *, selects: bool = True) -> list[str]:
-    """What to say of a cloud that is written: what its format has places for and is not kept, and a unit that it assumes.
+def cloud_file_notes(out: Path, *, selects: bool = True) -> list[str]:
+    """What to say of a cloud that is written: what its format has places for and is not kept.
 
     `selects`: the command has options for taking points by class and return.
     """
@@ -61,10 +61,6 @@ def cloud_file_notes(out: Path, unit: str, *, selects: bool = True) -> list[str]
     if suffix in (".las", ".laz"):
         more = "; --class and --returns choose before" if selects else ""
         return [f"classes, returns, colours and reference system are not kept{more}"]
-    if suffix == ".e57" and not unit:
-        return [
-            "E57 is in metres, and the unit of the scan is not known: its numbers are written as metres; --unit says it"
-        ]
     return []
 
 

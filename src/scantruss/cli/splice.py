@@ -158,6 +158,6 @@ def show_splice(result: Splice, written: list[Path]) -> None:
         [
             f"{line}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
-            *cloud_file_notes(written[0], result.unit, selects=False),
+            *cloud_file_notes(written[0], selects=False),
         ]
     )

@@ -76,7 +76,7 @@ def thin(values: Namespace) -> None:
             write_points(save.beside(out), result.points, unit=result.unit)
     boundary = f", {result.boundary:,} of them along the rim" if values.boundary else ""
     line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {out}"
-    print_lines([line, *cloud_file_notes(out, result.unit)])
+    print_lines([line, *cloud_file_notes(out)])
 
 
 def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:

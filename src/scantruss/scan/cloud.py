@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .invalid import CAUSE, check_sensible, find_invalid, invalid_values_note
+from .checks import CAUSE, check_sensible, find_invalid, invalid_values_note
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]

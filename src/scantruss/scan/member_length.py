@@ -68,7 +68,7 @@ def length_range(cloud: PointCloud) -> tuple[float, float]:
 
 def _usual_extent(cloud: PointCloud) -> float:
     """Return the longest side of a scan; of its bulk where a few points lie so far away that they are none of it [scan unit]."""
-    from .extent import usual_extent
+    from .checks import usual_extent
 
     usual = float(np.ptp(usual_extent(cloud.points), axis=0).max())
     return usual if 0.0 < usual < 0.5 * cloud.extent else cloud.extent

@@ -1,4 +1,4 @@
-"""Which columns of a text file hold x, y and z: by the names in its header."""
+"""Which columns hold x, y, z and the attributes of points, by their names."""
 
 from __future__ import annotations
 
@@ -19,6 +19,14 @@ _MAP = (
 _FAMILIES = (_DIRECT, _COUNTED, _MAP, (*_DIRECT[:2], _MAP[2]))
 _NUMBER_OF_POINT = re.compile("id|ids|nr|no|num|number|index|idx|point|pointid|pt|name|label|fid|punkt|punktnummer|")
 
+#: attribute -> names that columns and properties have for it, in lower case, letters and digits only
+NAMES = {
+    "class": ("classification", "class", "scalarclassification", "classid"),
+    "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
+    "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
+    "confidence": ("confidence", "scalarconfidence", "conf"),
+}
+
 
 def clean_name(name: str) -> str:
     """Return a column name without quotes, brackets, unit and all that is not a letter or digit of ASCII, in lower case."""
@@ -35,6 +43,16 @@ def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:
         if min(found) >= 0 and len(set(found)) == 3:
             return found[0], found[1], found[2]
     return None
+
+
+def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, int]:
+    """Return the columns that hold the wanted attributes, by their names; those that are not there are left out."""
+    clean = [clean_name(name) for name in names]
+    return {
+        attribute: column
+        for attribute in wanted
+        if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
+    }
 
 
 def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[int, int, int] | None:

@@ -35,7 +35,7 @@ def to_common_unit(
 
 
 def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """Return points whose heights have the unit of x and y, that unit, and what should be said.
+    """Return points whose heights have the unit of x and y, that unit, and notes.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
     content : Content
         What the file holds and says.
     unit : str
-        What the user says; goes before what the file says.
+        What the user gives; it overrides the file.
     z_unit : str
-        What the user says of the heights.
+        What the user gives for the heights.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
     said, metres, z_metres = name_of(content.metres), content.metres, content.z_metres
     name, scale = unit or said, 1.0
     if unit and metres and said != unit:
-        notes.append(f"{path.name} says that its unit is {said or f'{metres:g} m'}; --unit {unit} goes before it")
+        notes.append(f"{path.name} says that its unit is {said or f'{metres:g} m'}; --unit {unit} overrides it")
         z_metres = None
     elif metres and not name:
         name, scale = "m", metres

@@ -1,13 +1,11 @@
-"""What a reader returns: points, the attributes that were asked for, and what the file says of its units."""
+"""What a reader returns and what a writer is given."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
-
-from .columns import clean_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,25 +28,24 @@ class Content:
     feet: str = ""  #: ... unless heights are in feet, or their unit is said
 
 
-#: attribute -> names that columns and properties have for it, in lower case, letters and digits only
-NAMES = {
-    "class": ("classification", "class", "scalarclassification", "classid"),
-    "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
-    "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
-    "confidence": ("confidence", "scalarconfidence", "conf"),
-}
+class Cloud(NamedTuple):
+    """What a writer is given."""
 
+    points: np.ndarray  #: (N, 3) float64 [unit], in the scan's own frame
+    normals: np.ndarray | None  #: (N, 3)
+    unit: str
+    origin: np.ndarray | None  #: (3,) a place near the points
 
-def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, int]:
-    """Return the columns that hold the wanted attributes, by their names; those that are not there are left out."""
-    clean = [clean_name(name) for name in names]
-    return {
-        attribute: column
-        for attribute in wanted
-        if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
-    }
+    @property
+    def columns(self) -> np.ndarray:
+        """Coordinates and, where they are known, normals; (N, 3) or (N, 6)."""
+        return self.points if self.normals is None else np.column_stack([self.points, self.normals])
+
+    def names(self, *normal: str) -> list[str]:
+        """Names of the columns."""
+        return ["x", "y", "z", *(() if self.normals is None else normal)]
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:
-    """Return what should be said of a file with more points than it promises."""
+    """Return a note on a file with more points than it promises."""
     return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

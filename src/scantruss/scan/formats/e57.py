@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import FormatError
-from .content import Content, find_attributes
-from .e57_header import SPHERICAL, Field, Scan, read_pages, read_scans
-from .e57_pages import logical
+from .columns import find_attributes
+from .content import Content
+from .e57_header import SPHERICAL, Field, Scan, logical, read_pages, read_scans
 from .kinds import read_head, wrong_kind
 from .las_header import room_note
 

@@ -1,4 +1,4 @@
-"""What an E57 file says of its scans: the XML behind the points."""
+"""The header of an E57 file: pages of 1020 bytes with a CRC-32C each, and the XML that describes the scans."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ import math
 import re
 import struct
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ...errors import FormatError
-from .e57_pages import DATA, PAGE, checksums, logical
 
+PAGE = 1024  # bytes
+DATA = 1020  # bytes of a page that are data
+MOST_PAGES = 1 << 14  # pages checked in one go
+POLYNOMIAL = 0x82F63B78  # Castagnoli's, bits reversed
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 FLOATS = {"double": 64, "single": 32}
@@ -67,6 +71,35 @@ def read_pages(path: Path) -> np.ndarray:
     if len(wrong):
         raise FormatError(f"{path} is damaged: page {wrong[0] + 1} of {len(pages)} has a wrong checksum; copy it again")
     return pages[:, :DATA].reshape(-1)
+
+
+def logical(place: int) -> int:
+    """Return the byte of the data that a byte of the file holds."""
+    return place // PAGE * DATA + min(place % PAGE, DATA)
+
+
+def checksums(pages: np.ndarray) -> np.ndarray:
+    """Return the CRC-32C of the data of each page, (P,) uint32: two bytes at a time, all pages at once."""
+    table = _table()
+    sums = np.empty(len(pages), dtype=np.uint32)
+    for begin in range(0, len(pages), MOST_PAGES):
+        words = (
+            np.ascontiguousarray(pages[begin : begin + MOST_PAGES, :DATA]).view("<u2").T.astype(np.uint32, order="C")
+        )
+        state = np.full(words.shape[1], 0xFFFFFFFF, dtype=np.uint32)
+        for word in words:
+            state = table[(state ^ word) & 0xFFFF] ^ (state >> 16)
+        sums[begin : begin + MOST_PAGES] = ~state
+    return sums
+
+
+@cache
+def _table() -> np.ndarray:
+    """Return what 16 shifts make of each pair of bytes, (65536,) uint32."""
+    table: np.ndarray = np.arange(1 << 16, dtype=np.uint32)
+    for _ in range(16):
+        table = (table >> 1) ^ np.where(table & 1, np.uint32(POLYNOMIAL), np.uint32(0))
+    return table
 
 
 def read_scans(path: Path, data: np.ndarray) -> list[Scan]:

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 
 from ...errors import FormatError
-from .layout import Layout, find_layout, number_of, split_fields, split_line
+from .text_fields import number_of, split_fields, split_line
+from .text_layout import Layout, find_layout
 
 NAMES = ("length", "member", "desired", "l", "size", "edge")  # of the column of lengths, where a header names columns
 

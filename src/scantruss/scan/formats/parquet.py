@@ -1,4 +1,4 @@
-"""Points of a Parquet file by pyarrow, the extra `parquet`: the columns are those a text file would be read by."""
+"""Points of a Parquet file by pyarrow: the columns are those a text file would be read by."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import FormatError, ScanTrussError
 from ..units import metres_of_columns
-from .columns import check_not_degrees, find_columns
-from .content import Content, find_attributes
+from .columns import check_not_degrees, find_attributes, find_columns
+from .content import Content
 from .kinds import read_head, unreadable, wrong_kind
 
 BATCH = 1 << 18  # rows
@@ -23,12 +23,8 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"PAR1"):
         raise wrong_kind(path, head, "a Parquet file")
-    try:
-        import pyarrow.parquet as parquet
-    except ImportError:
-        raise FormatError(
-            f'{path}: reading .parquet needs the package pyarrow; python -m pip install "scantruss[parquet]"'
-        ) from None
+    import pyarrow.parquet as parquet
+
     try:
         with parquet.ParquetFile(path, memory_map=True) as file:
             return _read(path, file, wanted)
@@ -40,7 +36,7 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:
     """Return the metres a unit of x and y, and of z, that the columns name, without reading them; None where they do not."""
-    with suppress(Exception):  # pyarrow is not there, or the file is damaged: reading its points says so
+    with suppress(Exception):  # of a damaged file reading the points says what is wrong
         import pyarrow.parquet as parquet
 
         names = parquet.read_schema(path).names

@@ -16,7 +16,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import PATTERN, metres_of
-from .content import Content, find_attributes, surplus_note
+from .columns import find_attributes
+from .content import Cloud, Content, surplus_note
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 
 LONGEST_HEADER = 1 << 16  # bytes
@@ -167,3 +168,18 @@ def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.n
         shape = (header.points, header.counts[column])
         table[:, i] = np.ndarray(shape, header.types[column], raw, begin)[:, 0]
     return table
+
+
+def write_pcd(path: Path, cloud: Cloud) -> None:
+    """Write a binary PCD file of doubles."""
+    names = cloud.names("normal_x", "normal_y", "normal_z")
+    count, many = len(cloud.points), len(names)
+    unit = f"# unit {cloud.unit}\n" if cloud.unit else ""
+    head = (
+        f"# .PCD v0.7 - Point Cloud Data file format\n{unit}VERSION 0.7\nFIELDS {' '.join(names)}\n"
+        f"SIZE{' 8' * many}\nTYPE{' F' * many}\nCOUNT{' 1' * many}\nWIDTH {count}\nHEIGHT 1\n"
+        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+    )
+    with path.open("wb") as file:
+        file.write(head.encode())
+        file.write(np.ascontiguousarray(cloud.columns, dtype="<f8").data)

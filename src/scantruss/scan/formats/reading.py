@@ -1,8 +1,8 @@
-"""From files to a PointCloud: the table of formats and `read_points`."""
+"""From files to a PointCloud."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,44 +11,18 @@ import numpy as np
 
 from ...errors import FormatError, InputError
 from ...selection import Selection
+from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
-from ..degrees import degrees_note
-from ..extent import extent_note, extent_of
 from ..units import check_unit
 from .choose import check_attributes, choose, describe, places_in
 from .common_unit import to_common_unit
 from .content import Content
 from .copc import Place
-from .e57 import read_e57
 from .kinds import read_head
 from .las import Places, read_las
-from .numpy_files import read_npy, read_npz
 from .packed import unpacked
-from .parquet import read_parquet
 from .paths import Source, files_of, name_of_files
-from .pcd import read_pcd
-from .ply import read_ply
-from .solids import read_obj, read_off, read_stl
-from .text import read_text
-
-Reader = Callable[[Path, Sequence[str]], Content]
-
-
-def _plain(read: Callable[[Path], np.ndarray]) -> Reader:
-    """Return a reader of a format that holds points alone."""
-    return lambda path, wanted: Content(read(path))
-
-
-#: suffix -> function that returns what a file holds: its points and the wanted attributes
-READERS: dict[str, Reader] = {
-    ".ply": read_ply,
-    ".xyz": read_text, ".txt": read_text, ".csv": read_text, ".pts": read_text, ".asc": read_text,
-    ".las": read_las, ".laz": read_las,
-    ".obj": _plain(read_obj), ".stl": _plain(read_stl), ".off": _plain(read_off),
-    ".npy": read_npy, ".npz": read_npz,
-    ".e57": read_e57, ".pcd": read_pcd, ".parquet": read_parquet,
-}  # fmt: skip
-PACKED = ".gz"
+from .table import PACKED, READERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +140,7 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
 
 
 def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """Return the points of all files in one unit, the unit, and what should be said."""
+    """Return the points of all files in one unit, the unit, and notes."""
     check_systems(files, [part.system for part in parts])
     unit, notes = joint_notes(files, [part.unit for part in parts], [part.notes for part in parts])
     points = parts[0].points if len(parts) == 1 else np.concatenate([part.points for part in parts])
@@ -177,7 +151,7 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
 def joint_notes(
     files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of all files of a scan, "" where none says one, and what should be said of them, each thing once."""
+    """Return the unit of all files of a scan, "" where none says one, and the notes on them, each once."""
     unit = next((unit for unit in units if unit), "")
     said: dict[str, None] = {}
     for file, own, words in zip(files, units, notes, strict=True):
@@ -188,7 +162,7 @@ def joint_notes(
 
 
 def left_out_note(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
-    """Return what should be said of the points that are left out of the parts of a scan."""
+    """Return a note on the points that are left out of the parts of a scan."""
     return tuple(f"{count:,} points {words} are left out" for words, count in add_counts(parts).items())
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import bulk_of
 from ..cloud import PointCloud
-from ..extent import bulk_of
 from .views import View, make_view
 
 PARTS = 75.0  # coarse spacings along the diagonal of a typical scan

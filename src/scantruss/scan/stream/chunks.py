@@ -5,26 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from io import BytesIO, StringIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...errors import FormatError, ScanTrussError
 from ...selection import Selection
-from ..formats.content import Content, find_attributes
+from ..formats.columns import find_attributes
+from ..formats.content import Content
 from ..formats.copc import Place
 from ..formats.kinds import unreadable
 from ..formats.las import check_count, fields_for, fields_of, records_near, take
-from ..formats.ragged_text import EMPTY, Ragged, is_plain, read_ragged
 from ..formats.reading import places_in_file, read_content, select
-from ..formats.regular_text import LARGE, read_block
-from ..formats.rising import NAME_IT, is_number_of_point
+from ..formats.text import EMPTY, NAME_IT, is_number_of_point, read_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..formats.layout import Layout
     from .source import Source, Tile
 
 POINTS_PER_CHUNK = 1_000_000  # points
@@ -199,7 +196,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
-                rows, promised, empty = text_rows(source.path, block, layout, columns, at)
+                rows, promised, empty = read_lines(source.path, block, layout, columns, at)
                 counts.append(promised)
                 if len(source.columns) == 4:
                     if not is_number_of_point(rows[:, 0]):
@@ -210,30 +207,3 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
                 left_out = {EMPTY: empty} if empty else {}
                 yield source.said_of(Content(rows[:, :3], more, left_out=left_out))
-
-
-def text_rows(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Ragged:
-    """Return the columns of the whole lines of a block of text that begins at a byte of its file."""
-    if len(block) > LARGE and (rows := read_block(bytearray(block), layout, columns)) is not None:
-        return Ragged(rows, 0, 0)
-    try:
-        if not is_plain(block, layout):
-            raise ValueError
-        lines = block.replace(b",", b".") if layout.comma else block
-        rows = np.loadtxt(
-            BytesIO(lines), comments="#", delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2
-        )
-        return Ragged(rows, 0, 0)
-    except ValueError:
-        encoding = "utf-8" if layout.encoding.startswith("utf-8") else layout.encoding
-        text = StringIO(block.decode(encoding, errors="replace"), newline=None)
-        return read_ragged(path, text, layout, columns, lambda: _count_lines(path, begin))
-
-
-def _count_lines(path: Path, end: int) -> int:
-    """Return how many lines of a file end before a byte."""
-    count = 0
-    with path.open("rb") as file:
-        while raw := file.read(min(TEXT_BYTES_PER_BLOCK, end - file.tell())):
-            count += raw.count(b"\n")
-    return count

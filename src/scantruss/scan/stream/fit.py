@@ -11,13 +11,13 @@ import numpy as np
 
 from ...runtime.memory import available_memory
 from ...runtime.progress import Progress
+from ..checks import BULK, degrees_note, usual_extent
 from ..cloud import LARGEST_COORDINATE, PointCloud
-from ..degrees import degrees_note
-from ..extent import BULK, usual_extent
 from ..formats.kinds import read_head
 from ..formats.paths import Source as Names
 from ..formats.paths import files_of, name_of_files
-from ..formats.reading import PACKED, read_points
+from ..formats.reading import read_points
+from ..formats.table import PACKED
 from .chunks import Reading, count_unread, read_chunks
 from .opened import open_scan
 from .source import Source

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..formats.content import Content
-from ..formats.layout import Layout
+from ..formats.text_layout import Layout
 
 
 @dataclass(frozen=True)

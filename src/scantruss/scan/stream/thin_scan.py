@@ -12,7 +12,7 @@ from ...errors import FormatError, InputError
 from ...runtime.cluster import Workers
 from ...runtime.progress import Progress
 from ...selection import Selection
-from ..extent import extent_note, extent_of, joined
+from ..checks import extent_note, extent_of, joined
 from ..formats.content import surplus_note
 from ..formats.paths import Source as Names
 from ..formats.paths import name_of_files

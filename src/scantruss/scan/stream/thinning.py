@@ -26,7 +26,7 @@ from ...kernels.scan.thinning import (
     take_nearest,
 )
 from ...runtime.parallel import in_parts
-from ..invalid import CAUSE
+from ..checks import CAUSE
 
 FIRST_ROWS = 4096  # room of a new table
 GROWTH = 1.5  # of a table that is full

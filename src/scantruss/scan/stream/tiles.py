@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 
 from ...errors import FormatError
-from ..formats.content import NAMES, find_attributes
+from ..formats.columns import NAMES, find_attributes
 from ..formats.kinds import kind_of, read_head, unreadable, wrong_kind
 from ..formats.las_header import LASZIP, check_header
-from ..formats.layout import ANY, Layout, find_layout
-from ..formats.numpy_files import is_turned, metres_of_npz, read_array_header
+from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
 from ..formats.packed import unpacked
 from ..formats.parquet import metres_of_parquet
 from ..formats.pcd import read_pcd_header
 from ..formats.ply import row_type
 from ..formats.ply_header import PLY, read_header
-from ..formats.reading import PACKED, READERS
-from ..formats.rising import first_column_note, has_unnamed_first, is_number_of_point
 from ..formats.systems import system_of
+from ..formats.table import PACKED, READERS
+from ..formats.text import first_column_note, is_number_of_point, read_lines
+from ..formats.text_fields import ANY
+from ..formats.text_layout import Layout, find_layout
 from ..units import metres_of
-from .chunks import text_rows
 from .source import Source, Tile
 
 TILE = 8_000_000  # points of a tile
@@ -197,7 +197,7 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     points = min(points, (size - start) // LEAST_LINE + 1)
     columns = layout.columns
     notes: tuple[str, ...] = ()
-    if has_unnamed_first(layout):
+    if layout.has_unnamed_first:
         first = _first_column(path, layout, start, size)
         notes = first_column_note(path.name, layout, *first)
         if len(columns) == 4 and not is_number_of_point(np.concatenate(first)):
@@ -228,5 +228,5 @@ def _first_column(path: Path, layout: Layout, start: int, size: int) -> list[np.
             lines = file.read(BYTES_LOOKED_AT) + file.readline()
             end = file.tell()
         if lines.strip():
-            parts.append(text_rows(path, lines, layout, layout.columns, begin).rows[:, 0])
+            parts.append(read_lines(path, lines, layout, layout.columns, begin).rows[:, 0])
     return parts

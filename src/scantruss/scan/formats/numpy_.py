@@ -14,7 +14,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of
-from .content import Content, find_attributes
+from .columns import find_attributes
+from .content import Cloud, Content
 from .kinds import read_head, unreadable, wrong_kind
 from .packed import check_size
 
@@ -91,7 +92,7 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 
 def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return which array of an archive holds the points, and what should be said; by names and headers, as all may be large."""
+    """Return which array of an archive holds the points, and notes; by names and headers, as all may be large."""
     fitting, held = [], []
     for name in arrays.files:
         shape, kind = _shape_of(arrays, name, path)
@@ -180,3 +181,18 @@ def _content(array: np.ndarray | None, wanted: Sequence[str]) -> Content | None:
         return None
     points = np.column_stack([array[axis] for axis in "xyz"])
     return Content(points, {attribute: array[name] for attribute, name in found.items()})
+
+
+def write_npy(path: Path, cloud: Cloud) -> None:
+    """Write coordinates and normals as columns; the format has no place for the unit."""
+    with path.open("wb") as file:
+        np.save(file, np.ascontiguousarray(cloud.columns))
+
+
+def write_npz(path: Path, cloud: Cloud) -> None:
+    """Write the arrays points, normals and unit."""
+    arrays: dict[str, Any] = {"points": cloud.points, "unit": np.array(cloud.unit)}
+    if cloud.normals is not None:
+        arrays["normals"] = cloud.normals
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)

@@ -1,7 +1,4 @@
-"""An E57 file (ASTM E2807): one scan, or several with their poses.
-
-An own writer of a page on numpy: of the packages that read E57, the one that also writes weighs 33 MB.
-"""
+"""E57 files (ASTM E2807) of one scan or several with their poses, for the tests of the reader."""
 
 from __future__ import annotations
 
@@ -14,10 +11,9 @@ from zlib import crc32
 
 import numpy as np
 
-from .e57_pages import physical, to_pages
+from scantruss.scan.formats.e57_header import DATA, PAGE, checksums
 
 SPACE = "http://www.astm.org/COMMIT/E57/2010-e57-v1.0"
-NORMALS = "http://www.libe57.org/E57_NOR_surface_normals.txt"
 LARGEST_PACKET = 60_000  # bytes; the format allows 65,536
 HEADER = 48  # bytes
 
@@ -62,12 +58,22 @@ class Column:
 Scan = tuple[Sequence[Column], str]  # its columns and the XML of its pose, "" for none
 
 
-def write_e57(path: Path, points: np.ndarray, normals: np.ndarray | None) -> None:
-    """Write one scan of points [m] with doubles for coordinates; normals as the extension for them."""
-    columns = [Column(f"cartesian{axis}", points[:, i]) for i, axis in enumerate("XYZ")]
-    if normals is not None:
-        columns += [Column(f"nor:normal{axis}", normals[:, i], "single") for i, axis in enumerate("XYZ")]
-    write_scans(path, [(columns, "")])
+def physical(place: int) -> int:
+    """Return the byte of the file that holds a byte of the data."""
+    return place // DATA * PAGE + place % DATA
+
+
+def to_pages(data: bytes) -> np.ndarray:
+    """Return data, filled up with zeros, as pages with their checksums, (P, 1024) uint8."""
+    count = -(-len(data) // DATA)
+    pages = np.zeros((count, PAGE), dtype=np.uint8)
+    whole = len(data) // DATA
+    flat = np.frombuffer(data, dtype=np.uint8)
+    pages[:whole, :DATA] = flat[: whole * DATA].reshape(whole, DATA)
+    if whole < count:
+        pages[whole, : len(data) - whole * DATA] = flat[whole * DATA :]
+    pages[:, DATA:] = checksums(pages)[:, None].astype(">u4").view(np.uint8)
+    return pages
 
 
 def write_scans(path: Path, scans: Sequence[Scan]) -> None:
@@ -113,7 +119,7 @@ def _packet(streams: Sequence[bytes]) -> bytes:
 def _document(scans: str, key: int) -> str:
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
-        f'<e57Root type="Structure" xmlns="{SPACE}" xmlns:nor="{NORMALS}">\n'
+        f'<e57Root type="Structure" xmlns="{SPACE}">\n'
         '<formatName type="String">ASTM E57 3D Imaging Data File</formatName>'
         f'<guid type="String">{{{uuid5(NAMESPACE_URL, str(key))}}}</guid>'
         '<versionMajor type="Integer">1</versionMajor><versionMinor type="Integer">0</versionMinor>'

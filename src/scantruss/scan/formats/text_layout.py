@@ -1,12 +1,10 @@
-"""How a text file of points is laid out: separator, decimal sign, header, columns. Found from a part of the file."""
+"""The layout of a text file of points, found from a part of it: separator, decimal sign, header, columns."""
 
 from __future__ import annotations
 
-import csv
-import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,25 +12,16 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of_columns, metres_of_comments
-from .columns import check_not_degrees, fit_columns
-from .content import find_attributes
+from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
+from .text_fields import ANY, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
 
 BYTES_LOOKED_AT = 1 << 16  # bytes looked at, at the start and in the middle
 LINES = 1000  # lines looked at in each part
-ANY = "any"  # blanks, commas and semicolons in one line
-COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
-NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
-NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
+BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
+LINE_BREAK = re.compile(r"\r\n|\n|\r")
 THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
 GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)")
-MISSING = frozenset(
-    [
-        *(sign + word for sign in ("", "+", "-") for word in ("nan", "nan(ind)", "inf", "infinity")),
-        *(sign + word for sign in ("", "-") for word in ("1.#qnan", "1.#ind", "1.#inf")),
-        *("na", "n/a", "null", "none", "-", "--"),
-    ]
-)
 #: separator (None: blanks) and whether a comma may be the decimal sign; the first that fits best is taken
 GRAMMARS: tuple[tuple[str | None, bool], ...] = (
     *((sign, comma) for sign in (";", "|", "\t") for comma in (False, True)),
@@ -67,53 +56,10 @@ class Layout:
         """Whether one sign, which is no decimal sign too, stands between two numbers."""
         return self.separator != ANY and not (self.separator == "," and self.comma)
 
-
-def split_line(line: str, separator: str | None) -> list[str]:
-    """Return the fields of a line without its comment; [] where nothing is left."""
-    if "#" in line or "//" in line:
-        line = COMMENT.split(line, maxsplit=1)[0]
-    return split_fields(line.strip(" \r\n") if separator == "\t" else line.strip(), separator)
-
-
-def split_fields(text: str, separator: str | None) -> list[str]:
-    """Return the fields of a text, without blanks and quotes around them; [] for an empty text."""
-    if not text:
-        return []
-    if separator == ANY:
-        fields = re.split(r"[,;\s]+", text.strip(" ,;\t"))
-    elif separator is None:
-        fields = text.split()
-    elif '"' in text:
-        fields = _split_quoted(text, separator)
-    else:
-        fields = text.split(separator)
-    return [field.strip().strip("\"'").strip() for field in fields]
-
-
-def _split_quoted(text: str, separator: str) -> list[str]:
-    try:
-        return next(csv.reader([text], delimiter=separator, skipinitialspace=True))
-    except csv.Error:
-        return text.split(separator)
-
-
-def is_number(field: str, comma: bool) -> bool:
-    """Return whether a field is a number, or a word for a missing one."""
-    return bool((NUMBER_COMMA if comma else NUMBER).fullmatch(field)) or _is_missing(field)
-
-
-def number_of(field: str, comma: bool) -> float:
-    """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
-    if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
-        return float(re.sub("[dD]", "e", field.replace(",", ".")))
-    if not field or _is_missing(field):
-        return math.nan
-    raise ValueError(field)
-
-
-def _is_missing(field: str) -> bool:
-    """Whether a field is a word for a missing number, or the stars for one that a program had no room for."""
-    return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
+    @property
+    def has_unnamed_first(self) -> bool:
+        """Whether the first of four or more columns may be a number, a time or x, as no header names it."""
+        return not self.named and self.width > 3 and self.columns[0] == 0
 
 
 def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
@@ -132,7 +78,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     if (separator, comma) == (",", True):
         _check_not_thousands(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
-    data = [(number, row) for number, row in split if _count_numbers(row, comma) >= 3]
+    data = [(number, row) for number, row in split if count_numbers(row, comma) >= 3]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
     columns = _numeric_columns([row for _, row in data], comma)
     if not data and not kind:
@@ -141,25 +87,30 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
         raise wrong_kind(path, head, "a text file of points")
     layout = _finish(start, data, columns, encoding, separator, comma)
     _check_no_points(path, start[: layout.skip], separator, comma)
-    lines = list(header_names(start[: layout.skip], separator))
+    return _with_header(path, layout, start[: layout.skip], wanted)
+
+
+def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequence[str]) -> Layout:
+    """Return a layout with what its header says of attributes and units."""
+    lines = list(header_names(header, layout.separator))
     if not layout.named:
         for names in lines:
             check_not_degrees(path, names)
     fitting = [names for names in lines if len(names) == layout.width]
     found = [find_attributes(names, wanted) for names in fitting]
-    metres, z_metres = metres_of_comments(start[: layout.skip]), None
+    metres, z_metres = metres_of_comments(header), None
     for names in fitting if layout.named else ():
         by_name = metres_of_columns(path, [names[column] for column in layout.columns])
         metres, z_metres = by_name if by_name[0] else (metres, z_metres)
     attributes = tuple(max(found, key=len, default={}).items())
-    header = tuple(line.strip() for line in start[: layout.skip])
-    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=header)
+    stripped = tuple(line.strip() for line in header)
+    return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=stripped)
 
 
 def _encoding(head: bytes) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    return "utf-8-sig" if head.startswith(b"\xef\xbb\xbf") else "latin-1"
+    return "utf-8-sig" if head.startswith(BOM) else "latin-1"
 
 
 def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
@@ -169,8 +120,8 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
         raw = file.read(BYTES_LOOKED_AT)
         file.seek(size // 2)
         later = file.read(BYTES_LOOKED_AT // 4) if size > 2 * BYTES_LOOKED_AT and encoding != "utf-16" else b""
-    start = re.split(r"\r\n|\n|\r", raw.decode(encoding, errors="replace"))
-    middle = re.split(r"\r\n|\n|\r", later.decode("latin-1"))[1:-1]
+    start = LINE_BREAK.split(raw.decode(encoding, errors="replace"))
+    middle = LINE_BREAK.split(later.decode("latin-1"))[1:-1]
     return (start[:-1] if size > BYTES_LOOKED_AT and len(start) > 1 else start), middle
 
 
@@ -178,7 +129,7 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     """Return separator and decimal sign by which most lines hold three numbers."""
     scores = []
     for separator, comma in GRAMMARS:
-        scores.append(sum(_count_numbers(split_line(line, separator), comma) >= 3 for line in lines))
+        scores.append(sum(count_numbers(split_line(line, separator), comma) >= 3 for line in lines))
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
         return GRAMMARS[-1]
@@ -189,7 +140,7 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
 def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
     """Whether one line of ten holds more numbers with decimal commas: 1,5;2,5;3,5;200;100;50 has three without."""
     split = [split_line(line, separator) for line in lines]
-    return 10 * sum(_count_numbers(row, True) > _count_numbers(row, False) for row in split) > len(split)
+    return 10 * sum(count_numbers(row, True) > count_numbers(row, False) for row in split) > len(split)
 
 
 def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
@@ -198,8 +149,10 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
         for row in rows[:: len(rows) // 20 + 1]:
             fields = split_line(row, separator)
             grouped = [field for field in fields if GROUPED.fullmatch(field)]
-            if grouped and len(grouped) + _count_numbers(fields, True) >= 3:
-                raise FormatError(f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without")
+            if grouped and len(grouped) + count_numbers(fields, True) >= 3:
+                raise FormatError(
+                    f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without one"
+                )
 
 
 def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
@@ -208,7 +161,7 @@ def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
     if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
         said = next(field for field in fields if "," in field)
         raise FormatError(
-            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with points'
+            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with decimal points'
         )
 
 
@@ -216,17 +169,13 @@ def _check_no_points(path: Path, header: Sequence[str], separator: str | None, c
     """Refuse points above the first line that is split as most are: with another separator they would pass for a header."""
     for number, line in enumerate(header, start=1):
         fields = split_line(line, ANY)
-        if len(fields) >= 3 > _count_numbers(split_line(line, separator), comma) and all(
+        if len(fields) >= 3 > count_numbers(split_line(line, separator), comma) and all(
             is_number(field, False) for field in fields
         ):
             raise FormatError(
                 f"{path}: line {number} ({line.strip()[:60]!r}) holds numbers with another separator than most lines;"
-                " mend or delete it"
+                " correct or delete it"
             )
-
-
-def _count_numbers(row: Sequence[str], comma: bool) -> int:
-    return sum(is_number(field, comma) for field in row)
 
 
 def _numeric_columns(rows: Sequence[Sequence[str]], comma: bool) -> list[int]:
@@ -297,11 +246,3 @@ def _named_columns(
                 if columns:
                     return columns
     return None
-
-
-def header_names(header: Sequence[str], separator: str | None) -> Iterator[list[str]]:
-    """Yield the header lines split by every separator in turn, the line nearest to the points first."""
-    for line in reversed(header):
-        text = line.strip().lstrip("#/%!;* \t").strip()
-        for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
-            yield split_fields(text, sign)

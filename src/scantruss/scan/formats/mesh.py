@@ -6,19 +6,21 @@ Own readers of a few lines: libraries for such files drop vertices without a fac
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import FormatError
+from .content import Content
 from .kinds import is_text, kind_of, read_head, wrong_kind
 
 STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 STL_START = 84  # bytes: a comment of 80 and the number of facets
 
 
-def read_obj(path: Path) -> np.ndarray:
-    """Return the `v` lines of an OBJ file, (N, 3) float64 [scan unit]."""
+def read_obj(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the `v` lines of an OBJ file."""
     head = read_head(path)
     if b"\0" in head or kind_of(head) not in ("", "an OBJ file"):
         raise wrong_kind(path, head, "an OBJ file")
@@ -27,13 +29,13 @@ def read_obj(path: Path) -> np.ndarray:
     if not lines:
         raise FormatError(f"{path} has no line `v x y z`, so no points")
     try:
-        return np.loadtxt(lines, usecols=(1, 2, 3), ndmin=2)
+        return Content(np.loadtxt(lines, usecols=(1, 2, 3), ndmin=2))
     except ValueError:
         raise FormatError(f"{path} has a line `v` without three numbers; the file is damaged") from None
 
 
-def read_off(path: Path) -> np.ndarray:
-    """Return the vertices of an OFF file (also COFF, NOFF, STOFF), (N, 3) float64 [scan unit]."""
+def read_off(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the vertices of an OFF file (also COFF, NOFF, STOFF)."""
     head = read_head(path)
     if kind_of(head) != "an OFF file":
         raise wrong_kind(path, head, "an OFF file")
@@ -48,27 +50,27 @@ def read_off(path: Path) -> np.ndarray:
     if len(rows) < count + faces:
         raise FormatError(f"{path} ends early: its header promises {count:,} points and {faces:,} faces; copy it again")
     if not count:
-        return np.empty((0, 3))
+        return Content(np.empty((0, 3)))
     try:
-        return np.loadtxt(rows[:count], usecols=(0, 1, 2), ndmin=2)
+        return Content(np.loadtxt(rows[:count], usecols=(0, 1, 2), ndmin=2))
     except ValueError:
         raise FormatError(f"{path} has a vertex without three numbers; the file is damaged") from None
 
 
-def read_stl(path: Path) -> np.ndarray:
-    """Return the corners of an STL file, each place once, (N, 3) float64 [scan unit]."""
+def read_stl(path: Path, wanted: Sequence[str] = ()) -> Content:
+    """Return the corners of an STL file, each place once."""
     head = read_head(path)
     size = path.stat().st_size
     facets = int(np.frombuffer(head, "<u4", 1, 80)[0]) if size >= STL_START else -1
     if facets >= 0 and size == STL_START + facets * STL_FACET.itemsize:
-        return _read_stl_binary(path, facets)
+        return Content(_read_stl_binary(path, facets))
     if re.match(rb"\s*solid\b", head) and b"\0" not in head:
-        return _read_stl_text(path)
+        return Content(_read_stl_text(path))
     if facets < 0 or kind_of(head) or is_text(head):
         raise wrong_kind(path, head, "an STL file")
     if size < STL_START + facets * STL_FACET.itemsize:
         raise FormatError(f"{path} ends early: its header promises {facets:,} triangles; copy it again")
-    return _read_stl_binary(path, facets)
+    return Content(_read_stl_binary(path, facets))
 
 
 def _read_stl_binary(path: Path, facets: int) -> np.ndarray:

@@ -1,0 +1,151 @@
+"""Checks of what a scan holds: where its points lie, invalid values, files that lie apart, degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .cloud import PointCloud
+
+POINTS_OF_EXTENT = 10_000  # points that show where a file lies
+BULK = 100_000  # points that show where most of them lie
+FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is an outlier
+BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which the bulk lies
+POINTS_OF_MIDDLE = 2_000  # points that show where the middle half lies
+FEWEST_POINTS = 100  # points below which no value is called invalid
+FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
+MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
+EXTENTS = (1e-30, 1e30)  # of a scan in any unit; swapped bytes make less of a whole number, and more of others
+CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
+WIDEST = 1.0  # degrees that a scan spans at most
+STEEP = 50.0  # heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
+
+
+def extent_of(points: np.ndarray) -> np.ndarray:
+    """Return about the lowest and highest coordinates of points (N, 3), (2, 3); inf and -inf where there are none."""
+    some = points[:: max(len(points) // POINTS_OF_EXTENT, 1)]
+    some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # whole numbers have no inf
+    return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
+
+
+def bulk_of(points: np.ndarray) -> np.ndarray:
+    """Return the lowest and highest coordinates of points (N, 3) but for a few outliers at each end, (2, 3)."""
+    return np.percentile(points[:: max(len(points) // BULK, 1)], BULK_PERCENTILES, axis=0)
+
+
+def usual_extent(points: np.ndarray) -> np.ndarray:
+    """Return about the lowest and highest coordinates of points (N, 3) but for those far from most others, (2, 3).
+
+    As (0, 0, 0) for no echo in a scan with national coordinates. Sparse far ends count.
+    """
+    some = points[:: max(len(points) // BULK, 1)]
+    lower, upper = bulk_of(some)
+    away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
+    near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
+    return np.stack([near.min(axis=0), near.max(axis=0)])
+
+
+def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the extent of both."""
+    return np.stack([np.minimum(one[0], other[0]), np.maximum(one[1], other[1])])
+
+
+def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[str, ...]:
+    """Return a note on files that lie apart, by the extent (2, 3) of each.
+
+    Two lie together where the gap between them is no longer than the longer of them, or where others lead from one to the other.
+    """
+    held = [number for number, extent in enumerate(extents) if np.isfinite(extent).all()]
+    if len(held) < 2:
+        return ()
+    low, high = (np.array([extents[number][side] for number in held]) for side in (0, 1))
+    long = np.linalg.norm(high - low, axis=1)
+    least = np.full(len(held), np.inf)  # gap to those that lie together with the first
+    together, coming = {0}, [0]
+    while coming:
+        one = coming.pop()
+        gap = np.linalg.norm(np.maximum(np.maximum(low - high[one], low[one] - high), 0.0), axis=1)
+        least = np.minimum(least, gap)
+        new = set(np.flatnonzero(gap <= np.maximum(long, long[one])).tolist()) - together
+        together |= new
+        coming += new
+    aside = sorted(set(range(len(held))) - together)
+    if not aside:
+        return ()
+    name = files[held[aside[0]]].name
+    more = f" and {len(aside) - 1:,} more files lie" if len(aside) > 1 else " lies"
+    return (
+        f"{name}{more} about {least[aside].min():.2g} or more from the others, farther than they are long;"
+        " scantruss splice puts scans into one frame",
+    )
+
+
+def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said: str) -> np.ndarray | None:
+    """Return which points lie too far away to belong to the scan, (N,) bool; None where all belong to it.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 array
+        Finite.
+    lower, upper : their smallest and largest coordinates
+    said : str
+        What a message starts with.
+
+    Raises
+    ------
+    InputError
+        They are more than a few.
+    """
+    if len(points) < FEWEST_POINTS:
+        return None
+    some = points[:: max(len(points) // POINTS_OF_MIDDLE, 1)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        low, middle, high = np.percentile(some, [25.0, 50.0, 75.0], axis=0)
+        width = float((high - low).max()) or float(np.ptp(bulk_of(some), axis=0).max())
+        if not width > 0 or max(np.max(upper - middle), np.max(middle - lower)) <= FARTHEST_FROM_MIDDLE * width:
+            return None
+        invalid: np.ndarray = (np.abs(points - middle) > FARTHEST_FROM_MIDDLE * width).any(axis=1)
+    if (count := int(invalid.sum())) > MOST_INVALID_SHARE * len(points):
+        most = np.abs(points[invalid]).max()
+        raise InputError(
+            f"{said}{count:,} of {len(points):,} points lie a million times farther away than half of the scan is wide,"
+            f" with coordinates up to {most:.3g}; {CAUSE}"
+        )
+    return invalid
+
+
+def invalid_values_note(points: np.ndarray) -> str:
+    """Return a note on points that are left out for this."""
+    most = np.abs(points).max()
+    return (
+        f"{len(points):,} points with coordinates up to {most:.3g}, a million times farther away than the scan is wide,"
+        " are left out"
+    )
+
+
+def check_sensible(extent: float, said: str) -> None:
+    """Refuse an extent that no scan has."""
+    if not EXTENTS[0] <= extent <= EXTENTS[1]:
+        raise InputError(f"{said}the points span {extent:.3g}, as no scan does; {CAUSE}")
+
+
+def degrees_note(cloud: PointCloud) -> tuple[str, ...]:
+    """Return a note on a cloud whose x and y look like longitude and latitude; none where its unit is known."""
+    if cloud.unit:
+        return ()
+    some = cloud.points[:: max(len(cloud.points) // POINTS_OF_EXTENT, 1)]
+    lower, upper = bulk_of(some) + cloud.origin
+    x, y, z = upper - lower
+    on_earth = max(-lower[0], upper[0]) <= 180.0 and max(-lower[1], upper[1]) <= 90.0
+    if not (on_earth and min(x, y) > 0.0 and max(x, y) < WIDEST and z >= STEEP * max(x, y)):
+        return ()
+    return (
+        f"x and y look like longitude and latitude in degrees, {x:.2g} by {y:.2g} beside heights of {z:.2g}: a grid needs lengths,"
+        " so project such a scan to a plane system first (QGIS, PDAL filters.reprojection); where they are lengths, --unit says the unit",
+    )
