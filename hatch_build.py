@@ -62,11 +62,16 @@ def compile_kernels(source: Path, folder: Path) -> None:
         words = [sys.executable, str(Path(__file__).resolve())]
         subprocess.run(words, cwd=name, env=environment, check=True, timeout=PATIENCE, stdout=subprocess.DEVNULL)
         (stored,) = Path(name, "scantruss").glob("kernels-*")
-        (machine_code,) = stored.iterdir()
         fresh = folder.with_name(f"{folder.name}-{os.getpid()}")
-        shutil.copytree(machine_code, fresh / stored.name)
+        for room in stored.iterdir():
+            shutil.copytree(room, fresh / stored.name / room_of(room))
         shutil.rmtree(folder, ignore_errors=True)
         fresh.rename(folder)
+
+
+def room_of(folder: Path) -> str:
+    """Return the name of a folder of kernels without the hash of its path that numba appends (`scantruss.runtime.cache.room_of`)."""
+    return folder.name.rpartition("_")[0]
 
 
 def run() -> None:

@@ -12,7 +12,8 @@ import pytest
 from marks import handed_over
 
 ROOT = Path(__file__).resolve().parents[1]
-THIN = ("thin", "shell.npy", "-o", "thin.ply", "--spacing", "1")
+# Compiles little, of two folders of kernels.
+CLEAN = "clean shell.npy clean.ply --keep-outliers --keep-pieces --keep-layers --no-smooth --no-normals".split()
 CODE = "import sys, hatchling.build as build; getattr(build, 'build_' + sys.argv[1])('out')"
 
 pytest.importorskip("hatchling")
@@ -26,7 +27,7 @@ def project(tmp_path):
     shutil.copytree(ROOT / "src", folder / "src", ignore=nothing_made)
     for name in ("pyproject.toml", "README.md", "LICENSE", "hatch_build.py"):
         shutil.copy(ROOT / name, folder)
-    with_commands(folder, " ".join(THIN))
+    with_commands(folder, " ".join(CLEAN))
     return folder
 
 
@@ -49,17 +50,17 @@ def build(project, kind="wheel", **environment):
 
 
 def machine_code_in(folder):
-    return sorted(path.name for path in Path(folder).glob("scantruss/machine_code/kernels-*/*.nbc"))
+    return sorted(path.name for path in Path(folder).glob("scantruss/machine_code/kernels-*/*/*.nbc"))
 
 
-def thin(package, folder):
+def clean(package, folder):
     """Run the command of a package where nothing is stored; say whether it compiled, and what it stored."""
     folder.mkdir()
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "SCANTRUSS_"))}
     environment |= {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": str(package)}
     scan = "import numpy as np; np.save('shell.npy', np.random.default_rng(1).uniform(0.0, 10.0, (5000, 3)))"
     subprocess.run([sys.executable, "-c", scan], cwd=folder, check=True)
-    words = [sys.executable, "-m", "scantruss", *THIN]
+    words = [sys.executable, "-m", "scantruss", *CLEAN]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return "compiling kernels" in done.stdout, sorted(path.name for path in (folder / "cache").rglob("*.nbc"))
@@ -73,9 +74,9 @@ def test_a_wheel_brings_machine_code_and_its_first_run_does_not_compile(project,
     with zipfile.ZipFile(wheel) as content:
         content.extractall(sample)
     assert machine_code_in(sample) and not (project / "out" / "machine_code").exists()
-    assert thin(sample, tmp_path / "first") == (False, [])
+    assert clean(sample, tmp_path / "first") == (False, [])
     shutil.rmtree(sample / "scantruss" / "machine_code")
-    assert thin(sample, tmp_path / "second") == (True, sorted(machine_code_in_wheel(wheel)))
+    assert clean(sample, tmp_path / "second") == (True, sorted(machine_code_in_wheel(wheel)))
 
 
 def machine_code_in_wheel(wheel):
@@ -90,7 +91,7 @@ def test_an_editable_installation_compiles_into_the_source_in_place_of_what_is_t
     wheel, _ = build(project, "editable")
     assert "none-any" in wheel.name and not machine_code_in_wheel(wheel)
     assert machine_code_in(project / "src") and not old.exists()
-    assert thin(project / "src", tmp_path / "first") == (False, [])
+    assert clean(project / "src", tmp_path / "first") == (False, [])
     build(project, "editable")  # once more, where all of it could be found
     assert machine_code_in(project / "src")
 
@@ -100,7 +101,7 @@ def test_a_wheel_for_all_machines_brings_none(project):
     assert wheel.name.endswith("py3-none-any.whl") and not machine_code_in_wheel(wheel)
 
 
-@pytest.mark.parametrize("commands", [("thin missing.npy -o thin.ply --spacing 1",), ()])
+@pytest.mark.parametrize("commands", [("clean missing.npy clean.ply",), ()])
 def test_where_it_cannot_compile_it_says_so_and_the_first_run_does(project, commands):
     with_commands(project, *commands)
     wheel, said = build(project)

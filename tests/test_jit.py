@@ -229,11 +229,12 @@ print(sum(stats.cache_hits.values()), v.__file__)
 @handed_over
 def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path):
     made = Path(run(NUMBA_CACHE_DIR=str(tmp_path / "made"))[0])
-    (machine_code,) = made.iterdir()
     package = tmp_path / "elsewhere" / "scantruss"
     shutil.copytree(KERNELS.parent, package, ignore=shutil.ignore_patterns("__pycache__", "machine_code"))
-    installed = shutil.copytree(machine_code, package / "machine_code" / made.name)
-    stamps = {path: path.stat().st_mtime_ns for path in installed.iterdir()}
+    installed = package / "machine_code" / made.name
+    for room in made.iterdir():
+        shutil.copytree(room, installed / cache.room_of(room))
+    stamps = {path: path.stat().st_mtime_ns for path in installed.rglob("*")}
 
     def find(name, **environment):
         """Use a kernel of that package where nothing is stored yet; say whether it was found and what was stored."""
@@ -246,7 +247,7 @@ def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path
         return int(hits), len(list((tmp_path / name).rglob("*.nbc")))
 
     assert find("fresh") == (1, 0)
-    assert {path: path.stat().st_mtime_ns for path in installed.iterdir()} == stamps
+    assert {path: path.stat().st_mtime_ns for path in installed.rglob("*")} == stamps
     assert find("left aside", SCANTRUSS_INSTALLED="0") == (0, 1)
     assert find("another processor", NUMBA_CPU_NAME="generic") == (0, 1)
     with (package / "kernels" / "boxes.py").open("a") as file:

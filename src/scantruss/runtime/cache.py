@@ -109,7 +109,14 @@ class Store(FunctionCache):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any], installed: Path | None) -> None:
         super().__init__(function)
         stamp = self._impl.locator.get_source_stamp()
+        if installed is not None:
+            installed = installed / room_of(self.cache_path)
         self._cache_file = Files(self.cache_path, self._impl.filename_base, stamp, installed)
+
+
+def room_of(folder: str | Path) -> str:
+    """Return the name of the folder of sources whose machine code numba keeps in `folder`: it appends a hash of its path."""
+    return Path(folder).name.rpartition("_")[0]
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
