@@ -249,7 +249,7 @@ def test_info_names_the_command_whose_options_keep_what_is_left_out(tmp_path, ca
     np.save(tmp_path / "a.npy", shape.points)
     assert main(["info", str(tmp_path / "a.npy"), "--length", str(shape.length)]) == 0
     said = "".join(capsys.readouterr())
-    assert "points are left out; scantruss grid --outlier-distance 0 keeps them" in said
+    assert "outliers are left out; scantruss grid --outlier-distance 0 keeps them" in said
     assert "points are left out; scantruss grid --no-drop-duplicates keeps them" in said
 
 
@@ -284,11 +284,11 @@ def test_the_command_counts_what_it_does_and_writes_normals(tmp_path, capsys):
     np.save(scan, shape.points)
     assert main(["clean", str(scan), str(out), "--report", str(report), "--spacing", "1"]) == 0
     said = capsys.readouterr().out
-    assert "2,000 repeated points left out" in said and "stray points left out" in said
+    assert "2,000 duplicate points left out" in said and "outliers left out" in said
     figures = json.loads(report.read_text())
     assert figures["points_read"] == 13_000
     assert [step["name"] for step in figures["steps"]] == [
-        "duplicates", "near_duplicates", "strays", "pieces", "layers", "noise", "spacing", "normals",
+        "duplicates", "near_duplicates", "outliers", "pieces", "layers", "noise", "spacing", "normals",
     ]  # fmt: skip
     assert np.loadtxt(out).shape == (figures["points"], 6)
 

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import fields, replace
 from pathlib import Path
 from textwrap import indent
@@ -403,9 +404,8 @@ def test_pieces_that_are_too_small_are_counted(place, capsys):
     patch = 0.1 * plate() + np.array([200.0, 0.0, 0.0])
     np.savetxt("scan.xyz", np.concatenate([plate(), patch]))
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH]) == 0
-    assert (
-        "1 of the pieces, " in (said := capsys.readouterr().out) and " % of the scanned surface, are left out" in said
-    )
+    said = capsys.readouterr().out
+    assert "1 piece, " in said and " % of the scanned surface, left out" in said
 
 
 def test_info_says_what_a_length_can_be(place, capsys):
@@ -544,3 +544,18 @@ def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised():
     as_it_is, with_zeros = PointCloud.from_array(points), PointCloud.from_array(odd)
     assert member_length.suggest_length(with_zeros) == pytest.approx(member_length.suggest_length(as_it_is), rel=0.05)
     assert member_length.length_range(with_zeros)[1] == pytest.approx(member_length.length_range(as_it_is)[1], rel=0.05)
+
+
+def test_a_stop_that_another_error_hides_is_still_a_stop(monkeypatch, capsys):
+    """A compiler that is interrupted ends with an error of its own."""
+
+    def interrupted(words):
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10)
+        except BaseException:
+            raise RuntimeError("no compiled object yet") from None
+
+    monkeypatch.setattr(sys.modules[main.__module__], "run", interrupted)
+    assert main(["info", "scan.ply"]) == 143
+    assert capsys.readouterr().err == "scantruss: stopped; nothing was written\n"

@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from .options import Parser
 
 SHARES = {  # option, step that it steers, metavar, default, what it is
-    "duplicates": ("SHARE", 0.01, "points nearer to an earlier one than this share of the spacing are left out"),
+    "duplicates": ("SHARE", 0.01, "remove points closer to an earlier one than this share of the spacing"),
     "outlier-distance": (
         "NUMBER",
         3.0,
-        "points so many times farther from others than their neighbours are left out; 0: none",
+        "remove points this many times farther from others than their neighbours are; 0: none",
     ),
     "loose-pieces": (
         "SHARE",
         0.005,
-        "pieces with fewer than this share of all points, away from all, are left out; narrow clouds with any number of points; 0: none",
+        "remove detached pieces with fewer than this share of all points, and narrow clouds of any size; 0: none",
     ),
-    "layer-distance": ("NUMBER", 2.0, "two layers up to so many spacings apart become one"),
+    "layer-distance": ("NUMBER", 2.0, "merge two layers up to this many spacings apart"),
 }
 KEEP = {
-    "duplicates": ("keep-duplicates", "leave repeated points as they are"),
-    "outlier-distance": ("keep-outliers", "leave stray points as they are"),
-    "loose-pieces": ("keep-pieces", "leave loose small pieces as they are"),
-    "layer-distance": ("keep-layers", "leave doubled layers as they are"),
+    "duplicates": ("keep-duplicates", "keep duplicate points"),
+    "outlier-distance": ("keep-outliers", "keep outliers"),
+    "loose-pieces": ("keep-pieces", "keep loose pieces"),
+    "layer-distance": ("keep-layers", "keep doubled layers"),
 }
 
 
@@ -43,24 +43,24 @@ def clean_parser() -> Parser:
     parser = Parser(
         "clean",
         "SCAN OUT [options]",
-        "Take repeated and stray points, loose pieces, doubled layers and noise off a scan; find normals.",
+        "Remove duplicates, outliers, loose pieces, doubled layers and noise from a scan; compute normals.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("out", metavar="OUT", help="clean cloud; the suffix names the format")
     parser.add_argument("--report", metavar="FILE.json", help="save what each step did")
-    steps = parser.add_argument_group("steps, in their order")
+    steps = parser.add_argument_group("steps, in this order")
     for name, (metavar, default, words) in SHARES.items():
         steps.add_argument(
             f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
         )
         keep, said = KEEP[name]
         steps.add_argument(f"--{keep}", action="store_true", help=said)
-    steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: no noise is taken off")
+    steps.add_argument("--no-smooth", action="store_true", help="keep points where they are: remove no noise")
     steps.add_argument(
         "--spacing",
         metavar="NUMBER",
         type=number,
-        help="one point stays in each search box of this width, in scan units",
+        help="keep one point in each search box of this width, in scan units",
     )
     steps.add_argument("--no-normals", action="store_true", help="write no normals")
     add_reading(parser)

@@ -46,6 +46,9 @@ Exit status (if it is not 0, one line says why):
 """
 
 
+STOPPED = "stopped; nothing was written"
+
+
 def run(words: Sequence[str]) -> None:
     """Run one command."""
     if not words or words[0] in ("-h", "--help", "help"):
@@ -89,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Words after the name of the program; `sys.argv` by default.
     """
-    kept = signal.getsignal(signal.SIGTERM)
+    kept, _Stopped.asked = signal.getsignal(signal.SIGTERM), False
     try:
         try_signal(signal.SIGTERM, _stop)
         run(sys.argv[1:] if arguments is None else arguments)
@@ -98,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     except _Stopped:
-        return refuse("stopped; nothing was written", 143)
+        return refuse(STOPPED, 143)
     except KeyboardInterrupt:
         return refuse("interrupted; nothing was written", 130)
     except FrontError as error:
@@ -112,10 +115,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return refuse("not enough memory; use fewer points or a larger --length")
     except Exception as error:
+        if _Stopped.asked:  # whoever was interrupted, such as the compiler, has made another error of it
+            return refuse(STOPPED, 143)
         if os.environ.get("SCANTRUSS_TRACEBACK"):
             raise
         words = f"{type(error).__name__}: {error}"
-        return refuse(f"a fault of ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
+        return refuse(f"a bug in ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
     finally:
         try_signal(signal.SIGTERM, kept)
     return 0
@@ -128,10 +133,13 @@ def refuse(message: str, status: int = 2) -> int:
 
 
 class _Stopped(BaseException):
-    """Somebody ended the process politely; what is half-written is taken away."""
+    """The process was asked to end (SIGTERM); what is half-written is removed."""
+
+    asked = False
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
+    _Stopped.asked = True
     raise _Stopped
 
 

@@ -87,20 +87,20 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 
 def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
-    """Say so where points of the scan were left out, and the option that keeps them, of another command where this one has none."""
+    """Report points that were left out of the scan, and the option that keeps them; `command` is named if it is of another command."""
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
     say = f"{command} " if command else ""
     if samples.repeated:
-        bars.note(f"{samples.repeated:,} repeated points are left out; {say}--no-drop-duplicates keeps them")
+        bars.note(f"{samples.repeated:,} duplicate points are left out; {say}--no-drop-duplicates keeps them")
     if samples.outliers:
-        bars.note(f"{samples.outliers:,} stray points are left out; {say}--outlier-distance 0 keeps them")
+        bars.note(f"{samples.outliers:,} outliers are left out; {say}--outlier-distance 0 keeps them")
     pieces, share = samples.left_out
     if pieces:
         bars.note(
-            f"{pieces:,} of the pieces, {100 * share:.2g} % of the scanned surface, are left out:"
-            " too small beside the others or for this length"
+            f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {100 * share:.2g} % of the scanned surface, left out:"
+            " too small for this length or compared with the others"
         )
 
 

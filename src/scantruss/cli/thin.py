@@ -22,15 +22,17 @@ def thin_parser() -> Parser:
     parser = Parser(
         "thin",
         "SCAN... -o OUT --spacing S [options]",
-        "Thin a scan of any size to one point a box, with memory for the result only.",
+        "Thin a scan of any size to one point per box; only the result is kept in memory.",
     )
-    parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns as 'tiles/*.laz'")
+    parser.add_argument(
+        "scans", metavar="SCAN", nargs="+", help="scan files, or patterns in quotes such as 'tiles/*.laz'"
+    )
     parser.add_argument("-o", "--out", metavar="OUT", required=True, help="thinned scan; the suffix names the format")
     parser.add_argument("--spacing", metavar="S", type=number, required=True, help="side of a box [scan unit]")
     parser.add_argument(
         "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
     )
-    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points along the rim")
+    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points along the boundary")
     add_workers(parser)
     add_reading(parser)
     return parser
@@ -41,9 +43,9 @@ def add_workers(parser: Parser) -> None:
     from .options import whole_number
 
     parser.add_argument(
-        "--workers", metavar="N", type=whole_number, help="workers on this machine; 1: this process alone"
+        "--workers", metavar="N", type=whole_number, help="worker processes on this machine; 1: only this process"
     )
-    parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="Dask cluster, as tcp://10.0.0.5:8786")
+    parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="Dask cluster, e.g. tcp://10.0.0.5:8786")
 
 
 def thin(values: Namespace) -> None:
@@ -74,7 +76,7 @@ def thin(values: Namespace) -> None:
         bars("write", 0.0)
         with SaveTogether() as save:
             write_points(save.beside(out), result.points, unit=result.unit)
-    boundary = f", {result.boundary:,} of them along the rim" if values.boundary else ""
+    boundary = f", {result.boundary:,} of them along the boundary" if values.boundary else ""
     line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {out}"
     print_lines([line, *cloud_file_notes(out)])
 

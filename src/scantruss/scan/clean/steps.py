@@ -90,11 +90,11 @@ def clean_points(
     cloud = points if isinstance(points, PointCloud) else PointCloud.from_array(points, unit=unit)
     work = _Work(cloud, progress)
     if duplicates is not None:
-        work.leave_out("duplicates", find_repeated(work.points), "repeated points left out")
+        work.leave_out("duplicates", find_repeated(work.points), "duplicate points left out")
         work.leave_out("near_duplicates", find_near_duplicates(work.points, duplicates), "near duplicates left out")
     if outlier_distance:
-        work.say("strays")
-        work.leave_out("strays", find_outliers(work.points, outlier_distance), "stray points left out")
+        work.say("outliers")
+        work.leave_out("outliers", find_outliers(work.points, outlier_distance), "outliers left out")
     work.check_enough()
     if loose_pieces is not None:
         work.say("pieces")
