@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 from shapes import make
 
 import scantruss as st
+from scantruss import clean_points
 from scantruss.cli.main import main
 from scantruss.kernels.geometry import kd_tree as trees
-from scantruss.scan.clean import clean_points
 from scantruss.scan.clean.duplicates import find_near_duplicates, find_repeated, has_repeats
 from scantruss.scan.clean.nearby import Nearby
 from scantruss.scan.clean.pieces import find_loose_pieces

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from scantruss import Grid
-from scantruss.grid.topology import labels
+from scantruss.kernels.geometry.components import component_labels
 
 
 @pytest.mark.kernels
@@ -33,4 +33,4 @@ def test_things_joined_by_links_have_the_lowest_of_them_as_label(count, links):
         both = groups[a] | groups[b]
         for thing in both:
             groups[thing] = both
-    assert labels(count, pairs[:, 0], pairs[:, 1]).tolist() == [min(groups[thing]) for thing in range(count)]
+    assert component_labels(count, pairs[:, 0], pairs[:, 1]).tolist() == [min(groups[thing]) for thing in range(count)]

@@ -5,10 +5,11 @@ import pytest
 from shapes import make
 
 import scantruss as st
+from scantruss import clean_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.scan import outliers as kernels_of_outliers
 from scantruss.kernels.surface import samples as kernels
-from scantruss.scan.clean import clean_points, outliers
+from scantruss.scan.clean import outliers
 from scantruss.scan.clean.nearby import Nearby
 from scantruss.scan.cloud import measure_gap
 from scantruss.surface.samples import sample_surface

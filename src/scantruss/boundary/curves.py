@@ -95,7 +95,7 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
 def smooth_between(
     curve: np.ndarray, at: np.ndarray, places: np.ndarray, halves: Sequence[int]
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """Smooth a closed curve by local quadratics (Savitzky-Golay) of some half widths [steps], corners kept exactly.
+    """Smooth a closed curve by local quadratics of some half widths [steps] with tricube weights (Savitzky-Golay has none); corners stay.
 
     Returns
     -------

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Certificate, Fault, Place, place_of
-from ..grid.topology import labels, pinched_nodes
+from ..grid.topology import pinched_nodes
+from ..kernels.geometry.components import component_labels
 from .crossings import MOST_CROSSINGS
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def _seam(grid: Grid) -> Place | None:
 
 def _smallest_piece(grid: Grid) -> Place:
     """Return a place on the piece of fewest triangles."""
-    piece = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])[grid.triangles[:, 0]]
+    piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])[grid.triangles[:, 0]]
     found, count = np.unique(piece, return_counts=True)
     return place_of(grid.nodes[found[np.argmin(count)]] + grid.origin)
 

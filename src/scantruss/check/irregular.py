@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..grid.topology import labels
+from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -33,6 +33,6 @@ def count_irregular(grid: Grid) -> tuple[int, int]:
     on_boundary[edges[uses != 2].ravel()] = True
     charge = np.where(on_boundary, room + 1, 6) - members
     charge[members == 0] = 0
-    piece = labels(count, edges[:, 0], edges[:, 1])
+    piece = component_labels(count, edges[:, 0], edges[:, 1])
     forced = np.bincount(piece, charge)
     return int(np.abs(charge).sum()), int(np.abs(forced).sum())

@@ -80,7 +80,7 @@ def clean(values: Namespace) -> None:
     steps = _steps(values)
     with Bars() as bars:
         cloud = read_scan(values.scan, settings, bars)
-        from ..scan.clean import clean_points
+        from ..scan.clean.steps import clean_points
 
         with note_compiling(bars):
             result = clean_points(cloud, **steps, progress=bars)

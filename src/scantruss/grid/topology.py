@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..kernels.mesh import figures
+from ..kernels.geometry.components import component_labels
 from .tables import GridTables
 
 
@@ -24,13 +24,6 @@ class Topology:
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON."""
         return asdict(self)
-
-
-def labels(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return for each of `count` things the smallest thing that the links first-second join it with."""
-    label = np.arange(count)
-    figures.join(label, np.ascontiguousarray(first), np.ascontiguousarray(second))
-    return label
 
 
 def _links(grid: GridTables) -> tuple[np.ndarray, np.ndarray]:
@@ -52,7 +45,9 @@ def _is_orientable(grid: GridTables) -> bool:
     starts = grid.triangles.T.ravel()
     turned = starts[one] == starts[other]
     a, b = one % count, other % count
-    label = labels(2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned]))
+    label = component_labels(
+        2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned])
+    )
     return not np.any(label[:count] == label[count:])
 
 
@@ -68,7 +63,7 @@ def pinched_nodes(grid: GridTables) -> np.ndarray:
         for half, found in ((one, first), (other, second)):
             starts = corners[half] == node
             found.append(np.where(starts, half, (half + count) % (3 * count)))
-    label = labels(3 * count, np.concatenate(first), np.concatenate(second))
+    label = component_labels(3 * count, np.concatenate(first), np.concatenate(second))
     fans = np.bincount(corners[np.unique(label)], minlength=len(grid.nodes))
     return np.flatnonzero(fans > 1)
 
@@ -82,10 +77,10 @@ def measure_topology(grid: GridTables) -> Topology:
     triangles, edges, uses = grid.triangles, grid.edges, grid.edge_uses
     if len(triangles) == 0:
         return Topology(components=0, boundary_loops=0, euler=0, manifold=True, orientable=True)
-    node = labels(len(grid.nodes), edges[:, 0], edges[:, 1])
+    node = component_labels(len(grid.nodes), edges[:, 0], edges[:, 1])
     used = np.unique(triangles)
     boundary_edges = edges[uses == 1]
-    boundary_label = labels(len(grid.nodes), boundary_edges[:, 0], boundary_edges[:, 1])
+    boundary_label = component_labels(len(grid.nodes), boundary_edges[:, 0], boundary_edges[:, 1])
     passages = np.bincount(boundary_edges.ravel(), minlength=len(grid.nodes)) // 2
     loops = len(np.unique(boundary_label[boundary_edges[:, 0]])) + int(np.maximum(passages - 1, 0).sum())
     a, b, c = np.sort(triangles, axis=1).T

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import words_of_place
-from ..grid.topology import labels
+from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -48,7 +48,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
 
 def count_holes(grid: Grid) -> int:
     """Count the loops that are not the outer boundary of their piece: every piece with a boundary has one."""
-    label = labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    label = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     pieces = {int(label[loop[0]]) for loop in grid.boundary_loops}
     return len(grid.boundary_loops) - len(pieces)
 

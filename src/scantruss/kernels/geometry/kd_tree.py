@@ -186,3 +186,15 @@ def nearest_others(tree: KDTree, neighbors: np.ndarray, squares: np.ndarray, beg
                 held += 1
         for k in range(held, most):
             neighbors[p, k], squares[p, k] = -1, np.inf
+
+
+@kernel
+def nearest_of_places(tree: KDTree, places: np.ndarray, rank: int, squares: np.ndarray, which: np.ndarray) -> None:
+    """Squared distance of each place (P, 3) from its nearest point for rank 1, from its second nearest for rank 2, and so on.
+
+    squares (P,) and which (P,) int64, the number that this point had, are filled; where there are fewer points the farthest counts.
+    """
+    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(rank, np.int64), np.empty(rank)
+    for i in range(len(places)):
+        last = nearest(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away) - 1
+        squares[i], which[i] = away[last], tree.ids[found[last]]

@@ -40,22 +40,3 @@ def folds_of(nodes: np.ndarray, triangles: np.ndarray, two: np.ndarray, angles: 
         if two[e, 1] >= 0:
             first = _normal_of(nodes, triangles, two[e, 0])
             angles[e] = 180.0 - _angle_between(first, _normal_of(nodes, triangles, two[e, 1]))
-
-
-@kernel
-def _lowest(label: np.ndarray, thing: int) -> int:
-    """The lowest thing known to be joined with a thing; the way there is shortened."""
-    while label[thing] != thing:
-        label[thing] = label[label[thing]]
-        thing = label[thing]
-    return thing
-
-
-@kernel
-def join(label: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
-    """Let each of the things labelled 0, 1, 2... get the lowest that the links first-second join it with (union and find)."""
-    for i in range(len(first)):
-        a, b = _lowest(label, first[i]), _lowest(label, second[i])
-        label[max(a, b)] = min(a, b)
-    for thing in range(len(label)):
-        label[thing] = label[label[thing]]

@@ -1,4 +1,4 @@
-"""Points that belong to no surface: those that stand alone, those that stand off, and small pieces."""
+"""Points that belong to no surface: those that stand alone, and those that stand off."""
 
 from __future__ import annotations
 
@@ -159,46 +159,3 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
         if count >= FLAT:
             _, _, across, spread = _plane_of(offsets, count)
             bulk[i] = across / max(spread, 1e-300)
-
-
-@kernel
-def join_near(neighbors: np.ndarray, squares: np.ndarray, reach: np.ndarray, far: float, piece: np.ndarray) -> None:
-    """Number the pieces of points linked over no more than `far` times the smaller reach of the two; piece (N,) gets the first of each."""
-    for p in range(len(piece)):
-        piece[p] = p
-    for p in range(len(piece)):
-        for k in range(neighbors.shape[1]):
-            n = neighbors[p, k]
-            if n < 0:
-                break
-            limit = far * min(reach[p], reach[n])
-            if squares[p, k] > limit * limit:
-                break
-            a, b = p, n
-            while piece[a] != a:
-                piece[a] = piece[piece[a]]
-                a = piece[a]
-            while piece[b] != b:
-                piece[b] = piece[piece[b]]
-                b = piece[b]
-            piece[max(a, b)] = min(a, b)
-    for p in range(len(piece)):
-        piece[p] = piece[piece[p]]
-
-
-@kernel
-def nearest_of_places(tree: KDTree, places: np.ndarray, away: np.ndarray, which: np.ndarray) -> None:
-    """Distance of each place (P, 3) from the nearest point of a tree, and the number that this point had."""
-    stack, found, squares = np.empty(2 * STACK_LEVELS, np.int64), np.empty(1, np.int64), np.empty(1)
-    for i in range(len(places)):
-        nearest(tree, places[i, 0], places[i, 1], places[i, 2], 1, stack, found, squares)
-        away[i], which[i] = math.sqrt(squares[0]), tree.ids[found[0]]
-
-
-@kernel
-def ranked_of_places(tree: KDTree, places: np.ndarray, rank: int, squares: np.ndarray) -> None:
-    """Squared distance of each place (P, 3) from the point of a tree that is at a rank of nearness to it, 1 for the nearest."""
-    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(rank, np.int64), np.empty(rank)
-    for i in range(len(places)):
-        count = nearest(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away)
-        squares[i] = away[count - 1]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...kernels.geometry.kd_tree import nearest_of_places
 from ...kernels.scan import duplicates as kernels
-from ...kernels.scan import outliers as trees
 from ...runtime.parallel import in_parts
 from .nearby import build_kd_tree
 
@@ -66,6 +66,6 @@ def _densest_spacing(points: np.ndarray) -> float:
     if rank < 1:
         return 0.0
     places = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), SAID)).astype(np.int64)])
-    squares = np.empty(len(places))
-    trees.ranked_of_places(build_kd_tree(points), places, rank + 1, squares)
+    squares, which = np.empty(len(places)), np.empty(len(places), np.int64)
+    nearest_of_places(build_kd_tree(points), places, rank + 1, squares, which)
     return float(np.sqrt(np.quantile(squares, DENSEST) * np.pi / rank))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kernels.geometry import kd_tree as trees
+from ...kernels.geometry.components import join
+from ...kernels.geometry.kd_tree import nearest_of_places
 from ...kernels.scan import outliers as kernels
 from .nearby import REACH_TO, Nearby, build_kd_tree
 from .outliers import THICK
@@ -27,8 +28,7 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     count = len(near.squares)
     if count <= REACH_TO or share == 0.0:
         return np.zeros(count, np.bool_)
-    piece = np.empty(count, np.int64)
-    kernels.join_near(near.neighbors, near.squares, near.reach, LINK, piece)
+    piece = _pieces(near)
     sizes = np.bincount(piece, minlength=count)
     thick, aside = np.empty((2, count))
     kernels.measure_planes(near.tree, np.arange(count), near.neighbors, thick, aside, 0, count)
@@ -39,14 +39,26 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     typical = float(np.median(near.reach))
     while loose.any():
         kept = np.flatnonzero(~loose)
-        tree = build_kd_tree(near.tree.points[kept])
-        away, which = _distances(tree, near.tree.points[loose])
+        away, which = _distances(near.tree.points[loose], near.tree.points[kept])
         beside = away <= PIECE_DISTANCE * np.maximum(typical, near.reach[kept[which]])
         joined = np.unique(piece[loose][beside & ~blob[piece[loose]]])
         if not len(joined):
             break
         loose &= ~np.isin(piece, joined)
     return loose
+
+
+def _pieces(near: Nearby) -> np.ndarray:
+    """Return the piece of each point (N,), numbered by its first point; rows of the tree.
+
+    A point is linked with its neighbours, nearest first, up to the first that is farther than `LINK` times the smaller reach of the two.
+    """
+    reach, piece = near.reach, np.arange(len(near.squares))
+    linked = np.ones(len(piece), np.bool_)
+    for neighbor, square in zip(near.neighbors.T, near.squares.T, strict=True):
+        linked &= (neighbor >= 0) & (square <= (LINK * np.minimum(reach, reach[neighbor])) ** 2)
+        join(piece, np.flatnonzero(linked), neighbor[linked])
+    return piece
 
 
 def _small_clouds(points: np.ndarray, piece: np.ndarray, clouds: np.ndarray, largest: int) -> np.ndarray:
@@ -56,8 +68,8 @@ def _small_clouds(points: np.ndarray, piece: np.ndarray, clouds: np.ndarray, lar
     return np.isin(piece, small)
 
 
-def _distances(tree: trees.KDTree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance of places (P, 3) from the nearest point of a tree, and the number of that point."""
-    away, which = np.empty(len(places)), np.empty(len(places), np.int64)
-    kernels.nearest_of_places(tree, np.ascontiguousarray(places), away, which)
-    return away, which
+def _distances(places: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of places (P, 3) from the nearest of points (N, 3), and the number of that point."""
+    squares, which = np.empty(len(places)), np.empty(len(places), np.int64)
+    nearest_of_places(build_kd_tree(points), np.ascontiguousarray(places), 1, squares, which)
+    return np.sqrt(squares), which

@@ -10,9 +10,9 @@ from ...errors import InputError
 from ...runtime.progress import Progress
 from ..cloud import PointCloud
 from .duplicates import find_near_duplicates, find_repeated
-from .facing import face_one_way
 from .nearby import REACH_TO, Nearby
 from .noise import find_layers, fit_surfaces, onto_surfaces
+from .normals import orient_to_one_side
 from .outliers import find_outliers
 from .pieces import find_loose_pieces
 from .thinning import thin_to
@@ -197,13 +197,13 @@ class _Work:
             _, found = onto_surfaces(near, fit_surfaces(near))
         else:
             found = self._normals[near.tree.ids]
-        facing = face_one_way(near, near.tree.points, found)
+        oriented = orient_to_one_side(near, near.tree.points, found)
         said = (
-            f"normals turned to one side of {facing.pieces} pieces"
-            if facing.pieces > 1
+            f"normals turned to one side of {oriented.pieces} pieces"
+            if oriented.pieces > 1
             else "normals turned to one side"
         )
-        if facing.one_sided:
+        if oriented.one_sided:
             said += "; the surface is one-sided (like a Moebius strip), so somewhere they change sides"
         self.add("normals", len(self.points), said)
-        return near.in_order(facing.normals)
+        return near.in_order(oriented.normals)

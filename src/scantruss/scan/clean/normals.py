@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels.scan import facing as near_kernels
+from ...kernels.scan.normals import turn_like_beside
 from ...kernels.surface import normals as kernels
 from ...runtime.parallel import in_parts
 from ..normals import HEAD_ON, cut_steep_links, face_one_side, face_outside
@@ -21,7 +21,7 @@ SMOOTH = 0.15  # thickness, in their spacings, up to which these are smooth enou
 NEIGHBORS_ASKED = 4  # of them a point asks for its side, the one most beside it counts
 
 
-class Facing(NamedTuple):
+class OrientedNormals(NamedTuple):
     """Sides that have been settled."""
 
     normals: np.ndarray  #: (N, 3) unit normals, rows of the tree
@@ -29,7 +29,7 @@ class Facing(NamedTuple):
     one_sided: int  #: links that meet head-on: some dozens on a one-sided surface
 
 
-def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facing:
+def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) -> OrientedNormals:
     """Turn normals (N, 3) of points (N, 3), rows of the tree, to one side of each piece.
 
     A piece faces away from its middle, which is outwards where it is closed; where that does not tell (a plate) upwards.
@@ -55,6 +55,6 @@ def face_one_way(near: Nearby, points: np.ndarray, normals: np.ndarray) -> Facin
     in_parts(
         len(points),
         POINTS_PER_THREAD,
-        lambda _, begin, end: near_kernels.turn_like_beside(tree, settled, points, turned, NEIGHBORS_ASKED, begin, end),
+        lambda _, begin, end: turn_like_beside(tree, settled, points, turned, NEIGHBORS_ASKED, begin, end),
     )
-    return Facing(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)
+    return OrientedNormals(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)
