@@ -119,7 +119,7 @@ def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed):
     shape = make("terrain", 20_000, outliers=0.1, seed=seed)
     away = shape.distance(shape.points)
     true, far = away < 0.5, away > 1.5 * measure_gap(shape.points)
-    outlier = outliers.find_outliers(shape.points, 3.0, shape.length)
+    outlier = outliers.find_outliers(shape.points, 3.0)
     assert far.sum() > 800
     assert outlier[far].mean() > 0.97
     assert outlier[true].mean() < 0.002
@@ -202,3 +202,35 @@ def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(extent, expect
     bulk = np.empty(len(middle))
     kernels_of_outliers.measure_bulk(near.tree, np.ones(8000, np.bool_), middle, bulk, 0, len(middle))
     assert bulk.mean() == pytest.approx(expected, abs=0.1)
+
+
+def with_sparse_part(points, is_sparse, share, seed=0):
+    """Return points of which only a share is left in a part; and which of them lie there."""
+    kept = ~is_sparse | (np.random.default_rng(seed).random(len(points)) < share)
+    return points[kept], is_sparse[kept]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.04, 0.02])
+def test_a_sparse_part_inside_a_sheet_is_no_stray(share):
+    """A face, or a wall in the shadow, that was scanned with a fraction of the points of the rest."""
+    shape = make("sphere", 60_000)
+    points, sparse = with_sparse_part(shape.points, shape.points[:, 2] > 35.0, share)
+    assert outliers.find_outliers(points, 3.0)[sparse].mean() <= 0.03
+
+
+def test_a_sparse_wall_beside_a_dense_one_is_no_stray():
+    """A vessel whose inner wall has a tenth of the points of the outer one, a little more than its own spacing away."""
+    rng = np.random.default_rng(1)
+    turn, height = rng.uniform(0.0, 2 * np.pi, 44_000), rng.uniform(0.0, 60.0, 44_000)
+    inner = np.arange(44_000) < 4000
+    radius = np.where(inner, 47.0, 50.0) + rng.normal(0.0, 0.05, 44_000)
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+    outlier = outliers.find_outliers(points, 3.0)
+    assert outlier[inner].mean() <= 0.02 and outlier[~inner].mean() <= 0.002
+
+
+def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length():
+    shape = make("cloth", 20_000, outliers=0.05)
+    cloud = st.PointCloud.from_array(shape.points)
+    found = {sample_surface(cloud, st.Settings(length=share * shape.length)).outliers for share in (0.5, 1.0)}
+    assert found == {int(outliers.find_outliers(cloud.points, 3.0).sum())}

@@ -287,7 +287,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
     if asked.outlier_distance and has_outliers(found.neighbors):
-        outlier = find_outliers(points, asked.outlier_distance, length)
+        outlier = find_outliers(points, asked.outlier_distance)
         outliers = int(outlier.sum())
         if outliers:
             points = np.ascontiguousarray(points[~outlier])

@@ -9,11 +9,22 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.quadric import COLUMNS
-from ..geometry.vectors import Vector, dot, norm, row, smallest_eigenvector, spread_along, subtract
+from ..geometry.vectors import Vector, across, cross, dot, norm, row, smallest_eigenvector, spread_along, subtract
 from ..surface.patches import FLAT, FULL, PATCH, doubt, fit
 
 PATCH_FITS = 3  # fits of a patch, each with the points that lie off the one before weighed down
 BULK = 40  # points around a place that tell a cloud from a crease
+FEW_COMPANY, COMPANY = 10, 16  # points that tell whether a sheet goes through a point: a thin one, any
+THIN_SHEET, SHEET = (
+    0.08,
+    0.15,
+)  # thickness of that sheet and distance of the point from it; 1 of 5,000 random points are as flat [radii]
+SIMILAR = 3.0  # reach of a point over that of another up to which they are about as far apart
+MOST_LOOKED_AT = 512  # points among which those are looked for
+SECTORS, EMPTY_SECTORS = (
+    12,
+    5,
+)  # sectors around a point on a sheet, and those side by side without any point where it ends
 THICK = 0.2  # thickness, in radii, from which on the points around a place are no surface to stand off from
 
 
@@ -115,6 +126,90 @@ def _plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, f
 
 
 @kernel
+def find_sheets(
+    tree: KDTree,
+    alive: np.ndarray,
+    like: np.ndarray,
+    reach: np.ndarray,
+    which: np.ndarray,
+    company: np.ndarray,
+    at_edge: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """Look for a thin sheet of points like each of `which` (P,) and about as far apart, however dense the rest of the scan is.
+
+    Parameters
+    ----------
+    like : (N,) bool, points that the sheet may consist of
+    reach : (N,) distance of each point to its eighth neighbour [scan unit]
+    company : (P, COMPANY) int64, filled with the points of the sheet, -1 where there are none
+    at_edge : (P,) bool, filled: no living point lies beyond the point to one side of that sheet
+    """
+    stack, found, away = (
+        np.empty(2 * STACK_LEVELS, np.int64),
+        np.empty(MOST_LOOKED_AT, np.int64),
+        np.empty(MOST_LOOKED_AT),
+    )
+    offsets = np.empty((COMPANY, 3))
+    for i in range(begin, end):
+        p = which[i]
+        place = row(tree.points, p)
+        most, taken, count, exhausted = COMPANY, 0, 0, False
+        while taken < COMPANY and not exhausted:
+            most *= 2
+            count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
+            taken = 0
+            for k in range(count):
+                q = found[k]
+                if q != p and like[q] and taken < COMPANY and SIMILAR * reach[q] >= reach[p]:
+                    offsets[taken, 0], offsets[taken, 1], offsets[taken, 2] = subtract(row(tree.points, q), place)
+                    company[i, taken] = q
+                    taken += 1
+            exhausted = count < most or 2 * most > MOST_LOOKED_AT
+        on = False
+        for few, thin in ((FEW_COMPANY, THIN_SHEET), (COMPANY, SHEET)):
+            on = taken >= few and _is_on_sheet(offsets, few, thin)
+            if on:
+                at_edge[i] = _is_at_edge(tree, alive, place, offsets, few, found, count)
+                company[i, few:] = -1
+                break
+        if not on:
+            company[i] = -1
+
+
+@kernel
+def _is_on_sheet(offsets: np.ndarray, count: int, thin: float) -> bool:
+    """Whether the first of some offsets (K, 3) from a point, nearest first, lie on a plane through it, as far as `thin` tells [radii]."""
+    mean, normal, spread, _ = _plane_of(offsets, count)
+    radius, rms = norm(row(offsets, count - 1)), math.sqrt(spread / count)
+    return rms <= thin * radius and abs(dot(mean, normal)) <= max(2.0 * rms, thin * radius)
+
+
+@kernel
+def _is_at_edge(
+    tree: KDTree, alive: np.ndarray, place: Vector, offsets: np.ndarray, few: int, found: np.ndarray, count: int
+) -> bool:
+    """Whether neither the sheet nor any living point found lies in some five of twelve sectors around a place on that sheet."""
+    _, normal, _, _ = _plane_of(offsets, few)
+    x, taken = across(normal), np.zeros(SECTORS, np.bool_)
+    y = cross(normal, x)
+    for k in range(few + count):
+        if k >= few and not alive[found[k - few]]:
+            continue
+        way = row(offsets, k) if k < few else subtract(row(tree.points, found[k - few]), place)
+        u, v = dot(way, x), dot(way, y)
+        if u != 0.0 or v != 0.0:
+            taken[int((math.atan2(v, u) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS] = True
+    run = 0
+    for k in range(2 * SECTORS):
+        run = 0 if taken[k % SECTORS] else run + 1
+        if run >= EMPTY_SECTORS:
+            return True
+    return False
+
+
+@kernel
 def measure_planes(
     tree: KDTree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
 ) -> None:
@@ -134,8 +229,8 @@ def measure_planes(
         thick[i], aside[i] = np.inf, np.inf
         if count < FLAT or radius == 0.0:
             continue
-        mean, normal, across, _ = _plane_of(offsets, count)
-        rms = math.sqrt(across / count)
+        mean, normal, spread, _ = _plane_of(offsets, count)
+        rms = math.sqrt(spread / count)
         thick[i] = rms / radius
         aside[i] = abs(dot(mean, normal)) / max(rms, 1e-9 * radius)
 
@@ -157,5 +252,5 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
                 count += 1
         bulk[i] = 0.0
         if count >= FLAT:
-            _, _, across, spread = _plane_of(offsets, count)
-            bulk[i] = across / max(spread, 1e-300)
+            _, _, off_plane, spread = _plane_of(offsets, count)
+            bulk[i] = off_plane / max(spread, 1e-300)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...kernels.geometry.components import component_labels
 from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts
 from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
@@ -20,7 +21,6 @@ CLOUD_SHARE = 0.18  # share of the spread across the plane from which on points 
 SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
 CLOUD_NEIGHBORS = 4  # neighbours in a cloud from which on a point is looked at with it
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
-TOO_FAR = 1.1  # the same in member lengths
 LONELY = (
     0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 )
@@ -28,6 +28,8 @@ DENSE = 4  # ... the reach of the densest but so many around it
 PATCH = 28  # points of the surface that a point may stand off
 STANDS_OFF = 5.0  # distance from it, in what is to be expected, from which on it does
 THIN = 0.01  # what is to be expected in any case, in radii of that surface
+SMALLEST_PART = 8  # fewest doubted points that are a part of a sheet
+OPEN_EDGE = 0.05  # share of them beyond which there is no other point to one side, from which on they are a fringe
 LONE = 3e-4  # share of samples without neighbours from which on outliers are looked for
 
 
@@ -36,17 +38,17 @@ def has_outliers(neighbors: np.ndarray) -> bool:
     return bool((neighbors[:, 5] < 0).mean() > LONE)
 
 
-def find_outliers(points: np.ndarray, distance: float, length: float = np.inf) -> np.ndarray:
-    """Return which points are outliers (N,) bool.
+def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
+    """Return which points are outliers (N,) bool: those that lie off every sheet.
 
-    Points are outliers if their reach is more than `distance` times that of their neighbours, if there are hardly any around them
-    in what is a full neighbourhood for those, or if they stand off the surface by far more than the points there do.
+    A point is doubted if its reach is more than `distance` times that of its neighbours, if there are hardly any around it in what
+    is a full neighbourhood for those, or if it stands off the surface by far more than the points there do. It is an outlier
+    unless it lies on a sheet of points that are about as far apart as it is: a sparse part of a scan is none.
 
     Parameters
     ----------
     points : (N, 3) [scan unit]
     distance : as `Settings.outlier_distance`
-    length : desired member length [scan unit]; where points are farther apart no grid can be made of them
     """
     if len(points) <= NEAREST:
         return np.zeros(len(points), np.bool_)
@@ -54,8 +56,9 @@ def find_outliers(points: np.ndarray, distance: float, length: float = np.inf) -
     alive = np.ones(len(points), np.bool_)
     which = np.arange(len(points))
     reach = near.reach
+    first_reach = reach.copy()
     usual = float(np.quantile(reach, 0.75))
-    limit = min(FARTHEST_REACH * usual, max(TOO_FAR * length, distance * float(np.median(reach))))
+    limit = FARTHEST_REACH * usual
     for _ in range(MOST_ROUNDS):
         thick, aside = _planes(near, which)
         outlier = _stand_alone(near, which, reach, distance, limit)
@@ -81,7 +84,33 @@ def find_outliers(points: np.ndarray, distance: float, length: float = np.inf) -
             kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
             found = which[_stand_off(near, alive, which, _planes(near, which)[1] > 0.5 * SIGHT)]
         alive[found] = False
+    doubted = np.flatnonzero(~alive)
+    alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
     return near.in_order(~alive)
+
+
+def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
+    """Return which of the doubted points (D,) lie on a sheet that they form with each other: a sparse part inside the scan.
+
+    A few in one plane may be there by chance, and a sparse fringe beyond the edge of the scan is none of it.
+    """
+    company, at_edge = np.empty((len(doubted), kernels.COMPANY), np.int64), np.zeros(len(doubted), np.bool_)
+    number = np.full(len(alive), -1)
+    number[doubted] = np.arange(len(doubted))
+    in_parts(
+        len(doubted),
+        POINTS_PER_THREAD,
+        lambda _, begin, end: kernels.find_sheets(
+            near.tree, alive, number >= 0, reach, doubted, company, at_edge, begin, end
+        ),
+    )
+    on = company[:, 0] >= 0
+    beside = np.where(company >= 0, number[company], -1)
+    one, other = np.nonzero((beside >= 0) & on[:, None] & on[beside])
+    part = component_labels(len(doubted), one, beside[one, other])
+    size, edges = np.bincount(part, on, len(doubted)), np.bincount(part, on & at_edge, len(doubted))
+    found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size))[part]
+    return found
 
 
 def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
