@@ -10,8 +10,10 @@ from scipy.spatial import cKDTree
 from small_grids import dome
 from surfaces import distance_to_triangles
 
-from scantruss.check.coverage import boxes_of, distances_to_grid, distances_to_scan
+from scantruss.check.distances import boxes_of, distances_to_grid
 from scantruss.kernels.geometry.triangles import distance_to_triangle
+from scantruss.kernels.mesh.coverage import nearest_distances
+from scantruss.kernels.mesh.distances import plane_distances
 
 pytestmark = pytest.mark.kernels
 
@@ -25,8 +27,10 @@ def test_the_nearest_of_all_triangles_is_found(seed: int, away: float) -> None:
     corners = grid.nodes[grid.triangles]
     places = rng.permutation(corners.reshape(-1, 3))[:40] + away * length * rng.normal(size=(40, 3))
     slow = distance_to_triangles(places[:, None], *(corners[None, :, k] for k in range(3))).min(axis=1)
-    found = distances_to_grid(places, boxes_of(places, 0.5 * length), grid, length)
+    found, nearest = distances_to_grid(places, grid, length)
     assert found == pytest.approx(slow, abs=1e-12 * (1 + away * length))
+    at = distance_to_triangles(places, *(corners[nearest, k] for k in range(3)))
+    assert at == pytest.approx(slow, abs=1e-12 * (1 + away * length))
 
 
 @settings(max_examples=20)
@@ -34,7 +38,8 @@ def test_the_nearest_of_all_triangles_is_found(seed: int, away: float) -> None:
 def test_the_nearest_of_all_places_is_found(seed: int, spread: float) -> None:
     rng = np.random.default_rng(seed)
     places, others = rng.normal(size=(60, 3)), spread * rng.normal(size=(25, 3))
-    found = distances_to_scan(others, places, boxes_of(places, 0.25), 0.5)
+    found = np.empty(len(others))
+    nearest_distances(others, places, boxes_of(places, 0.25), 0.5, found)
     assert found == pytest.approx(cKDTree(places).query(others)[0], rel=1e-12)
 
 
@@ -44,3 +49,23 @@ def test_the_distance_to_a_triangle_is_that_of_the_slow_twin(seed: int) -> None:
     p, a, b, c = rng.integers(-3, 4, size=(4, 3)).astype(float)  # now and then flat, or one place
     found = distance_to_triangle(*(tuple(map(float, x)) for x in (p, a, b, c)))
     assert found == pytest.approx(float(distance_to_triangles(p, a, b, c)), abs=1e-12)
+
+
+@settings(max_examples=20)
+@given(some.integers(0, 10_000), some.sampled_from([0.0, 0.3, 30.0]), some.sampled_from([1, 900]))
+def test_the_plane_of_the_nearest_points_is_that_of_least_squares(seed: int, spread: float, copies: int) -> None:
+    """Far from the points too, and where hundreds lie at one place: then the nearest of them counts."""
+    rng = np.random.default_rng(seed)
+    points = np.repeat(rng.normal(size=(40, 3)) * [1.0, 1.0, 0.1], copies, axis=0)
+    places = rng.normal(size=(15, 3)) * [1.0, 1.0, 0.1] + spread * rng.normal(size=(15, 3))
+    found, noise = np.empty(15), np.empty(15)
+    plane_distances(places, points, boxes_of(points, 0.4), 12, 0.1, found, noise)
+    away, which = cKDTree(points).query(places, k=12)
+    if copies > 1:
+        assert (found <= away[:, 0] + 1e-9).all() and (noise < 1e-7).all()
+        return
+    near = points[which] - points[which].mean(axis=1, keepdims=True)
+    _, sizes, axes = np.linalg.svd(near)
+    off = np.abs(np.einsum("qi,qi->q", places - points[which].mean(axis=1), axes[:, 2]))
+    assert found == pytest.approx(np.minimum(off, away[:, 0]), abs=1e-7 * (1 + spread))
+    assert noise == pytest.approx(sizes[:, 2] / np.sqrt(12), abs=1e-7)

@@ -259,15 +259,31 @@ class SmoothingSettings(_Checked):
     smooth_passes: int = _setting(500, "most passes", source="Sec. 4.1", low=0, high=10_000)
 
 
-#: the records in the order of the stages, from reading to smoothing
+@dataclass(frozen=True, kw_only=True)
+class CheckSettings(_Checked):
+    """Limits of a grid that can be built; the certificate says where they were widened."""
+
+    min_angle: float = _setting(15.0, "least angle of a triangle", unit="degree", source="", low=0.0, high=60.0)
+    min_length: float = _setting(0.5, "shortest member, in desired lengths", low=0.0, high=1.0)
+    max_length: float = _setting(1.8, "longest member, in desired lengths", low=1.0)
+    min_fold: float = _setting(
+        15.0, "least angle between neighbouring triangles; 180 is level", unit="degree", low=0.0, high=180.0
+    )
+    max_offset: float = _setting(
+        0.1, "largest distance of a node from the scan beyond its noise, in member lengths", low=0.0
+    )
+
+
+#: the records in the order of the stages, from reading to checking
 RECORDS = (
     MemberSettings, ReadingSettings, CleaningSettings, SurfaceSettings, BoundarySettings, ConstraintSettings, FrontSettings,
-    SmoothingSettings,
+    SmoothingSettings, CheckSettings,
 )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(
+    CheckSettings,
     SmoothingSettings,
     FrontSettings,
     ConstraintSettings,

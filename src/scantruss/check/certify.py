@@ -11,23 +11,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import CertificateError
-from ..grid.certificate import Certificate, Fault, Worst, place_of
-from ..kernels.mesh.figures import folds_of
+from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from .coverage import distances_to_grid, distances_to_scan, places_to_reach
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
+from .distances import Distances, measure_distances
+from .folds import fold_angles
 from .irregular import count_irregular
+from .left_out import parts_left_out
+from .limits import limits_of, places_to_look_at, widened_limits
 from .sheets import faults_on_sheets, nodes_of_samples
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
-    from ..kernels.geometry.boxes import SearchBoxes
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-COVER_REACH = 0.5  # distance within which a part of the scan and a triangle are in reach of each other [member lengths]
+COVER_REACH = (
+    0.5  # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
+)
 
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -38,11 +41,12 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     grid : Grid
         Of the same origin as the scan.
     samples : SurfaceSamples
-        The surface samples of the scan.
+        The surface samples of the scan, with all points that were read.
     boundary : Boundary
         Boundary loops of the scan.
     settings : Settings
-        `length` is the desired member length, `fill_holes` tells which holes are closed, `fixed` where nodes must be.
+        `length` is the desired member length, `fill_holes` tells which holes are closed, `fixed` where nodes must be; the limits of
+        a grid that can be built.
 
     Returns
     -------
@@ -54,20 +58,19 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
         fault = Fault("empty", empty or "has nodes that are nowhere")
         return replace(_topology(grid, samples, boundary, settings), faults=(fault,))
     length = settings.length
-    places, boxes = places_to_reach(samples, length)
-    nearest, left, certificate = side_by_side(
+    found = measure_distances(grid, samples, length)
+    nearest, cuts, certificate = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
-        lambda: distances_to_grid(places, boxes, grid, length),
+        lambda: find_crossings(grid.nodes, grid.triangles),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
     )
-    cuts = find_crossings(grid.nodes, grid.triangles)
-    certificate = replace(certificate, crossings=len(cuts), **_from_scan(grid, length, places, boxes))
-    on_sheets = faults_on_sheets(grid, samples, nearest)
-    certificate = replace(certificate, **_from_grid(grid, samples, length, places, left))
+    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, found, length))
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
+    too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
-    faults += [fault for fault in on_sheets if fault.kind not in known]
-    return replace(certificate, faults=tuple(faults))
+    faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
+    warnings = (*poor, *places_to_look_at(certificate))
+    return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 
 def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
@@ -106,31 +109,35 @@ def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     )
 
 
-def _from_scan(grid: Grid, length: float, places: np.ndarray, boxes: SearchBoxes) -> dict[str, Any]:
-    """Return how far the grid lies from the scan, places (P, 3) of which are given by box."""
-    middles = grid.nodes[grid.triangles].mean(axis=1)
-    members = np.full(len(middles), length) if grid.desired is None else grid.desired[grid.triangles].mean(axis=1)
+def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> dict[str, Any]:
+    """Return how far the scan lies from the grid and the grid from the scan, and what is left out."""
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    away = distances_to_scan(np.concatenate([middles, grid.nodes]), places, boxes, length)
-    off_surface, off = away[: len(middles)], away[len(middles) :]
-    if grid.deviation is not None:  # where a patch ends at a boundary it may say more than there is
-        off = np.where(np.isnan(grid.deviation), np.nan, np.fmin(off, grid.deviation))  # not over closed holes
+    at_triangles = at_nodes[grid.triangles].mean(axis=1)
+    members = at_triangles[found.triangle]
+    known = found.middles[np.isfinite(found.middles)]
+    in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.middles)]
     return {
-        "grid_within_reach": float((off_surface <= COVER_REACH * members).mean()),
-        "farthest_triangle": _worst(off_surface, middles, grid, length / members),
-        "node_deviation": _worst(off, grid.nodes, grid, length / at_nodes),
+        "points": len(samples.scan),
+        "left_out": parts_left_out(samples, found, members, COVER_REACH * members),
+        "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
+        "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
+        "scan_distance": _spread(found.scan, samples.scan, grid, length / members),
+        "triangle_distance": _spread(
+            found.middles, grid.nodes[grid.triangles].mean(axis=1), grid, length / at_triangles
+        ),
+        "node_distance": _spread(found.nodes, grid.nodes, grid, length / at_nodes),
+        "noise": float(np.median(found.noise)),
     }
 
 
-def _from_grid(
-    grid: Grid, samples: SurfaceSamples, length: float, places: np.ndarray, left: np.ndarray
-) -> dict[str, Any]:
-    """Return how far the scan lies from the grid; `left` (P,) is the distance of places (P, 3) of the scan from it."""
-    local = length * samples.surface.field[samples.kept]
-    return {
-        "scan_within_reach": float((left <= COVER_REACH * local).mean()),
-        "farthest_scan": _worst(left, places, grid, length / local),
-    }
+def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:
+    """Return the quantiles of distances (K,), and the one that is largest times its weight (K,) with its place (K, 3)."""
+    known = values[np.isfinite(values)]
+    worst = _worst(values, places, grid, weight)
+    if worst is None:
+        return None
+    p50, p95, p99 = np.quantile(known, [0.5, 0.95, 0.99]).tolist()
+    return Spread(p50, p95, p99, worst)
 
 
 def _extremes(grid: Grid, settings: Settings) -> dict[str, Any]:
@@ -157,13 +164,6 @@ def _worst(values: np.ndarray, places: np.ndarray, grid: Grid, weight: float | n
         return None
     at = known[np.argmax((weight * values)[known])]
     return Worst(float(values[at]), place_of(places[at] + grid.origin))
-
-
-def fold_angles(grid: Grid) -> np.ndarray:
-    """Return the angle between the first two triangles at each member, (E,) [degree]: 180 level, 0 folded flat; NaN at the boundary."""
-    angles = np.empty(len(grid.edges))
-    folds_of(grid.nodes, grid.triangles, grid.edge_triangles, angles)
-    return angles
 
 
 def _fixed_error(grid: Grid, settings: Settings) -> Worst | None:

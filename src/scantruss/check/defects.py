@@ -22,7 +22,6 @@ OFF_SURFACE = (
     0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
 )
 UNEVEN_LENGTHS = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
-FOLDED = 10.0  #: angle between neighbouring triangles below which one lies on the other [degree]
 FIXED_TOLERANCE = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
 
 
@@ -85,22 +84,18 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         more = " or more" if len(crossings) == MOST_CROSSINGS else ""
         where = place_of(grid.nodes[grid.triangles[crossings[0]]].mean(axis=(0, 1)) + grid.origin)
         faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
-    if found.sharpest_fold and found.sharpest_fold.value < FOLDED:
-        faults.append(Fault("folded", "is folded over onto itself", found.sharpest_fold.where))
     quality = grid.quality
     uneven = quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
     if uneven > UNEVEN_LENGTHS and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
-    if 1.0 - found.scan_within_reach > LEFT_OUT and found.farthest_scan:
-        faults.append(
-            Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", found.farthest_scan.where)
-        )
+    if 1.0 - found.scan_within_reach > LEFT_OUT and found.scan_distance:
+        where = found.scan_distance.largest.where
+        faults.append(Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
-    for worst in (found.farthest_triangle, found.node_deviation):
-        if worst and worst.value > gone * _length_at(grid, worst.where, settings):
-            faults.append(Fault("astray", "covers what the scan does not", worst.where))
-            break
+    worst = found.triangle_distance.largest if found.triangle_distance else None
+    if worst and worst.value > gone * _length_at(grid, worst.where, settings):
+        faults.append(Fault("astray", "covers what the scan does not", worst.where))
     if found.fixed_error and not found.fixed_error.value <= FIXED_TOLERANCE * settings.length:
         faults.append(Fault("fixed", "has no node at a fixed position", found.fixed_error.where))
     return faults

@@ -121,9 +121,11 @@ def make_grid(
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:
     """Print the figures of Table 2, the worst places and what was written."""
-    from ..report.figures import certificate_rows, grid_lines, quality_rows
+    from ..report.figures import certificate_rows, first_line, grid_lines, quality_rows
     from ..report.terminal import print_lines, print_table
 
+    if result.certificate is not None:
+        print_lines(first_line(result.certificate))
     print_table(("", "before", "after optimization"), quality_rows(result))
     if result.certificate is not None:
         print_table(("worst", "", "at"), certificate_rows(result.certificate))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from ..errors import words_of_place
@@ -28,6 +28,45 @@ class Fault:
 
 
 @dataclass(frozen=True)
+class Spread:
+    """Distances: the median, what 95 and 99 % are below, and the largest with its place [scan unit]."""
+
+    p50: float
+    p95: float
+    p99: float
+    largest: Worst
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Points of the scan that the grid does not follow, or a hole that it closes."""
+
+    kind: str  #: duplicates outliers sparse pieces far hole, or why points were not read
+    points: int
+    share: float  #: of all points that were read
+    where: Place | None = None  #: middle, in the scan's own frame
+    size: float | None = None  #: longest side of the box around it [scan unit]
+    farthest: float | None = None  #: largest distance from the grid [scan unit]
+    asked: bool = False  #: a setting asked for it; else it was ScanTruss's own judgement
+
+    @property
+    def words(self) -> str:
+        """Say what it is."""
+        return KINDS_LEFT_OUT.get(self.kind, self.kind)
+
+
+#: words for the kinds of `LeftOut` that a grid knows of itself
+KINDS_LEFT_OUT = {
+    "duplicates": "duplicates",
+    "outliers": "outliers, which lie on no surface",
+    "sparse": "too far apart for this length",
+    "pieces": "in pieces too small for this length",
+    "far": "farther than a member from the grid",
+    "hole": "hole closed",
+}
+
+
+@dataclass(frozen=True)
 class Certificate:
     """What holds for a grid; lengths in the scan's unit, places in the scan's own frame."""
 
@@ -42,14 +81,23 @@ class Certificate:
     euler: int  #: nodes - members + triangles = 2 pieces - 2 handles - boundary loops
     handles: int | None  #: None where the grid is no oriented manifold
     faults: tuple[Fault, ...] = ()
+    warnings: tuple[Fault, ...] = ()  #: what is poor and yet can be built
+    widened: tuple[str, ...] = ()  #: limits that the settings make wider than the defaults
+    points: int = 0  #: points that were read, all of which the distances count
+    left_out: tuple[LeftOut, ...] = ()  #: what the grid does not follow, the most points first
     crossings: int = 0  #: pairs of triangles that cut, touch or cover each other; exact, and at most 100 are counted
-    scan_within_reach: float = 0.0  #: share of the scan that lies within `reach` of a triangle
-    grid_within_reach: float = 0.0  #: share of the triangles whose middle lies within `reach` of the scan
-    farthest_scan: Worst | None = None  #: distance of a part of the scan from the nearest triangle
-    farthest_triangle: Worst | None = None  #: distance of the middle of a triangle from the nearest part of the scan
-    node_deviation: Worst | None = (
-        None  #: distance of a node from the scanned surface, or from a part of it if that is less
+    scan_within_reach: float = 0.0  #: share of all points that were read that lie within `reach` of a triangle
+    grid_within_reach: float = (
+        0.0  #: share of the triangles whose middle lies within `reach` of a point, closed holes aside
     )
+    scan_distance: Spread | None = None  #: of every point that was read from the nearest triangle
+    triangle_distance: Spread | None = (
+        None  #: of the middle of each triangle from the nearest point, closed holes aside
+    )
+    node_distance: Spread | None = (
+        None  #: of each node from the plane of the 12 nearest points, or the nearest if that is less
+    )
+    noise: float = 0.0  #: median rms distance of the 12 points nearest to a node from their plane [scan unit]
     shortest_member: Worst | None = None
     longest_member: Worst | None = None
     smallest_angle: Worst | None = None  #: [degree]
@@ -64,29 +112,44 @@ class Certificate:
         """Whether nothing is wrong."""
         return not self.faults
 
+    @property
+    def judged_out(self) -> float:
+        """Share of the points that were read that ScanTruss itself left out, duplicates aside."""
+        own = (part for part in self.left_out if not part.asked and part.kind != "duplicates")
+        return sum(part.share for part in own)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; `passed` first."""
-        return {"passed": self.passed, **asdict(self), "faults": [asdict(fault) for fault in self.faults]}
+        values = asdict(self)
+        return {"passed": self.passed, **{k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Certificate:
         """Return a certificate from plain values."""
-        plain = {name: value for name, value in values.items() if name != "passed"}
+        known = {spec.name for spec in fields(cls)}
+        plain = {name: value for name, value in values.items() if name in known}
         for name, value in plain.items():
             if isinstance(value, dict):
-                plain[name] = Worst(float(value["value"]), place_of(value["where"]))
-        faults = [
-            Fault(fault["kind"], fault["words"], None if fault["where"] is None else place_of(fault["where"]))
-            for fault in plain["faults"]
-        ]
-        return cls(**{**plain, "faults": tuple(faults)})
+                plain[name] = _spread_of(value) if "p50" in value else _worst_of(value)
+        for name in ("faults", "warnings"):
+            plain[name] = tuple(
+                Fault(fault["kind"], fault["words"], None if fault["where"] is None else place_of(fault["where"]))
+                for fault in plain.get(name, ())
+            )
+        plain["widened"] = tuple(plain.get("widened", ()))
+        plain["left_out"] = tuple(
+            LeftOut(**{**part, "where": None if part["where"] is None else place_of(part["where"])})
+            for part in plain.get("left_out", ())
+        )
+        return cls(**plain)
 
     def __str__(self) -> str:
         """Return all in one line."""
         if self.faults:
             return "FAILED: the grid " + "; ".join(f"{fault.words}{near(fault.where)}" for fault in self.faults)
+        verdict = "passed with warnings" if self.warnings else "passed"
         said = [
-            "passed",
+            verdict + (f" (wider limits: {', '.join(self.widened)})" if self.widened else ""),
             "oriented manifold",
             f"{self.handles} handles" if self.handles else "",
             "no triangles cut each other",
@@ -95,6 +158,14 @@ class Certificate:
             f"irregular {self.irregular}, forced {self.irregular_forced}",
         ]
         return ", ".join(word for word in said if word)
+
+
+def _worst_of(value: dict[str, Any]) -> Worst:
+    return Worst(float(value["value"]), place_of(value["where"]))
+
+
+def _spread_of(value: dict[str, Any]) -> Spread:
+    return Spread(float(value["p50"]), float(value["p95"]), float(value["p99"]), _worst_of(value["largest"]))
 
 
 def near(where: Place | None) -> str:

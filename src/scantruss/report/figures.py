@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..check.limits import WARN_LEFT_OUT
 from ..errors import words_of_place
+from ..grid.certificate import near
 from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
-    from ..grid.certificate import Certificate
+    from ..grid.certificate import Certificate, Spread, Worst
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
-
-
-NOTED = 0.03  # part of a scan out of reach of its grid from which on that is said
 
 
 def report_of(grid: Grid, points: int) -> dict[str, Any]:
@@ -83,7 +82,7 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
 
 def grid_lines(grid: Grid, points: int) -> list[str]:
     """Return counts, topology, deviation and times in words."""
-    topology, quality, unit = grid.topology, grid.quality, f" {grid.unit}" if grid.unit else ""
+    topology = grid.topology
     loops = topology.boundary_loops
     lines = [
         f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.triangles)} triangles from {points} points",
@@ -96,25 +95,62 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     ]
     if len(grid.lines):
         lines.append(f"{len(grid.lines)} members along lines and ridges")
-    if quality.node_deviation_mean is not None and quality.node_deviation_max is not None:
-        lines.append(
-            f"nodes lie {quality.node_deviation_mean:.3g}{unit} from the smooth surface fitted to the points around them"
-            f" on average, {quality.node_deviation_max:.3g}{unit} at most"
-        )
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
     if bridging:
         lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
     if grid.certificate is not None:
+        lines += distance_lines(grid.certificate)
+        lines += left_out_lines(grid.certificate)
         lines.append(f"certificate: {grid.certificate}")
-        left, far = 1.0 - grid.certificate.scan_within_reach, grid.certificate.farthest_scan
-        if left > NOTED and far is not None:
-            lines.append(
-                f"look there: {left:.1%} of the scan lies farther than {grid.certificate.reach:.3g}{unit} from the grid,"
-                f" up to {far.value:.3g}{unit}, near ({words_of_place(far.where)})"
-            )
+        lines += warning_lines(grid.certificate)
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
     return lines
+
+
+def first_line(certificate: Certificate) -> list[str]:
+    """Return what a user must know first: that ScanTruss left out much of the scan by its own judgement; nothing where it did not."""
+    if certificate.judged_out <= WARN_LEFT_OUT:
+        return []
+    own = [part for part in certificate.left_out if not part.asked and part.kind != "duplicates"]
+    kinds = dict.fromkeys(part.words for part in own)
+    return [
+        f"{certificate.judged_out:.1%} of the scan, {sum(part.points for part in own):,} of {certificate.points:,} points,"
+        f" is not in the grid: {'; '.join(kinds)}"
+    ]
+
+
+def distance_lines(certificate: Certificate) -> list[str]:
+    """Return how far scan and grid lie apart, in the scan's unit and in members."""
+    unit, member = f" {certificate.unit}" if certificate.unit else "", 2.0 * certificate.reach
+    return [
+        f"{name}: 50 % within {spread.p50:.3g}, 95 % {spread.p95:.3g}, 99 % {spread.p99:.3g}, all"
+        f" {spread.largest.value:.3g}{unit} ({spread.p50 / member:.2g}, {spread.p95 / member:.2g}, {spread.p99 / member:.2g},"
+        f" {spread.largest.value / member:.2g} members)"
+        for name, spread in (
+            ("points to grid", certificate.scan_distance),
+            ("triangles to scan", certificate.triangle_distance),
+            ("nodes to scan", certificate.node_distance),
+        )
+        if spread is not None
+    ]
+
+
+def left_out_lines(certificate: Certificate) -> list[str]:
+    """Return what the grid does not follow, with counts, places and sizes."""
+    unit, lines = f" {certificate.unit}" if certificate.unit else "", []
+    for part in certificate.left_out:
+        if part.kind == "far" and part.where is not None:  # a warning tells of it
+            continue
+        place = "" if part.where is None else f", near ({words_of_place(part.where)}), {part.size:.3g}{unit} across"
+        count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
+        lines.append(f"left out: {count}{part.words}{place}" if count else f"{part.words}{place}")
+    return lines
+
+
+def warning_lines(certificate: Certificate) -> list[str]:
+    """Return a line for each warning, with its place."""
+    return [f"look there: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
 
 
 def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
@@ -126,9 +162,9 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
         ("smallest angle", certificate.smallest_angle, " degrees"),
         ("largest angle", certificate.largest_angle, " degrees"),
         ("sharpest fold between triangles", certificate.sharpest_fold, " degrees"),
-        ("node farthest from the scan", certificate.node_deviation, unit),
-        ("triangle farthest from the scan", certificate.farthest_triangle, unit),
-        ("scan farthest from the grid", certificate.farthest_scan, unit),
+        ("node farthest from the scan", _largest(certificate.node_distance), unit),
+        ("triangle farthest from the scan", _largest(certificate.triangle_distance), unit),
+        ("point farthest from the grid", _largest(certificate.scan_distance), unit),
         ("fixed node farthest from its position", certificate.fixed_error, unit),
     )
     return [
@@ -136,6 +172,10 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
         for name, worst, words in found
         if worst is not None
     ]
+
+
+def _largest(spread: Spread | None) -> Worst | None:
+    return None if spread is None else spread.largest
 
 
 def cloud_lines(cloud: PointCloud) -> list[str]:

@@ -71,7 +71,8 @@ class Bars(AbstractContextManager["Bars"]):
 
 def print_lines(lines: list[str]) -> None:
     """Print plain lines as they are."""
-    print("\n".join(lines))
+    if lines:
+        print("\n".join(lines))
 
 
 def print_table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:

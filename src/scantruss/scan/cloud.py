@@ -15,6 +15,7 @@ from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
+INVALID = "with a value that stands for no echo"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
@@ -31,6 +32,7 @@ class PointCloud:
     origin: np.ndarray  #: (3,) float64 [scan unit], so that national-grid coordinates lose nothing
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
+    left_out: tuple[tuple[str, int], ...] = ()  #: why other points of the file were not taken, and how many
     name: str = ""  #: file the points came from
     notes: tuple[str, ...] = ()  #: what a user should know of how it was read
 
@@ -89,16 +91,17 @@ class PointCloud:
         said = f"{name}: " if name else ""
         array = _as_coordinates(points, said)
         clean, lower, upper = _drop_not_finite(array, said)
-        dropped, notes = len(array) - len(clean), tuple[str, ...]()
+        dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
+            left_out = ((INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
         moved, sums = _moved(clean, origin)
         _check_not_on_a_line(len(moved), sums, extent, said)
-        cloud = cls(points=moved, origin=origin, unit=unit, dropped=dropped, name=name, notes=notes)
+        cloud = cls(moved, origin, unit=unit, dropped=dropped, left_out=left_out, name=name, notes=notes)
         cloud.__dict__["bounds"] = lower - origin, upper - origin  # exact, as all points
         return cloud
 

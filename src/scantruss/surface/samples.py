@@ -15,7 +15,7 @@ from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
-from ..scan.clean.outliers import find_outliers, has_outliers
+from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from ..scan.vectors import dots
@@ -40,8 +40,10 @@ from .streamline import points_near
 
 # distance from the points already taken within which all points of the boundary are taken [their spacings]
 BESIDE_SAMPLES = 1.5
+NOT_FINITE = "with NaN or infinite coordinates"
 SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
 UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT = 0, 1, 2, 3  # what a point of the scan was judged to be
 SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
 
 
@@ -57,14 +59,31 @@ class SurfaceSamples:
     area: float  #: rough area of the scanned surface [scan unit^2]
     graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
-    outliers: int = 0  #: outliers that were left out
-    repeated: int = 0  #: points that were left out because they repeat another one
+    scan: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  #: (N, 3) all points that were read [scan unit]
+    judged: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))  #: (N,) KEPT, DUPLICATE or OUTLIER
+    unread: tuple[tuple[str, int], ...] = ()  #: why points of the file were not read, and how many
     measured: int = 0  #: samples with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
     sample_spacing: float = 0.0  #: about so far apart [scan unit]
     smooth: bool = False  #: the scan bends evenly at all samples: no ridge is there
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
+
+    @property
+    def outliers(self) -> int:
+        """Outliers that were left out."""
+        return int((self.judged == OUTLIER).sum())
+
+    @property
+    def repeated(self) -> int:
+        """Points that were left out because they repeat another one."""
+        return int((self.judged == DUPLICATE).sum())
+
+    @cached_property
+    def measured_points(self) -> np.ndarray:
+        """The points that were read and are kept: no outliers, duplicates or lone points (M, 3) [scan unit]."""
+        kept = self.judged == KEPT
+        return self.scan if kept.all() else np.ascontiguousarray(self.scan[kept])
 
     @cached_property
     def kept(self) -> np.ndarray:
@@ -115,7 +134,7 @@ class _Chosen(NamedTuple):
     radius: float  #: of a sample
     points: np.ndarray  #: (N, 3) the points given to the samples
     whole: np.ndarray  #: (M, 3) all points of the scan
-    outliers: int  #: points that were left out of it
+    judged: np.ndarray | None  #: (M,) what each point given is: KEPT, OUTLIER, SPARSE_POINT; None where all are kept
     smooth: bool
 
 
@@ -137,7 +156,8 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     if asked not in kept:
         kept.clear()
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
-        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit)
+        unread = (*cloud.left_out, *((NOT_FINITE, cloud.dropped) for _ in range(cloud.dropped > 0)))
+        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)
     return kept[asked]
 
 
@@ -161,8 +181,9 @@ def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
     return replace(
         prepared,
-        outliers=samples.outliers,
-        repeated=samples.repeated,
+        scan=samples.scan,
+        judged=samples.judged,
+        unread=samples.unread,
         whole=samples.whole,
         sample_spacing=samples.sample_spacing,
         origin=samples.origin,
@@ -234,17 +255,18 @@ def _prepare(
     measured: int | None = None,
 ) -> SurfaceSamples:
     """Return the samples of points, of which those from the number `measured` on are made up: then none is left out."""
-    length, repeated = asked.length, 0
+    length, scan, judged = asked.length, points, np.zeros(len(points), np.uint8)
     if asked.drop_duplicates and has_repeats(points):
-        kept = ~find_repeated(points)
-        repeated = int(len(points) - kept.sum())
-        points = np.ascontiguousarray(points[kept])
+        judged[find_repeated(points)] = DUPLICATE
+        points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None
     chosen = _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
         points, bounds, spacing, asked, thinned
     )
     found = chosen.found
+    if chosen.judged is not None:
+        judged[judged == KEPT] = chosen.judged
     surface, piece = _faced_surface(found, chosen.radius, length, spacing)
     surface = surface._replace(field=length_field(surface, asked.wish))
     piece = _number(piece)
@@ -259,8 +281,9 @@ def _prepare(
         float(area.sum()),
         float(graded.sum()),
         _large_pieces(piece, area, graded, length),
-        chosen.outliers,
-        repeated,
+        scan,
+        judged,
+        (),
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
@@ -277,20 +300,20 @@ def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _
     found = link_samples(some, radius, length, spacing)
     if has_outliers(found.neighbors) or not is_smooth(found, length, asked.uneven):
         return None
-    return _Chosen(found, radius, some, points, 0, True)
+    return _Chosen(found, radius, some, points, None, True)
 
 
 def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
     """Return the samples of any scan, without its outliers; of a rough one moved to the middle of its sheets."""
-    length, outliers = asked.length, 0
+    length, judged = asked.length, None
     radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
     if asked.outlier_distance and has_outliers(found.neighbors):
-        outlier = find_outliers(points, asked.outlier_distance)
-        outliers = int(outlier.sum())
-        if outliers:
-            points = np.ascontiguousarray(points[~outlier])
+        outlier, sparse = judge_points(points, asked.outlier_distance, length)
+        if outlier.any() or sparse.any():
+            judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
+            points = np.ascontiguousarray(points[judged == KEPT])
             some = thin_dense(points, bounds_of(points), radius, spacing)
             found = link_samples(some, radius, length, spacing)
     if is_rough(found, SHEETS * length):
@@ -299,7 +322,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
             some, (found, radius) = points, fine
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
-    return _Chosen(found, radius, some, points, outliers, False)
+    return _Chosen(found, radius, some, points, judged, False)
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:

@@ -8,8 +8,9 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
+from ..geometry.planes import plane_of
 from ..geometry.quadric import COLUMNS
-from ..geometry.vectors import Vector, across, cross, dot, norm, row, smallest_eigenvector, spread_along, subtract
+from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
 from ..surface.patches import FLAT, FULL, PATCH, doubt, fit
 
 PATCH_FITS = 3  # fits of a patch, each with the points that lie off the one before weighed down
@@ -110,22 +111,6 @@ def stand_off(
 
 
 @kernel
-def _plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, float]:
-    """Mean and plane normal of offsets (>=count, 3), and the sums of squares about the mean: across the plane, and in all."""
-    cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
-    for k in range(count):
-        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
-        cx, cy, cz = cx + x, cy + y, cz + z
-        xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-        yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
-    cx, cy, cz = cx / count, cy / count, cz / count
-    xx, xy, xz = xx - count * cx * cx, xy - count * cx * cy, xz - count * cx * cz
-    yy, yz, zz = yy - count * cy * cy, yz - count * cy * cz, zz - count * cz * cz
-    v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-    return (cx, cy, cz), v, max(spread_along(v, xx, xy, xz, yy, yz, zz), 0.0), xx + yy + zz
-
-
-@kernel
 def find_sheets(
     tree: KDTree,
     alive: np.ndarray,
@@ -181,7 +166,7 @@ def find_sheets(
 @kernel
 def _is_on_sheet(offsets: np.ndarray, count: int, thin: float) -> bool:
     """Whether the first of some offsets (K, 3) from a point, nearest first, lie on a plane through it, as far as `thin` tells [radii]."""
-    mean, normal, spread, _ = _plane_of(offsets, count)
+    mean, normal, spread, _ = plane_of(offsets, count)
     radius, rms = norm(row(offsets, count - 1)), math.sqrt(spread / count)
     return rms <= thin * radius and abs(dot(mean, normal)) <= max(2.0 * rms, thin * radius)
 
@@ -191,7 +176,7 @@ def _is_at_edge(
     tree: KDTree, alive: np.ndarray, place: Vector, offsets: np.ndarray, few: int, found: np.ndarray, count: int
 ) -> bool:
     """Whether neither the sheet nor any living point found lies in some five of twelve sectors around a place on that sheet."""
-    _, normal, _, _ = _plane_of(offsets, few)
+    _, normal, _, _ = plane_of(offsets, few)
     x, taken = across(normal), np.zeros(SECTORS, np.bool_)
     y = cross(normal, x)
     for k in range(few + count):
@@ -229,7 +214,7 @@ def measure_planes(
         thick[i], aside[i] = np.inf, np.inf
         if count < FLAT or radius == 0.0:
             continue
-        mean, normal, spread, _ = _plane_of(offsets, count)
+        mean, normal, spread, _ = plane_of(offsets, count)
         rms = math.sqrt(spread / count)
         thick[i] = rms / radius
         aside[i] = abs(dot(mean, normal)) / max(rms, 1e-9 * radius)
@@ -252,5 +237,5 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
                 count += 1
         bulk[i] = 0.0
         if count >= FLAT:
-            _, _, off_plane, spread = _plane_of(offsets, count)
+            _, _, off_plane, spread = plane_of(offsets, count)
             bulk[i] = off_plane / max(spread, 1e-300)

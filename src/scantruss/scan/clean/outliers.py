@@ -21,6 +21,7 @@ CLOUD_SHARE = 0.18  # share of the spread across the plane from which on points 
 SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
 CLOUD_NEIGHBORS = 4  # neighbours in a cloud from which on a point is looked at with it
 SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
+TOO_FAR = 1.1  # reach in member lengths from which on points are too far apart for a grid
 LONELY = (
     0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 )
@@ -50,8 +51,13 @@ def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
     points : (N, 3) [scan unit]
     distance : as `Settings.outlier_distance`
     """
+    return judge_points(points, distance)[0]
+
+
+def judge_points(points: np.ndarray, distance: float, length: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points are outliers, and which others lie too far apart for a member length [scan unit]; (N,) bool each."""
     if len(points) <= NEAREST:
-        return np.zeros(len(points), np.bool_)
+        return np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)
     near = Nearby.of(points)
     alive = np.ones(len(points), np.bool_)
     which = np.arange(len(points))
@@ -86,7 +92,8 @@ def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
         alive[found] = False
     doubted = np.flatnonzero(~alive)
     alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
-    return near.in_order(~alive)
+    sparse = alive & (first_reach > max(TOO_FAR * length, distance * float(np.median(first_reach))))
+    return near.in_order(~alive), near.in_order(sparse)
 
 
 def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:

@@ -75,7 +75,8 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     if not len(points):
         raise _nothing_left(files, parts)
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
-    return replace(cloud, notes=(*notes, *cloud.notes, *degrees_note(cloud)))
+    left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
+    return replace(cloud, notes=(*notes, *cloud.notes, *degrees_note(cloud)), left_out=tuple(left_out.items()))
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:

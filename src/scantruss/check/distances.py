@@ -1,0 +1,100 @@
+"""Distances between the points that were read and a grid, each way: never from samples, nor from a surface that nodes were put on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.geometry.boxes import SearchBoxes, new_boxes
+from ..kernels.mesh.coverage import nearest_distances, put_places
+from ..kernels.mesh.distances import nearest_triangles, plane_distances, triangle_boxes
+from ..runtime.parallel import in_parts, side_by_side
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+
+FIRST_REACH = 0.1  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
+BOX = 0.5  # width of the boxes of triangles [member lengths]
+POINT_BOX = 0.2  # width of the boxes of points [member lengths]
+AROUND = 12  # points through which the plane at a node goes
+POINTS_PER_THREAD = 20_000  # fewest points for a thread of their own
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """Distances between a scan and a grid [scan unit]."""
+
+    scan: np.ndarray  #: (N,) of every point that was read from the nearest triangle
+    triangle: np.ndarray  #: (N,) int64, that triangle
+    middles: np.ndarray  #: (T,) of the middle of each triangle from the nearest point; NaN over closed holes
+    nodes: np.ndarray  #: (V,) of each node from the plane of the points around it; NaN over closed holes
+    noise: np.ndarray  #: (V,) rms distance of those points from their plane
+
+
+def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Distances:
+    """Return how far all points that were read lie from a grid, and the grid from those that are no outliers.
+
+    Parameters
+    ----------
+    length : desired member length [scan unit]
+    """
+    (scan, triangle), (middles, nodes, noise) = side_by_side(
+        lambda: distances_to_grid(samples.scan, grid, length), lambda: distances_to_points(grid, samples, length)
+    )
+    return Distances(scan, triangle, middles, nodes, noise)
+
+
+def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of each point (N, 3) from the nearest triangle (N,), and that triangle (N,) int64.
+
+    Far points are looked at again with ever more reach, so the nearest of all triangles is found.
+    """
+    distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
+    waiting, reach = np.arange(len(points)), FIRST_REACH * length
+    while len(waiting):
+        index = triangle_boxes(grid.nodes, grid.triangles, max(BOX * length, reach), reach)
+        look_up = partial(nearest_triangles, points, index, grid.nodes, grid.triangles, waiting, distance, nearest)
+        in_parts(len(waiting), POINTS_PER_THREAD, lambda _, begin, end: look_up(begin, end))  # noqa: B023
+        waiting = waiting[nearest[waiting] < 0]
+        reach *= 4.0
+    return distance, nearest
+
+
+def distances_to_points(
+    grid: Grid, samples: SurfaceSamples, length: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the distances of the middles of the triangles and of the nodes from the scan, and its noise there; see `Distances`."""
+    points = samples.measured_points
+    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
+    middles = grid.nodes[grid.triangles].mean(axis=1)
+    to_middles, to_nodes, noise = np.empty(len(middles)), np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
+    nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
+    plane_distances(grid.nodes, points, boxes, AROUND, 2.5 * samples.spacing, to_nodes, noise)
+    if samples.measured < len(samples.surface.mean):
+        to_middles[_over_holes(middles, samples)] = np.nan
+        to_nodes[_over_holes(grid.nodes, samples)] = np.nan
+    if grid.deviation is not None:
+        to_nodes[np.isnan(grid.deviation)] = np.nan
+    return to_middles, to_nodes, noise
+
+
+def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:
+    """Return points (N, 3) by box, the boxes no larger than `box` [scan unit]."""
+    boxes = new_boxes(points.min(axis=0), points.max(axis=0), box, len(points), len(points))
+    put_places(boxes, points)
+    return boxes
+
+
+def _over_holes(places: np.ndarray, samples: SurfaceSamples) -> np.ndarray:
+    """Return which places (Q, 3) lie over closed holes: a sample of made-up points is nearer than any other."""
+    mean, away = samples.surface.mean, []
+    for part in (mean[: samples.measured], mean[samples.measured :]):
+        distance = np.empty(len(places))
+        nearest_distances(places, part, boxes_of(part, samples.surface.length), 0.5 * samples.surface.length, distance)
+        away.append(distance)
+    over: np.ndarray = away[1] < away[0]
+    return over

@@ -1,0 +1,109 @@
+"""Whether a grid can be built: limits on members, angles, folds and distances from the scan, and what comes near them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Certificate, Fault, place_of
+from ..settings import CheckSettings
+from .folds import fold_angles
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..settings import Settings
+    from .distances import Distances
+
+WARN_ANGLE = 25.0  # angle of a triangle below which it is poor [degree]
+WARN_SHORT, WARN_LONG = 0.6, 1.6  # members below and above which they are poor [desired lengths]
+WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
+WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
+NOISE = 3.0  # rms distances of points from their plane that are noise
+WARN_LEFT_OUT = 0.01  # share of the points that ScanTruss may leave out by itself without a word
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with a limit: its values, where they are, and from where on they are poor or faulty."""
+
+    kind: str
+    values: np.ndarray
+    places: np.ndarray  #: (K, 3) where each value is
+    worst: float  #: the limit of the settings
+    poor: float  #: where warnings begin
+    words: str  #: what is said, with the value
+    largest: bool = True  #: large values are the bad ones
+
+    def beyond(self, limit: float) -> Fault | None:
+        """Return the fault of the worst value if it is beyond a limit."""
+        sign = 1.0 if self.largest else -1.0
+        bad = np.flatnonzero(sign * self.values > sign * limit)
+        if not len(bad):
+            return None
+        at = bad[np.argmax(sign * self.values[bad])]
+        more = f" ({len(bad):,} such places)" if len(bad) > 1 else ""
+        return Fault(self.kind, self.words.format(self.values[at]) + more, place_of(self.places[at]))
+
+
+def limits_of(grid: Grid, found: Distances, settings: Settings) -> tuple[list[Fault], list[Fault]]:
+    """Return the faults of a grid that cannot be built, and warnings where it only just can.
+
+    Members between two fixed nodes and angles of triangles with three are as long and as wide as the settings say.
+    """
+    faults, warnings = [], []
+    for figure in _figures(grid, found, settings):
+        fault = figure.beyond(figure.worst)
+        if fault is not None:
+            faults.append(fault)
+        elif (warning := figure.beyond(figure.poor)) is not None:
+            warnings.append(warning)
+    return faults, warnings
+
+
+def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
+    """Return all figures of a grid that have limits."""
+    at_nodes = np.full(len(grid.nodes), settings.length) if grid.desired is None else grid.desired
+    free = ~grid.fixed[grid.edges].all(axis=1)
+    halves = grid.nodes[grid.edges].mean(axis=1) + grid.origin
+    lengths = grid.lengths[free] / at_nodes[grid.edges].mean(axis=1)[free]
+    shapeable = ~grid.fixed[grid.triangles].all(axis=1)
+    corners = grid.nodes[grid.triangles[shapeable]].reshape(-1, 3) + grid.origin
+    folds = fold_angles(grid)
+    measured = np.isfinite(found.nodes) & ~grid.fixed
+    off = np.maximum(found.nodes - NOISE * found.noise, 0.0)[measured] / at_nodes[measured]
+    return [
+        Figure("angle", grid.angles[shapeable].ravel(), corners, settings.min_angle, WARN_ANGLE,
+               "has an angle of {:.1f} degrees", largest=False),
+        Figure("short", lengths, halves[free], settings.min_length, WARN_SHORT,
+               "has a member of {:.2f} desired lengths", largest=False),
+        Figure("long", lengths, halves[free], settings.max_length, WARN_LONG, "has a member of {:.2f} desired lengths"),
+        Figure("folded", folds[np.isfinite(folds)], halves[np.isfinite(folds)], settings.min_fold, WARN_FOLD,
+               "is folded to {:.1f} degrees", largest=False),
+        Figure("offset", off, grid.nodes[measured] + grid.origin, settings.max_offset, WARN_OFFSET,
+               "has a node {:.2f} members off the scan, its noise aside"),
+    ]  # fmt: skip
+
+
+def places_to_look_at(found: Certificate) -> list[Fault]:
+    """Return warnings of what a grid leaves out: each place farther than a member, and much that ScanTruss left out itself."""
+    unit = f" {found.unit}" if found.unit else ""
+    warnings = [
+        Fault("far", f"misses {part.points:,} points ({part.share:.2%}) by up to {part.farthest:.3g}{unit}", part.where)
+        for part in found.left_out
+        if part.kind == "far" and part.where is not None and part.farthest is not None
+    ]
+    if found.judged_out > WARN_LEFT_OUT:
+        warnings.append(Fault("left out", f"leaves out {found.judged_out:.1%} of the points that were read"))
+    return warnings
+
+
+def widened_limits(settings: Settings) -> tuple[str, ...]:
+    """Return the limits that the settings make wider than the defaults, in words."""
+    said = []
+    for spec in fields(CheckSettings):
+        value, wider = getattr(settings, spec.name), spec.name.startswith("max")
+        if value != spec.default and (value > spec.default) == wider:
+            said.append(f"{spec.name.replace('_', ' ')} {value:g} instead of {spec.default:g}")
+    return tuple(said)

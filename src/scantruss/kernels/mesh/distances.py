@@ -1,0 +1,156 @@
+"""How far measured points lie from the triangles of a grid, and nodes from the plane of the points around them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, box_index, new_boxes, put_into, slot_of
+from ..geometry.planes import plane_of
+from ..geometry.triangles import distance_to_triangle
+from ..geometry.vectors import Vector, dot, norm, row, subtract
+
+
+class TriangleBoxes(NamedTuple):
+    """The triangles of a grid by box: each is in all boxes that come within `reach` of it."""
+
+    boxes: SearchBoxes  #: entries by box
+    triangle: np.ndarray  #: (entries,) int64 triangle of each entry
+    middle: np.ndarray  #: (T, 3) centre of a ball around each triangle [scan unit]
+    radius: np.ndarray  #: (T,) radius of that ball [scan unit]
+    reach: float  #: [scan unit]
+
+
+def triangle_boxes(nodes: np.ndarray, triangles: np.ndarray, box: float, reach: float) -> TriangleBoxes:
+    """Return triangles (T, 3) of nodes (V, 3) by box of at most `box` [scan unit]."""
+    corners = nodes[triangles]
+    middle = corners.mean(axis=1)
+    radius = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
+    lower, upper = corners.min(axis=(0, 1)) - reach, corners.max(axis=(0, 1)) + reach
+    empty = new_boxes(lower, upper, box, 1, 1)
+    count = enter_triangles(empty, nodes, triangles, reach, np.empty(0, np.int64))
+    boxes = new_boxes(lower, upper, box, count, count)
+    triangle = np.empty(count, np.int64)
+    enter_triangles(boxes, nodes, triangles, reach, triangle)
+    return TriangleBoxes(boxes, triangle, middle, radius, reach)
+
+
+@kernel
+def enter_triangles(
+    boxes: SearchBoxes, nodes: np.ndarray, triangles: np.ndarray, reach: float, triangle: np.ndarray
+) -> int:
+    """Put triangles into all boxes within `reach` of them, as far as `triangle` has room; returns how many entries that takes."""
+    count = 0
+    for t in range(len(triangles)):
+        a, b, c = row(nodes, triangles[t, 0]), row(nodes, triangles[t, 1]), row(nodes, triangles[t, 2])
+        i0, i1 = box_index(boxes, 0, min(a[0], b[0], c[0]) - reach), box_index(boxes, 0, max(a[0], b[0], c[0]) + reach)
+        j0, j1 = box_index(boxes, 1, min(a[1], b[1], c[1]) - reach), box_index(boxes, 1, max(a[1], b[1], c[1]) + reach)
+        k0, k1 = box_index(boxes, 2, min(a[2], b[2], c[2]) - reach), box_index(boxes, 2, max(a[2], b[2], c[2]) + reach)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                for k in range(k0, k1 + 1):
+                    if count < len(triangle):
+                        triangle[count] = t
+                        put_into(boxes, count, i, j, k)
+                    count += 1
+    return count
+
+
+@kernel
+def nearest_triangles(
+    points: np.ndarray,
+    index: TriangleBoxes,
+    nodes: np.ndarray,
+    triangles: np.ndarray,
+    which: np.ndarray,
+    distance: np.ndarray,
+    nearest: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """Nearest triangle of points `which` and the distance to it, where that is at most the reach of the index; else -1 and inf."""
+    boxes = index.boxes
+    for at in range(begin, end):
+        p = which[at]
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        best, found = index.reach, -1
+        slot = slot_of(boxes, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
+        entry = boxes.first[slot]
+        while entry >= 0:
+            t = index.triangle[entry]
+            dx, dy, dz = x - index.middle[t, 0], y - index.middle[t, 1], z - index.middle[t, 2]
+            most = index.radius[t] + best
+            if dx * dx + dy * dy + dz * dz <= most * most:
+                a, b, c = row(nodes, triangles[t, 0]), row(nodes, triangles[t, 1]), row(nodes, triangles[t, 2])
+                d = distance_to_triangle((x, y, z), a, b, c)
+                if d < best or (d == best and (found < 0 or t < found)):
+                    best, found = d, t
+            entry = boxes.next[entry]
+        distance[p], nearest[p] = best if found >= 0 else math.inf, found
+
+
+@kernel
+def nearest_points(
+    boxes: SearchBoxes, points: np.ndarray, place: Vector, reach: float, found: np.ndarray, squares: np.ndarray
+) -> int:
+    """The points nearest to a place within reach, nearest first, the first of equals before; returns how many, len(found) at most."""
+    count = 0
+    x, y, z = place
+    for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+                p = boxes.first[slot_of(boxes, i, j, k)]
+                while p >= 0:
+                    dx, dy, dz = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
+                    square = dx * dx + dy * dy + dz * dz
+                    if square <= reach * reach and (count < len(found) or square <= squares[count - 1]):
+                        at = min(count, len(found) - 1)
+                        if count == len(found) and square == squares[at] and p > found[at]:
+                            p = boxes.next[p]
+                            continue
+                        while at > 0 and (
+                            squares[at - 1] > square or (squares[at - 1] == square and found[at - 1] > p)
+                        ):
+                            squares[at], found[at] = squares[at - 1], found[at - 1]
+                            at -= 1
+                        squares[at], found[at] = square, p
+                        count = min(count + 1, len(found))
+                    p = boxes.next[p]
+    return count
+
+
+@kernel
+def plane_distances(
+    places: np.ndarray,
+    points: np.ndarray,
+    boxes: SearchBoxes,
+    around: int,
+    near: float,
+    distance: np.ndarray,
+    noise: np.ndarray,
+) -> None:
+    """Distance of places (Q, 3) from the plane through the `around` nearest points, or from the nearest of them if that is less.
+
+    boxes : the points by box. near : where the search begins [scan unit]. noise : (Q,), filled with the rms distance of those
+    points from their plane.
+    """
+    wanted = min(around, len(points))
+    found, squares, offsets = np.empty(wanted, np.int64), np.empty(wanted), np.empty((wanted, 3))
+    reach = near
+    for q in range(len(places)):
+        place = row(places, q)
+        count = nearest_points(boxes, points, place, reach, found, squares)
+        while count < wanted:  # ends when all points are within reach
+            reach *= 1.5
+            count = nearest_points(boxes, points, place, reach, found, squares)
+        first = row(points, found[0])  # from there the plane is exact, however far the place is
+        for k in range(wanted):
+            offsets[k, 0], offsets[k, 1], offsets[k, 2] = subtract(row(points, found[k]), first)
+        mean, normal, off, _ = plane_of(offsets, wanted)
+        away = subtract(place, first)
+        distance[q] = min(abs(dot(subtract(away, mean), normal)), norm(away))
+        noise[q] = math.sqrt(off / wanted)
+        reach = max(1.5 * math.sqrt(squares[wanted - 1]), 1e-3 * near)
