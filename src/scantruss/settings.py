@@ -361,9 +361,10 @@ class Settings(
             raise InputError(f"cannot read settings {path}: {error.strerror}") from None
         except ValueError:
             raise InputError(f"{path} is not a settings file (JSON)") from None
-        values = values.get("settings", values) if isinstance(values, dict) else None
+        values = dict(values.get("settings", values)) if isinstance(values, dict) else None
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
+        values.pop("made_by", None)
         return cls.from_dict(values)
 
 

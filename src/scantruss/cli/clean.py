@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .outputs import claim, cloud_output, inputs_of
+from .outputs import claim, cloud_output, inputs_of, outs_of
 from .shared import cloud_file_notes, note_compiling, read_scan
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ KEEP = {
 
 def clean_parser() -> Parser:
     """Options of ``scantruss clean``."""
-    from .options import Parser, add_reading, number
+    from .options import Parser, add_outs, add_reading, number
 
     parser = Parser(
         "clean",
@@ -46,7 +46,7 @@ def clean_parser() -> Parser:
         "Remove duplicates, outliers, loose pieces, doubled layers and noise from a scan; compute normals.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
-    parser.add_argument("out", metavar="OUT", help="clean cloud; the suffix names the format")
+    add_outs(parser, "clean cloud; the suffix names the format", "?")
     parser.add_argument("--report", metavar="FILE.json", help="save what each step did")
     steps = parser.add_argument_group("steps, in this order")
     for name, (metavar, default, words) in SHARES.items():
@@ -74,7 +74,7 @@ def clean(values: Namespace) -> None:
     from ..scan.formats.writing import write_points
     from .options import READING, settings_of
 
-    out, report = _outputs(values)
+    outs, report = _outputs(values)
     chosen = {name: value for name, value in vars(values).items() if name in READING}  # steps share names with settings
     settings = settings_of(Namespace(**chosen, length=1.0))
     steps = _steps(values)
@@ -84,28 +84,30 @@ def clean(values: Namespace) -> None:
 
         with note_compiling(bars):
             result = clean_points(cloud, **steps, progress=bars)
-    with SaveTogether() as save:
+    with SaveTogether("" if values.force else "cloud") as save:
         points = result.points + result.origin
-        write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
+        for out in outs:
+            write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
         if report is not None:
             save.json(report, report_of(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
-    written = [str(out), *([str(report)] if report else [])]
-    said = cloud_file_notes(out)
+    written = [*map(str, outs), *([str(report)] if report else [])]
+    said = [note for out in outs for note in cloud_file_notes(out)]
     print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
 
 
-def _outputs(values: Namespace) -> tuple[Path, Path | None]:
+def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..runtime.files import check_place
 
-    out = cloud_output(values.out)
+    outs = [cloud_output(out) for out in outs_of(values)]
     report = check_place(values.report, (".json",)) if values.report else None
     taken = inputs_of(values)
-    claim(out, "clean cloud", taken)
+    for out in outs:
+        claim(out, "clean cloud", taken, force=values.force, kind="cloud")
     if report is not None:
-        claim(report, "report", taken)
-    return out, report
+        claim(report, "report", taken, force=values.force)
+    return outs, report
 
 
 def _steps(values: Namespace) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from .grid import make_grid, show_grid
-from .outputs import result_folder
+from .outputs import claim, result_folder
 from .shared import read_scan
 
 if TYPE_CHECKING:
@@ -15,26 +15,28 @@ if TYPE_CHECKING:
 
 def demo_parser() -> Parser:
     """Options of ``scantruss demo``."""
-    from .options import Parser
+    from .options import Parser, add_force
 
     parser = Parser(
         "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
     )
-    parser.add_argument(
-        "folder", metavar="FOLDER", nargs="?", default="scantruss-demo", help="default ./scantruss-demo"
-    )
+    parser.add_argument("outs", metavar="FOLDER", nargs="?", help="default ./scantruss-demo")
+    parser.add_argument("-o", "--out", dest="out", metavar="FOLDER", help="the same as an option")
+    add_force(parser)
     return parser
 
 
 def demo(values: Namespace) -> None:
     """Do the main job on the bundled scan."""
     from ..report.terminal import Bars
-    from .demo_files import SCAN, demo_settings, save_demo
+    from .demo_files import RESULTS, SCAN, demo_settings, save_demo
 
-    folder = result_folder(values.folder)
+    folder = result_folder(values.out or values.outs or "scantruss-demo")
+    for name in RESULTS:
+        claim(folder / name, "result", {}, force=values.force)
     with Bars() as bars:
         cloud = read_scan(str(SCAN), demo_settings(), bars)
         result = make_grid(cloud, demo_settings(), bars)
         bars("picture, solid", 0.0)
-        written = save_demo(folder, result, cloud)
+        written = save_demo(folder, result, cloud, force=values.force)
     show_grid(result, len(cloud.points), written)

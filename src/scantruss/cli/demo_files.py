@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
 
 SCAN = Path(__file__).parents[1] / "data" / "nefertiti.ply"
+RESULTS = ("grid.obj", "grid.json", "grid.png", "grid.settings.json", "report.json", "model.3mf")
 LENGTH = 24.0  #: members of the demo [mm]; the bust is 495 mm high
 SCALE = 0.25  #: of the printed model, so that it stands 124 mm high
 MEMBER_DIAMETER = 1.2  #: of the printed model [mm]
@@ -23,7 +24,7 @@ def demo_settings() -> Settings:
     return Settings(length=LENGTH, unit="mm")
 
 
-def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
+def save_demo(folder: Path, grid: Grid, cloud: PointCloud, *, force: bool = False) -> list[Path]:
     """Save grid, picture, report, settings and printable model together, or nothing.
 
     Parameters
@@ -34,6 +35,8 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
         Grid of the bundled scan.
     cloud : PointCloud
         The bundled scan.
+    force : bool
+        Replace files that ScanTruss did not write.
 
     Returns
     -------
@@ -45,10 +48,9 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
     from ..report.figures import report_of
     from ..runtime.files import SaveTogether
 
-    names = ("grid.obj", "grid.json", "grid.png", "grid.settings.json", "report.json", "model.3mf")
-    with SaveTogether() as save:
+    with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
-        for name in names[:3]:
+        for name in RESULTS[:3]:
             write(grid, save.beside(folder / name), cloud=cloud)
         save.json(folder / "grid.settings.json", (grid.settings or demo_settings()).to_dict())
         save.json(folder / "report.json", report_of(grid, len(cloud.points)))
@@ -59,4 +61,4 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud) -> list[Path]:
             node_diameter=NODE_DIAMETER,
             scale=SCALE,
         )
-    return [folder / name for name in names]
+    return [folder / name for name in RESULTS]

@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError
-from .outputs import claim, inputs_of
+from .outputs import claim, inputs_of, outs_of
 from .shared import SCAN, add_memory, note_compiling, note_outliers, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_settings
+    from .options import Parser, add_outs, add_settings
 
     parser = Parser(
         "grid",
@@ -30,7 +30,7 @@ def grid_parser() -> Parser:
         "Turn a scan into a triangular grid truss of a desired member length.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
-    parser.add_argument("outs", metavar="OUT", nargs="+", help="results; the suffix names the format")
+    add_outs(parser, "results; the suffix names the format", "*")
     files = parser.add_argument_group("files")
     files.add_argument(
         "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here win"
@@ -55,7 +55,7 @@ def grid(values: Namespace) -> None:
     from .options import settings_of
 
     settings = settings_of(values)
-    outs = [Path(out) for out in values.outs]
+    outs = outs_of(values)
     settings_file = outs[0].with_suffix(".settings.json")
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
@@ -68,7 +68,7 @@ def grid(values: Namespace) -> None:
     from ..export.formats import write
 
     written: list[Path] = []
-    with SaveTogether() as save:
+    with SaveTogether("" if values.force else "result") as save:
         for out in outs:
             written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud)]
         save.json(settings_file, (result.settings or settings).to_dict())
@@ -84,17 +84,23 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     from ..export.csv import nodes_path
     from ..export.formats import check_output
     from ..runtime.files import check_place
+    from ..runtime.ours import check_ours
 
     taken = inputs_of(values)
+    if not values.force:
+        for out in outs:  # before its suffix is: several scans may be named by a pattern without quotes
+            check_ours(out, "result")
     for out in outs:
-        claim(check_output(out), "grid", taken)
+        claim(check_output(out), "grid", taken, force=values.force)
         if out.suffix.lower() == ".csv":
-            claim(nodes_path(out), "table of nodes", taken)
+            claim(nodes_path(out), "table of nodes", taken, force=values.force)
     if report is not None:
-        claim(check_place(report, (".json",)), "report", taken)
+        claim(check_place(report, (".json",)), "report", taken, force=values.force)
     check_place(settings_file, (".json",))
     if taken.get(settings_file.resolve(), "settings") != "settings":  # a run may repeat the settings it saved itself
         raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")
+    if not values.force:
+        check_ours(settings_file, "result")
 
 
 def make_grid(

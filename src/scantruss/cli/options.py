@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
         if rest:
             unknown = next((word for word in rest if word.startswith("-")), None)
             if unknown is None:
-                self.error(f"too many arguments: {' '.join(rest)}")
+                self.error(f"too many arguments: {' '.join(rest)}; put a pattern such as *.ply in quotes")
             self.error(f"unknown option {unknown.partition('=')[0]}{self._nearest(unknown)}")
         return values
 
@@ -59,6 +59,22 @@ class Parser(argparse.ArgumentParser):
 
         near = get_close_matches(word.partition("=")[0], self._option_string_actions, 1)
         return f" (did you mean {near[0]}?)" if near else ""
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Add the option that lets results replace files that ScanTruss did not write."""
+    parser.add_argument("--force", action="store_true", help="replace files that ScanTruss did not write")
+
+
+def add_outs(parser: Parser, help: str, positional: str = "") -> None:
+    """Add ``-o OUT``, repeatable, and results as further files: none ("") or the number of them as argparse counts."""
+    if positional:
+        parser.add_argument("outs", metavar="OUT", nargs=positional, default=[], help=help)
+    parser.add_argument(
+        "-o", "--out", dest="more_outs", metavar="OUT", action="append", default=[],
+        help="the same as an option; repeatable" if positional else f"{help}; repeatable",
+    )  # fmt: skip
+    add_force(parser)
 
 
 def _join_negative(words: Sequence[str]) -> list[str]:

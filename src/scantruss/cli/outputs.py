@@ -7,6 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 
 from ..errors import FormatError
+from ..runtime.ours import check_ours
 from ..settings import CURVATURE
 
 Taken = dict[Path, str]  # place of a file -> what is there
@@ -32,11 +33,33 @@ def _lengths(given: object) -> list[str]:
     return [value for value in values if isinstance(value, str)]
 
 
-def claim(path: Path, what: str, taken: Taken) -> None:
-    """Claim a path for an output, unless an input or another output is there."""
+def claim(path: Path, what: str, taken: Taken, *, force: bool = False, kind: str = "result") -> None:
+    """Claim a path for an output, unless an input or another output is there, or a file that ScanTruss did not write."""
     if (before := taken.get(path.resolve())) is not None:
         raise FormatError(f"the {what} {path} would overwrite the {before}; choose another name")
+    if not force:
+        check_ours(path, "result" if path.suffix.lower() == ".json" else kind)
     taken[path.resolve()] = what
+
+
+def outs_of(values: Namespace) -> list[Path]:
+    """Return the results that a command line names, in their order.
+
+    Raises
+    ------
+    UsageError
+        None is named.
+    """
+    from .options import UsageError
+
+    outs = [Path(out) for out in (*_as_list(getattr(values, "outs", [])), *values.more_outs)]
+    if not outs:
+        raise UsageError("missing OUT, the file of the result; write it last or as -o OUT")
+    return outs
+
+
+def _as_list(given: str | list[str] | None) -> list[str]:
+    return given if isinstance(given, list) else [given] if given else []
 
 
 def cloud_output(path: str | Path) -> Path:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .outputs import claim
+from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 def print_parser() -> Parser:
     """Options of ``scantruss print``."""
-    from .options import Parser, number
+    from .options import Parser, add_outs, number
 
     usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
     parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    parser.add_argument("out", metavar="OUT", help="model, .3mf or .stl")
+    add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
     parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
@@ -32,25 +32,29 @@ def print_solid(values: Namespace) -> None:
     from ..report.terminal import print_lines
     from ..runtime.files import SaveTogether, check_place
 
-    out = check_place(values.out, (".3mf", ".stl"))
+    outs = [check_place(out, (".3mf", ".stl")) for out in outs_of(values)]
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; print needs a grid saved as .json by scantruss grid")
-    claim(out, "model", {Path(values.grid).resolve(): "grid"})
+    taken = {Path(values.grid).resolve(): "grid"}
+    for out in outs:
+        claim(out, "model", taken, force=values.force)
     from ..export.json import read_grid
     from ..export.solid import print_model
 
     result = read_grid(values.grid)
-    with SaveTogether() as save:
-        solid = print_model(
-            result,
-            save.beside(out),
-            member_diameter=values.member_diameter,
-            node_diameter=values.node_diameter,
-            scale=values.scale,
-        )
+    with SaveTogether("" if values.force else "result") as save:
+        for out in outs:
+            solid = print_model(
+                result,
+                save.beside(out),
+                member_diameter=values.member_diameter,
+                node_diameter=values.node_diameter,
+                scale=values.scale,
+            )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
-    print_lines([*solid.notes, *model_note(out, solid.unit), f"wrote {out}: {bodies}, {size} {solid.unit}".rstrip()])
+    notes = [note for out in outs for note in model_note(out, solid.unit)]
+    print_lines([*solid.notes, *notes, f"wrote {' '.join(map(str, outs))}: {bodies}, {size} {solid.unit}".rstrip()])
 
 
 def model_note(out: Path, unit: str) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..settings import UNITS
-from .outputs import claim, cloud_output, inputs_of
+from .outputs import claim, cloud_output, inputs_of, outs_of
 from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def splice_parser() -> Parser:
     """Options of ``scantruss splice``."""
-    from .options import Parser
+    from .options import Parser, add_outs
 
     parser = Parser(
         "splice",
@@ -29,7 +29,7 @@ def splice_parser() -> Parser:
         "scan that fits. The poses, and how well every two scans agree, are saved beside OUT as .poses.json.",
     )
     parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns such as 'scans/*.ply'")
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="merged cloud; the suffix names the format")
+    add_outs(parser, "merged cloud; the suffix names the format")
     parser.add_argument(
         "--poses", metavar="FILE", help="poses to start from, for all scans or some: .poses.json of an earlier run"
     )
@@ -48,22 +48,21 @@ def splice(values: Namespace) -> None:
     from ..scan.formats.writing import write_points
 
     files = scan_files(values.scans)
-    out = Path(values.out)
-    poses_file = out.with_suffix(".poses.json")
-    check_outputs(values, out, poses_file)
+    outs = outs_of(values)
+    poses_file = outs[0].with_suffix(".poses.json")
+    check_outputs(values, outs, poses_file)
     names = names_of(files)
     with Bars() as bars:
         result = splice_files(values, files, names, bars)
         bars("write", 0.0)
         from ..scan.register.saving import splice_values
 
-        with SaveTogether() as save:
-            cloud = result.cloud
-            write_points(
-                save.beside(out), cloud.points + cloud.origin, normals=None, unit=result.unit, origin=cloud.origin
-            )
+        with SaveTogether("" if values.force else "cloud") as save:
+            points, origin = result.cloud.points + result.cloud.origin, result.cloud.origin
+            for out in outs:
+                write_points(save.beside(out), points, normals=None, unit=result.unit, origin=origin)
             save.json(poses_file, splice_values(result))
-    show_splice(result, [out, poses_file])
+    show_splice(result, [*outs, poses_file])
 
 
 def scan_files(words: list[str]) -> list[Path]:
@@ -87,15 +86,16 @@ def names_of(files: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [file.as_posix() for file in files]
 
 
-def check_outputs(values: Namespace, out: Path, poses_file: Path) -> None:
+def check_outputs(values: Namespace, outs: list[Path], poses_file: Path) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from ..runtime.files import check_place
 
     taken = inputs_of(values)
-    claim(cloud_output(out), "whole", taken)
+    for out in outs:
+        claim(cloud_output(out), "merged cloud", taken, force=values.force, kind="cloud")
     check_place(poses_file, (".json",))
     if taken.get(poses_file.resolve()) != "poses":  # a run may replace the poses that it starts from
-        claim(poses_file, "file of poses", taken)
+        claim(poses_file, "file of poses", taken, force=values.force)
     if values.use_poses and not values.poses:
         raise InputError("--use-poses needs --poses FILE, the poses to be used")
 

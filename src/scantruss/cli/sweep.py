@@ -23,7 +23,7 @@ TABLES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
 
 def sweep_parser() -> Parser:
     """Options of ``scantruss sweep``."""
-    from .options import Parser, add_settings
+    from .options import Parser, add_force, add_settings
 
     parser = Parser(
         "sweep",
@@ -35,6 +35,7 @@ def sweep_parser() -> Parser:
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
     parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
     parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    add_force(parser)
     add_memory(parser)
     add_workers(parser)
     add_settings(parser)
@@ -77,7 +78,7 @@ def sweep(values: Namespace) -> None:
 
     folder = result_folder(values.out)
     trials, varied = trials_of_words(values)
-    claim_results(folder, trials, inputs_of(values))
+    claim_results(folder, trials, inputs_of(values), values.force)
     shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
     with Bars() as bars:
         fitting = thin_to_fit(values.scan, shortest, values.memory)
@@ -90,17 +91,17 @@ def sweep(values: Namespace) -> None:
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):
             raise InputError(f"no grid came out of {len(trials)} trials; the first: {outcomes[0].fault}")
-        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows)
+        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows, values.force)
     print_table(head, rows)
     print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
 
 
-def claim_results(folder: Path, trials: list[Trial], taken: Taken) -> None:
+def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) -> None:
     """Refuse a folder in which a result cannot be written, or would be where something else is."""
     from ..runtime.files import check_place
 
     for name in (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png"))):
-        claim(folder / name, "result", taken)
+        claim(folder / name, "result", taken, force=force)
         if folder.exists():
             check_place(folder / name, (Path(name).suffix,))
     _refuse_earlier_sweep(folder, {trial.name for trial in trials})
@@ -146,14 +147,20 @@ def _is_list(value: Any) -> bool:
 
 
 def _save(
-    folder: Path, title: str, trials: list[Trial], outcomes: list[Any], head: tuple[str, ...], rows: list[Any]
+    folder: Path,
+    title: str,
+    trials: list[Trial],
+    outcomes: list[Any],
+    head: tuple[str, ...],
+    rows: list[Any],
+    force: bool,
 ) -> None:
     """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
     from ..export.drawing.sheet import encode_sheet
     from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
     from ..runtime.files import SaveTogether
 
-    with SaveTogether() as save:
+    with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
         for trial, outcome in zip(trials, outcomes, strict=True):
             if outcome.grid:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .outputs import claim, cloud_output, inputs_of
+from .outputs import claim, cloud_output, inputs_of, outs_of
 from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ POINTS_FOR_WORKERS = 20_000_000  # points of which several workers thin a scan b
 
 def thin_parser() -> Parser:
     """Options of ``scantruss thin``."""
-    from .options import Parser, add_reading, number
+    from .options import Parser, add_outs, add_reading, number
 
     parser = Parser(
         "thin",
@@ -27,7 +27,7 @@ def thin_parser() -> Parser:
     parser.add_argument(
         "scans", metavar="SCAN", nargs="+", help="scan files, or patterns in quotes such as 'tiles/*.laz'"
     )
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, help="thinned scan; the suffix names the format")
+    add_outs(parser, "thinned scan; the suffix names the format")
     parser.add_argument("--spacing", metavar="S", type=number, required=True, help="side of a box [scan unit]")
     parser.add_argument(
         "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
@@ -59,8 +59,9 @@ def thin(values: Namespace) -> None:
     from .options import selection_of
 
     check_spacing(values.spacing)
-    out = cloud_output(values.out)
-    claim(out, "thinned scan", inputs_of(values))
+    outs, taken = [cloud_output(out) for out in outs_of(values)], inputs_of(values)
+    for out in outs:
+        claim(out, "thinned scan", taken, force=values.force, kind="cloud")
     scan = open_scan(values.scans, getattr(values, "unit", ""), selection_of(values))
     sources = scan.sources
     few = sum(source.points for source in sources) < POINTS_FOR_WORKERS
@@ -74,11 +75,12 @@ def thin(values: Namespace) -> None:
             )
         report_cloud(bars, result)
         bars("write", 0.0)
-        with SaveTogether() as save:
-            write_points(save.beside(out), result.points, unit=result.unit)
+        with SaveTogether("" if values.force else "cloud") as save:
+            for out in outs:
+                write_points(save.beside(out), result.points, unit=result.unit)
     boundary = f", {result.boundary:,} of them along the boundary" if values.boundary else ""
-    line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {out}"
-    print_lines([line, *cloud_file_notes(out)])
+    line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {' '.join(map(str, outs))}"
+    print_lines([line, *(note for out in outs for note in cloud_file_notes(out))])
 
 
 def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
+from ..runtime.ours import MARK
 from ..sweep import FIGURES
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def encode_page(
         if outcome.picture
     ]
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>\n'
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        f'<meta name="generator" content="{MARK}"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}\n</style></head><body>\n<h1>{escape(title)}</h1>\n<table>\n"
         + "\n".join(lines)
         + "\n</table>\n"

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from ..errors import FormatError
+from .ours import MARK, check_ours
 
 
 def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
@@ -67,10 +68,12 @@ class SaveTogether:
             write(grid, save.beside("out/grid.obj"))
             save.json("out/report.json", values)
 
-    Whatever a writer makes in the folder it is given moves along, so the two files of a format stay together.
+    With a `kind`, "cloud" or "result", a file that is there is replaced only if ScanTruss wrote it and it is of that kind; .json
+    is a result either way. Whatever a writer makes in the folder it is given moves along, so the two files of a format stay together.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str = "") -> None:
+        self._kind = kind
         self._folders: dict[Path, Path] = {}  # place -> temporary folder in it
         self._made: list[Path] = []  # folders of results that did not exist before
 
@@ -107,7 +110,7 @@ class SaveTogether:
 
     def json(self, path: str | Path, values: dict[str, Any]) -> None:
         """Save plain values as readable JSON."""
-        text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
+        text = json.dumps({"made_by": MARK, **values}, indent=2, ensure_ascii=False, allow_nan=False)
         self.beside(path).write_text(text + "\n", encoding="utf-8", newline="\n")
 
     def _folder(self, place: Path) -> Path:
@@ -129,6 +132,8 @@ class SaveTogether:
         ]
         moves, pipes = [], []
         for file, target in written:
+            if self._kind:
+                check_ours(target, "result" if target.suffix.lower() == ".json" else self._kind)
             if target.is_dir():
                 raise FormatError(f"cannot write {target}: it is a folder; name a file")
             if target.exists() and not target.is_file():

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...grid.grid import Grid
 from ...runtime.files import check_place, write_files
+from ...runtime.ours import MARK
 from ...scan.cloud import PointCloud
 from .camera import choose_camera
 from .strokes import (
@@ -123,7 +124,7 @@ def _paint(
     for x, y, words, points in texts:
         axes.text(x, y, words, fontsize=points * 0.72, color=tuple(INK), ha="center", va="center", family="DejaVu Sans")
     stream = io.BytesIO()
-    canvas.print_png(stream, metadata={"Software": None})  # unlike savefig it asks no settings of the user
+    canvas.print_png(stream, metadata={"Software": MARK})  # unlike savefig it asks no settings of the user
     return stream.getvalue()
 
 

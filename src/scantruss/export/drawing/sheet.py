@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...runtime.ours import MARK
 from .strokes import INK, PAPER
 
 PICTURE = (560, 391)  #: of one of them [pixel]
@@ -44,5 +45,5 @@ def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
             family="DejaVu Sans",
         )
     stream = io.BytesIO()
-    canvas.print_png(stream, metadata={"Software": None})
+    canvas.print_png(stream, metadata={"Software": MARK})
     return stream.getvalue()

@@ -13,6 +13,7 @@ from typing import IO, Any
 import numpy as np
 
 from ...errors import FormatError
+from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of
 from .columns import find_attributes
 from .content import Cloud, Content
@@ -191,7 +192,7 @@ def write_npy(path: Path, cloud: Cloud) -> None:
 
 def write_npz(path: Path, cloud: Cloud) -> None:
     """Write the arrays points, normals and unit."""
-    arrays: dict[str, Any] = {"points": cloud.points, "unit": np.array(cloud.unit)}
+    arrays: dict[str, Any] = {"points": cloud.points, "unit": np.array(cloud.unit), "made_by": np.array(CLOUD_MARK)}
     if cloud.normals is not None:
         arrays["normals"] = cloud.normals
     with path.open("wb") as file:

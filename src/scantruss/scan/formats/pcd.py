@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError
+from ...runtime.ours import CLOUD_MARK
 from ..units import PATTERN, metres_of
 from .columns import find_attributes
 from .content import Cloud, Content, surplus_note
@@ -176,7 +177,7 @@ def write_pcd(path: Path, cloud: Cloud) -> None:
     count, many = len(cloud.points), len(names)
     unit = f"# unit {cloud.unit}\n" if cloud.unit else ""
     head = (
-        f"# .PCD v0.7 - Point Cloud Data file format\n{unit}VERSION 0.7\nFIELDS {' '.join(names)}\n"
+        f"# .PCD v0.7 - Point Cloud Data file format\n# {CLOUD_MARK}\n{unit}VERSION 0.7\nFIELDS {' '.join(names)}\n"
         f"SIZE{' 8' * many}\nTYPE{' F' * many}\nCOUNT{' 1' * many}\nWIDTH {count}\nHEIGHT 1\n"
         f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
     )

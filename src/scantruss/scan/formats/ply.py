@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError
+from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of
 from .columns import find_attributes
 from .content import Cloud, Content
@@ -230,7 +231,7 @@ def write_ply(path: Path, cloud: Cloud) -> None:
     names = cloud.names("nx", "ny", "nz")
     unit = f"comment unit {cloud.unit}\n" if cloud.unit else ""
     properties = "".join(f"property double {name}\n" for name in names)
-    head = f"ply\nformat binary_little_endian 1.0\n{unit}element vertex {len(cloud.points)}\n{properties}end_header\n"
+    head = f"ply\nformat binary_little_endian 1.0\ncomment {CLOUD_MARK}\n{unit}element vertex {len(cloud.points)}\n{properties}end_header\n"
     with path.open("wb") as file:
         file.write(head.encode())
         file.write(np.ascontiguousarray(cloud.columns, dtype="<f8").data)

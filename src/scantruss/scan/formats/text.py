@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import FormatError
+from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of_columns
 from .columns import find_attributes, find_columns, fit_columns
 from .content import Cloud, Content, surplus_note
@@ -72,8 +73,8 @@ def write_text(path: Path, cloud: Cloud) -> None:
             unit = f" [{cloud.unit}]" if cloud.unit else ""
             axes, normal = (cloud.names("nx", "ny", "nz")[part] for part in (slice(3), slice(3, None)))
             file.write(sign.join([*(axis + unit for axis in axes), *normal]) + "\n")
-        elif cloud.unit:
-            file.write(f"# unit: {cloud.unit}\n")
+        else:
+            file.write(f"# {CLOUD_MARK}\n" + (f"# unit: {cloud.unit}\n" if cloud.unit else ""))
         columns = cloud.columns
         for begin in range(0, len(columns), ROWS_PER_WRITE):
             rows = columns[begin : begin + ROWS_PER_WRITE].tolist()
