@@ -86,7 +86,7 @@ def refused(capsys, *words, status=2):
     ("words", "line"),
     [
         ("cut a b", "no command 'cut'"),
-        ("grid", "missing SCAN, OUT"),
+        ("grid", "missing SCAN"),
         ("grid scan.xyz", "missing OUT"),
         ("grid scan.xyz a.obj", "--length is missing"),
         ("grid scan.xyz a.obj --length", "--length: expected one argument"),
@@ -269,11 +269,11 @@ def test_a_stopped_run_leaves_nothing_behind(ready, capsys, monkeypatch, stop, s
 
 
 def test_a_failing_run_keeps_the_files_of_the_run_before(ready, capsys, monkeypatch):
-    (ready / "a.obj").write_text("before")
+    (ready / "a.obj").write_text(before := "# ScanTruss 0.1.0, of the run before")
     error = FrontError("the front stopped", where=(1.0, 2.0, 3.0))
     monkeypatch.setattr("scantruss.runtime.files.SaveTogether.json", lambda *_: (_ for _ in ()).throw(error))
     assert "near 1, 2, 3" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH)
-    assert (ready / "a.obj").read_text() == "before"
+    assert (ready / "a.obj").read_text() == before
 
 
 # ---- what is said and written --------------------------------------------------------------------------------------
@@ -362,13 +362,13 @@ def test_the_report_holds_every_figure(place):
         "shape_mean shape_std shape_min length_mean length_std length_cv angle_min angle_max valence6"
         " node_deviation_mean node_deviation_max"
     )
-    names = "points nodes members triangles line_members quality before topology certificate seconds settings version"
+    names = "points nodes members triangles line_members quality before topology certificate seconds settings version made_by"
     assert set(report) == set(names.split())
     assert set(report["quality"]) == set(report["before"]) == set(figures.split())
     assert set(report["topology"]) == set("components boundary_loops euler manifold orientable".split())
     assert set(report["seconds"]) == {"read", "boundary", "front", "optimize", "total"}
     assert report["seconds"]["total"] == pytest.approx(sum(report["seconds"].values()) / 2)
-    assert report["settings"] == json.loads((place / "a.settings.json").read_text())
+    assert report["settings"] | {"made_by": report["made_by"]} == json.loads((place / "a.settings.json").read_text())
     assert report["points"] == 8000
     assert report["topology"] == {
         "components": 1,

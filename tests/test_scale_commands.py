@@ -60,7 +60,7 @@ def test_thin_writes_one_point_a_box(place, capsys):
     said = capsys.readouterr().out
     assert f"{len(both):,} points thinned to {len(wanted):,}; wrote thin.npy" in said
     assert main(["thin", "*.npy", "-o", "near.ply", "--spacing", "2", "--keep", "nearest", "--boundary"]) == 0
-    assert "of them along the rim" in capsys.readouterr().out
+    assert "of them along the boundary" in capsys.readouterr().out
     near = st.read_points("near.ply")
     assert len(near.points) > len(thin_points(np.concatenate([both, wanted]), 2.0))
     assert set(map(tuple, np.round(near.points + near.origin, 9).tolist())) <= set(
@@ -315,6 +315,8 @@ def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(place, c
     for path in (place / "out").glob("length-6.*"):
         path.unlink()
     (place / "out" / "length-0.1.json").write_text("{}")
+    assert "length-0.1.json is there already" in refused(capsys, *words, "--length", "7,0.1")
+    (place / "out" / "length-0.1.json").write_text('{"made_by": "ScanTruss 0.1.0"}')
     assert main([*words, "--length", "7,0.1"]) == 0
     assert sorted(entry.name for entry in os.scandir("out") if entry.name.startswith("length")) == [
         "length-7.json",

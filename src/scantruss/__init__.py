@@ -9,12 +9,12 @@ or `CertificateError`.
 
 from __future__ import annotations
 
-import importlib
 import sys
-from functools import cache
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # typing takes as long to import as all else until Ctrl-C is listened to
 if TYPE_CHECKING:  # a name is imported when it is first used, so that the command line starts quickly
+    from typing import Any
+
     from .boundary.find import Boundary as Boundary
     from .boundary.find import find_boundary as find_boundary
     from .candidates import advance_fronts as advance_fronts
@@ -73,14 +73,17 @@ def __getattr__(name: str) -> Any:
     """Import a public name on first use, so that the command line starts quickly."""
     if name not in _HOMES:
         raise AttributeError(f"module 'scantruss' has no attribute {name!r}")
+    import importlib
+
     _show_in_notebooks()
     return getattr(importlib.import_module(f"scantruss.{_HOMES[name]}"), name)
 
 
-@cache
 def _show_in_notebooks() -> None:
     """Show grids and clouds as pictures where a notebook or IPython runs us."""
     if "IPython" in sys.modules and (shell := sys.modules["IPython"].get_ipython()) is not None:
+        import importlib
+
         importlib.import_module("scantruss.report.notebook").show_pictures(shell)
 
 

@@ -89,9 +89,12 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
     if uneven > UNEVEN_LENGTHS and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
-    if 1.0 - found.scan_within_reach > LEFT_OUT and found.scan_distance:
-        where = found.scan_distance.largest.where
-        faults.append(Fault("cover", f"leaves out {1.0 - found.scan_within_reach:.0%} of the scan", where))
+    pieces = sum(
+        part.share for part in found.left_out if part.kind == "pieces"
+    )  # they may be dense; see `faults_on_sheets`
+    lost = 1.0 - found.scan_within_reach - pieces
+    if lost > LEFT_OUT and found.scan_distance:
+        faults.append(Fault("cover", f"leaves out {lost:.0%} of the scan", found.scan_distance.largest.where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     worst = found.triangle_distance.largest if found.triangle_distance else None
     if worst and worst.value > gone * _length_at(grid, worst.where, settings):

@@ -30,8 +30,8 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
 
 def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> list[Fault]:
     """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_samples`."""
-    left = np.flatnonzero((nearest < 0) & samples.kept)
-    share = len(left) / max(int(samples.kept.sum()), 1)
+    left = np.flatnonzero((nearest < 0) | ~samples.kept)
+    share = len(left) / len(nearest)
     faults = []
     if share > LEFT_OUT:
         where = place_of(samples.surface.mean[left[0]] + grid.origin)

@@ -54,8 +54,8 @@ def grid(values: Namespace) -> None:
     from ..runtime.files import SaveTogether
     from .options import settings_of
 
-    settings = settings_of(values)
     outs = outs_of(values)
+    settings = settings_of(values)
     settings_file = outs[0].with_suffix(".settings.json")
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
@@ -89,7 +89,8 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
     taken = inputs_of(values)
     if not values.force:
         for out in outs:  # before its suffix is: several scans may be named by a pattern without quotes
-            check_ours(out, "result")
+            if out.resolve() not in taken:
+                check_ours(out, "result")
     for out in outs:
         claim(check_output(out), "grid", taken, force=values.force)
         if out.suffix.lower() == ".csv":
