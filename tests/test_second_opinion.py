@@ -67,7 +67,7 @@ def compare(grid, found, cloud, samples, settings):
     assert found.scan_within_reach == (away <= 0.5 * LENGTH).mean()
     measured = cloud.points[samples.judged == 0]
     tree = cKDTree(measured)
-    middles = tree.query(corners.mean(axis=1))[0]
+    middles = np.maximum(tree.query(corners.mean(axis=1))[0], tree.query(corners)[0].max(axis=1))
     check_spread(found.triangle_distance, middles)
     assert found.grid_within_reach == (middles <= 0.5 * LENGTH).mean()
     near, which = tree.query(grid.nodes, k=12)

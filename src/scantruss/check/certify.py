@@ -114,8 +114,8 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     at_triangles = at_nodes[grid.triangles].mean(axis=1)
     members = at_triangles[found.triangle]
-    known = found.middles[np.isfinite(found.middles)]
-    in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.middles)]
+    known = found.triangles[np.isfinite(found.triangles)]
+    in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     return {
         "points": len(samples.scan),
         "left_out": parts_left_out(samples, found, members, COVER_REACH * members),
@@ -123,7 +123,7 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),
         "triangle_distance": _spread(
-            found.middles, grid.nodes[grid.triangles].mean(axis=1), grid, length / at_triangles
+            found.triangles, grid.nodes[grid.triangles].mean(axis=1), grid, length / at_triangles
         ),
         "node_distance": _spread(found.nodes, grid.nodes, grid, length / at_nodes),
         "noise": float(np.median(found.noise)),

@@ -30,7 +30,9 @@ class Distances:
 
     scan: np.ndarray  #: (N,) of every point that was read from the nearest triangle
     triangle: np.ndarray  #: (N,) int64, that triangle
-    middles: np.ndarray  #: (T,) of the middle of each triangle from the nearest point; NaN over closed holes
+    triangles: (
+        np.ndarray
+    )  #: (T,) of the middle or a corner of each triangle, the farther, from the nearest point; NaN over closed holes
     nodes: np.ndarray  #: (V,) of each node from the plane of the points around it; NaN over closed holes
     noise: np.ndarray  #: (V,) rms distance of those points from their plane
 
@@ -42,10 +44,10 @@ def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Dis
     ----------
     length : desired member length [scan unit]
     """
-    (scan, triangle), (middles, nodes, noise) = side_by_side(
+    (scan, triangle), (triangles, nodes, noise) = side_by_side(
         lambda: distances_to_grid(samples.scan, grid, length), lambda: distances_to_points(grid, samples, length)
     )
-    return Distances(scan, triangle, middles, nodes, noise)
+    return Distances(scan, triangle, triangles, nodes, noise)
 
 
 def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -67,19 +69,22 @@ def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np
 def distances_to_points(
     grid: Grid, samples: SurfaceSamples, length: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the distances of the middles of the triangles and of the nodes from the scan, and its noise there; see `Distances`."""
+    """Return the distances of the triangles and of the nodes from the scan, and its noise there; see `Distances`."""
     points = samples.measured_points
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     middles = grid.nodes[grid.triangles].mean(axis=1)
-    to_middles, to_nodes, noise = np.empty(len(middles)), np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
+    to_middles, to_corners = np.empty(len(middles)), np.empty(len(grid.nodes))
+    to_nodes, noise = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
+    nearest_distances(grid.nodes, points, boxes, 0.25 * length, to_corners)
     plane_distances(grid.nodes, points, boxes, AROUND, 2.5 * samples.spacing, to_nodes, noise)
     if samples.measured < len(samples.surface.mean):
         to_middles[_over_holes(middles, samples)] = np.nan
-        to_nodes[_over_holes(grid.nodes, samples)] = np.nan
+        over = _over_holes(grid.nodes, samples)
+        to_nodes[over] = to_corners[over] = np.nan
     if grid.deviation is not None:
         to_nodes[np.isnan(grid.deviation)] = np.nan
-    return to_middles, to_nodes, noise
+    return np.fmax(to_middles, np.fmax.reduce(to_corners[grid.triangles], axis=1)), to_nodes, noise
 
 
 def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:

@@ -88,11 +88,11 @@ class Certificate:
     crossings: int = 0  #: pairs of triangles that cut, touch or cover each other; exact, and at most 100 are counted
     scan_within_reach: float = 0.0  #: share of all points that were read that lie within `reach` of a triangle
     grid_within_reach: float = (
-        0.0  #: share of the triangles whose middle lies within `reach` of a point, closed holes aside
+        0.0  #: share of the triangles, middle and corners, within `reach` of a point, closed holes aside
     )
     scan_distance: Spread | None = None  #: of every point that was read from the nearest triangle
     triangle_distance: Spread | None = (
-        None  #: of the middle of each triangle from the nearest point, closed holes aside
+        None  #: of each triangle, middle and corners, from the nearest point, closed holes aside
     )
     node_distance: Spread | None = (
         None  #: of each node from the plane of the 12 nearest points, or the nearest if that is less
