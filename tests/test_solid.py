@@ -13,6 +13,7 @@ import scantruss as st
 from scantruss.cli.demo_files import save_demo
 from scantruss.export.solid import Solid, build_solid, is_watertight
 from scantruss.export.solid_files import encode_3mf, encode_stl, lattice_step, put_on_lattice
+from scantruss.grid.certificate import Certificate, Fault
 
 GRIDS = [fan, icosahedron, two_pieces, dome]
 SIZES = {"member_diameter": 0.8, "node_diameter": 1.4}
@@ -210,3 +211,16 @@ def test_pieces_that_touch_are_said():
     solid = build_solid(both, **SIZES)
     assert (solid.components, solid.expected_components) == (1, 2)
     assert solid.notes[0] == "pieces of the grid touch: 2 pieces became 1 bodies"
+
+
+def test_a_grid_that_failed_is_printed_only_where_that_is_asked_for(tmp_path):
+    grid = dome(5)
+    fault = Fault("cover", "leaves out 30% of the scan")
+    nothing = dict.fromkeys(("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1)
+    failed = Certificate(unit="", manifold=True, orientable=True, faults=(fault,), **nothing)
+    grid = grid.replace(certificate=failed)
+    sizes = {"member_diameter": 0.1, "node_diameter": 0.2}
+    with pytest.raises(st.CertificateError, match="failed its certificate: it leaves out 30% of the scan"):
+        st.print_model(grid, tmp_path / "a.stl", **sizes)
+    assert not (tmp_path / "a.stl").exists()
+    assert st.print_model(grid, tmp_path / "a.stl", **sizes, keep_failed=True).components == 1

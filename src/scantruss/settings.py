@@ -341,7 +341,7 @@ class Settings(
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Settings:
         """Return settings from plain values; unknown names are refused."""
-        values = {RENAMED.get(name, name): value for name, value in values.items()}
+        values = {RENAMED.get(name, name): value for name, value in values.items() if name != "made_by"}
         names = {spec.name for spec in fields(cls)}
         if unknown := sorted(set(values) - names):
             raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
@@ -361,10 +361,9 @@ class Settings(
             raise InputError(f"cannot read settings {path}: {error.strerror}") from None
         except ValueError:
             raise InputError(f"{path} is not a settings file (JSON)") from None
-        values = dict(values.get("settings", values)) if isinstance(values, dict) else None
+        values = values.get("settings", values) if isinstance(values, dict) else None
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
-        values.pop("made_by", None)
         return cls.from_dict(values)
 
 

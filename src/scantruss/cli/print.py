@@ -24,6 +24,7 @@ def print_parser() -> Parser:
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
     parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
+    parser.add_argument("--keep-failed", action="store_true", help="print a grid that failed its certificate too")
     return parser
 
 
@@ -50,6 +51,7 @@ def print_solid(values: Namespace) -> None:
                 member_diameter=values.member_diameter,
                 node_diameter=values.node_diameter,
                 scale=values.scale,
+                keep_failed=values.keep_failed,
             )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"

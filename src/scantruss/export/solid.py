@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..runtime.files import check_place, write_files
 from .solid_files import Solid, encode_3mf, encode_stl
@@ -19,7 +20,14 @@ PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours fi
 
 
 def print_model(
-    grid: Grid, path: str | Path, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12
+    grid: Grid,
+    path: str | Path,
+    *,
+    member_diameter: float,
+    node_diameter: float,
+    scale: float = 1.0,
+    sides: int = 12,
+    keep_failed: bool = False,
 ) -> Solid:
     """Write the grid as one watertight solid for a 3D printer.
 
@@ -35,6 +43,8 @@ def print_model(
         Size of the model over the size of the grid.
     sides : int
         Sides of a member.
+    keep_failed : bool
+        Print a grid that failed its certificate too.
 
     Returns
     -------
@@ -45,10 +55,13 @@ def print_model(
     ------
     InputError
         Diameters that do not suit the grid.
+    CertificateError
+        The grid failed its certificate.
     FormatError
         The file cannot be written.
     """
     path = check_place(path, SUFFIXES)
+    check_passed(grid, keep_failed)
     solid = build_solid(grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides)
     encode = encode_3mf if path.suffix.lower() == ".3mf" else encode_stl
     write_files({path: encode(solid)})

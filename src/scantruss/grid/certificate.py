@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..errors import words_of_place
+from ..errors import CertificateError, words_of_place
+
+if TYPE_CHECKING:
+    from .grid import Grid
 
 Place = tuple[float, float, float]
 
@@ -166,6 +169,19 @@ def _worst_of(value: dict[str, Any]) -> Worst:
 
 def _spread_of(value: dict[str, Any]) -> Spread:
     return Spread(float(value["p50"]), float(value["p95"]), float(value["p99"]), _worst_of(value["largest"]))
+
+
+def check_passed(grid: Grid, keep_failed: bool) -> None:
+    """Refuse a grid that failed its certificate, for whatever is to be made of it; one that has none is its owner's affair.
+
+    Raises
+    ------
+    CertificateError
+        The grid failed, and is not to be used all the same.
+    """
+    if grid.certificate is not None and not grid.certificate.passed and not keep_failed:
+        words = " and ".join(fault.words for fault in grid.certificate.faults)
+        raise CertificateError(f"the grid failed its certificate: it {words}; --keep-failed uses it all the same", grid)
 
 
 def near(where: Place | None) -> str:
