@@ -19,7 +19,7 @@ from .improve.optimize import improve_first, improve_last
 from .runtime.parallel import processors
 from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
-from .surface.samples import sample_surface
+from .surface.samples import ROD, sample_surface
 from .surface.scratch import with_own_scratch
 
 if TYPE_CHECKING:
@@ -72,6 +72,9 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     ):
         settings = settings.replace(ridge_angle=0.0)
         yield from _same_scan(settings)
+    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+        settings = settings.replace(keep_rods=False)
+        yield from _same_scan(settings)
     if settings.method == "default":
         if samples.smooth:
             yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
@@ -79,6 +82,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if size <= COARSEST:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
+
+
+def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a part of the scan is too thin for a grid, as columns and scaffold are."""
+    return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
 
 
 def _same_scan(settings: Settings) -> Iterator[Attempt]:

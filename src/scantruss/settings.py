@@ -144,6 +144,15 @@ class CleaningSettings(_Checked):
     drop_duplicates: bool = _setting(
         True, "leave out duplicate points if they are a hundredth of the points or more", source="Sec. 2"
     )
+    judge_outliers: str = _setting(
+        "auto", "when to look for outliers: auto, where samples stand alone or no grid passes; or always",
+        choices=("auto", "always"),
+    )  # fmt: skip
+    keep_rods: bool = _setting(
+        True,
+        "keep columns, scaffold and cables, thinner than a member; they are left out where no grid passes with them",
+    )
+    piece: str = _setting("all", "pieces of the scan to make a grid of: all, largest, or numbers such as 1 or 1,3")
     outlier_distance: float = _setting(
         3.0,
         "leave out points this many times farther from others than their neighbours are; 0 keeps all",
@@ -298,6 +307,7 @@ class Settings(
     def __post_init__(self) -> None:
         """Check every value and bring positions, lines and lengths into their plainest form."""
         object.__setattr__(self, "length_field", check_length_field(self.length_field))
+        object.__setattr__(self, "piece", check_piece(self.piece))
         taken = self.selection
         for name in ("classes", "returns", "crop"):
             object.__setattr__(self, name, getattr(taken, name))
@@ -365,6 +375,14 @@ class Settings(
         if not isinstance(values, dict):
             raise InputError(f"{path} is not a settings file (a JSON object is needed)")
         return cls.from_dict(values)
+
+
+def check_piece(given: Any) -> str:
+    """Return which pieces are chosen, "all", "largest" or numbers from 1 with commas between them, or refuse it."""
+    text = str(given).replace(" ", "").lower()
+    if text in ("all", "largest") or all(word.isdecimal() and int(word) > 0 for word in text.split(",")):
+        return text
+    raise InputError(f"piece must be all, largest or numbers from 1 such as 1 or 1,3, got {given!r}")
 
 
 def _positions(given: Any) -> tuple[tuple[float, ...], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
-from ..surface.samples import DUPLICATE, KEPT, OUTLIER, SPARSE_POINT
+from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
 
 if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
@@ -30,14 +31,18 @@ def parts_left_out(
     count = len(samples.scan)
     parts = [*_of_kind("outliers", samples.judged == OUTLIER, samples, found)]
     parts += _of_kind("sparse", samples.judged == SPARSE_POINT, samples, found)
+    parts += _of_kind("rods", samples.judged == ROD, samples, found)
     parts += _of_kind("duplicates", samples.judged == DUPLICATE, samples, found)
     away = np.flatnonzero((samples.judged == KEPT) & (found.scan > reach))
     owner = _owners(samples, away)
     small = (owner >= 0) & ~samples.kept[owner]
-    parts += _places("pieces", away[small], samples.piece[owner[small]], samples, found)
+    other = small & np.isin(samples.piece[owner], samples.not_chosen)
+    parts += _places("pieces", away[small & ~other], samples.piece[owner[small & ~other]], samples, found)
     far = ~small & (found.scan[away] > members[away])
     parts += _places("far", away[far], _groups(samples, owner[far]), samples, found)
     parts.sort(key=lambda part: -part.points)
+    chosen_out = _places("not chosen", away[other], samples.piece[owner[other]], samples, found)
+    parts += [replace(part, asked=True) for part in chosen_out]
     total = count + sum(number for _, number in samples.unread)
     parts += [LeftOut(words, number, number / total, asked=True) for words, number in samples.unread]
     return (*parts, *_closed_holes(samples))

@@ -30,8 +30,9 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
 
 def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> list[Fault]:
     """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_samples`."""
-    left = np.flatnonzero((nearest < 0) | ~samples.kept)
-    share = len(left) / len(nearest)
+    wanted = ~np.isin(samples.piece, samples.not_chosen)
+    left = np.flatnonzero(((nearest < 0) | ~samples.kept) & wanted)
+    share = len(left) / max(int(wanted.sum()), 1)
     faults = []
     if share > LEFT_OUT:
         where = place_of(samples.surface.mean[left[0]] + grid.origin)

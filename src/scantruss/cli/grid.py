@@ -8,9 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ..errors import CertificateError, FormatError
+from ..errors import CertificateError, FormatError, FrontError
 from .outputs import claim, inputs_of, outs_of
-from .shared import SCAN, add_memory, note_compiling, note_outliers, read_scan, thin_to_fit
+from .shared import SCAN, add_memory, note_compiling, note_outliers, note_pieces, read_scan, thin_to_fit
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -113,7 +113,13 @@ def make_grid(
 
     check_length(cloud, settings)
     with note_compiling(bars):
-        grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
+        try:
+            grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
+        except FrontError:
+            note_pieces(bars, cloud, settings)
+            raise
+    if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
+        bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:
@@ -122,7 +128,8 @@ def make_grid(
         )
     if grid.settings is not None and grid.settings.method != settings.method:
         bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
-    note_outliers(bars, cloud, settings)
+    note_outliers(bars, cloud, grid.settings or settings)
+    note_pieces(bars, cloud, grid.settings or settings)
     return grid
 
 

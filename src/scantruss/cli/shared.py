@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from .options import Parser
 
+MOST_PIECES = 5  # pieces that are named one by one
 SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
 
 
@@ -102,6 +103,25 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
             f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {100 * share:.2g} % of the scanned surface, left out:"
             " too small for this length or compared with the others"
         )
+
+
+def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Name the pieces of a scan with their sizes, and how to take one alone; nothing where there is one."""
+    from ..surface.samples import sample_surface
+
+    samples = sample_surface(cloud, settings)
+    if len(samples.pieces) < 2:
+        return
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    option = "--piece" if settings.keep_rods else "--no-keep-rods --piece"
+    for number, piece in enumerate(samples.pieces[:MOST_PIECES], 1):
+        places = samples.surface.mean[samples.piece == piece] + cloud.origin
+        low, high = places.min(axis=0), places.max(axis=0)
+        size = " x ".join(f"{side:.3g}" for side in high - low)
+        box = ",".join(f"{c:.6g}" for c in (*low - samples.surface.radius, *high + samples.surface.radius))
+        bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone, --crop box:{box} all in its box")
+    if len(samples.pieces) > MOST_PIECES:
+        bars.note(f"and {len(samples.pieces) - MOST_PIECES} smaller pieces")
 
 
 @contextmanager

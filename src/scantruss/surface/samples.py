@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface import normals as normal_kernels
@@ -35,6 +36,7 @@ from .linked_samples import (
     settle_to_sheet,
     thin_dense,
 )
+from .rods import rod_points
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
@@ -43,7 +45,7 @@ BESIDE_SAMPLES = 1.5
 NOT_FINITE = "with NaN or infinite coordinates"
 SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
 UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT = 0, 1, 2, 3  # what a point of the scan was judged to be
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
 SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
 
 
@@ -61,6 +63,7 @@ class SurfaceSamples:
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     scan: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  #: (N, 3) all points that were read [scan unit]
     judged: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))  #: (N,) KEPT, DUPLICATE or OUTLIER
+    not_chosen: tuple[int, ...] = ()  #: numbers of the pieces that are large enough and that the settings leave out
     unread: tuple[tuple[str, int], ...] = ()  #: why points of the file were not read, and how many
     measured: int = 0  #: samples with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
@@ -117,6 +120,8 @@ class _Asked(NamedTuple):
     drop_duplicates: bool
     uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
     wish: Wish | None
+    keep_rods: bool
+    piece: str
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
@@ -124,7 +129,10 @@ class _Asked(NamedTuple):
         outliers = settings.outlier_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
-        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish_of(settings, origin))
+        wish = wish_of(settings, origin)
+        return cls(
+            settings.length, settings.box_size, outliers, repeated, uneven, wish, settings.keep_rods, settings.piece
+        )
 
 
 class _Chosen(NamedTuple):
@@ -264,14 +272,21 @@ def _prepare(
     chosen = _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
         points, bounds, spacing, asked, thinned
     )
-    found = chosen.found
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
+    if not asked.keep_rods and thinned:
+        rod = _rods_of(scan[judged == KEPT], spacing, asked)
+        judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
+        left = np.ascontiguousarray(scan[judged == KEPT])
+        chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), thinned)
+    found = chosen.found
     surface, piece = _faced_surface(found, chosen.radius, length, spacing)
     surface = surface._replace(field=length_field(surface, asked.wish))
     piece = _number(piece)
     area = _sample_areas(surface)
     graded = area / surface.field**2
+    large = _large_pieces(piece, area, graded, length)
+    pieces = _chosen_pieces(large, asked.piece)
     return SurfaceSamples(
         surface,
         found.boxes,
@@ -280,15 +295,22 @@ def _prepare(
         spacing,
         float(area.sum()),
         float(graded.sum()),
-        _large_pieces(piece, area, graded, length),
+        pieces,
         scan,
         judged,
+        tuple(sorted(set(large) - set(pieces))),
         (),
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
     )
+
+
+def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
+    """Return which points (N, 3) belong to rods, (N,) bool."""
+    radius = max((asked.box_size or SAMPLE_SPACING) * asked.length, 0.25 * spacing)
+    return rod_points(link_samples(points, radius, asked.length, spacing), len(points), asked.length)
 
 
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
@@ -368,6 +390,22 @@ def _sample_areas(surface: Surface) -> np.ndarray:
     arm = surface.mean[last] - surface.mean
     reach = dots(arm, arm)
     return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
+
+
+def _chosen_pieces(large: tuple[int, ...], wanted: str) -> tuple[int, ...]:
+    """Return those of the large pieces that the settings choose: all, the largest, or some by their numbers from 1.
+
+    Raises
+    ------
+    InputError
+        There is no piece of that number.
+    """
+    if wanted == "all":
+        return large
+    numbers = [1] if wanted == "largest" else [int(word) for word in wanted.split(",")]
+    if max(numbers) > len(large):
+        raise InputError(f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid")
+    return tuple(large[number - 1] for number in sorted(set(numbers)))
 
 
 def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, length: float) -> tuple[int, ...]:

@@ -1,0 +1,89 @@
+"""Columns, scaffold and floor: what is too thin for a grid is left out where nothing passes with it, and pieces can be chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.surface.linked_samples import link_samples
+from scantruss.surface.rods import rod_points
+
+LENGTH = 1.4
+
+
+def roof(rng, count=20_000):
+    x, y = rng.uniform(-9, 9, count), rng.uniform(-6, 6, count)
+    return np.column_stack([x, y, 6.0 - 0.03 * x * x - 0.04 * y * y]) + rng.normal(0.0, 0.004, (count, 3))
+
+
+def pole(rng, x, y, low, high, radius, count):
+    turn = rng.uniform(0, 2 * np.pi, count)
+    return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn), rng.uniform(low, high, count)])
+
+
+@pytest.fixture(scope="module")
+def hall():
+    """A roof, a floor under it and four columns between them; and which points are of the columns."""
+    rng = np.random.default_rng(2)
+    floor = np.column_stack([rng.uniform(-11, 11, 9000), rng.uniform(-8, 8, 9000), rng.normal(0.0, 0.004, 9000)])
+    columns = np.concatenate([pole(rng, x, y, 0.0, 4.0, 0.2, 900) for x in (-6, 6) for y in (-4, 4)])
+    parts = [roof(rng), floor, columns]
+    return np.concatenate(parts), np.repeat([False, False, True], [len(part) for part in parts])
+
+
+def rods_of(points, length):
+    cloud = st.PointCloud.from_array(points)
+    return rod_points(link_samples(cloud.points, 0.2 * length, length, cloud.spacing), len(points), length)
+
+
+def test_columns_are_rods_and_roof_and_floor_are_none(hall):
+    points, column = hall
+    rod = rods_of(points, LENGTH)
+    clear = (points[:, 2] > 0.5 * LENGTH) & (points[:, 2] < 3.0)
+    assert rod[column & clear].mean() > 0.95
+    assert rod[~column].mean() < 0.01
+
+
+@pytest.mark.parametrize("width", [0.8, 2.0])
+def test_a_sheet_is_no_rod_however_its_edge_runs(width):
+    """Nor is a strip as wide as .8 members."""
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(0, 12, 8000), rng.uniform(0, width * LENGTH, 8000)
+    assert not rods_of(np.column_stack([x, y, 0.05 * x * x]), LENGTH).any()
+
+
+def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall):
+    points, column = hall
+    grid = st.grid_from_points(points, st.Settings(length=LENGTH, effort="quick"))
+    assert grid.certificate.passed and grid.topology.components == 2 and not grid.settings.keep_rods
+    (part,) = (part for part in grid.certificate.left_out if part.kind == "rods")
+    assert 0.8 * column.sum() < part.points < 1.1 * column.sum() and not part.asked
+    assert any(warning.kind == "left out" for warning in grid.certificate.warnings)
+
+
+@pytest.mark.parametrize(("piece", "height"), [("2", (2.0, 6.5)), ("largest", (-0.2, 0.6)), ("1", (-0.2, 0.6))])
+def test_one_piece_is_taken_alone(hall, piece, height):
+    settings = st.Settings(length=LENGTH, effort="quick", keep_rods=False, piece=piece)
+    grid = st.grid_from_points(hall[0], settings)
+    assert grid.topology.components == 1
+    assert height[0] < grid.nodes[:, 2].min() and grid.nodes[:, 2].max() < height[1]
+    assert any(part.kind == "not chosen" and part.asked for part in grid.certificate.left_out)
+
+
+def test_pieces_that_are_not_there_and_words_that_are_none_are_refused(hall):
+    with pytest.raises(st.InputError, match="piece 7 is asked for, but the scan has 2"):
+        st.grid_from_points(hall[0], st.Settings(length=LENGTH, keep_rods=False, piece="7"))
+    for piece in ("some", "0", "1,", "-1", ""):
+        with pytest.raises(st.InputError, match="piece must be all, largest or numbers"):
+            st.Settings(length=1.0, piece=piece)
+
+
+def test_the_command_names_the_pieces_and_how_to_take_one(hall, tmp_path, capsys):
+    np.save(tmp_path / "hall.npy", hall[0])
+    words = ["grid", str(tmp_path / "hall.npy"), str(tmp_path / "a.obj"), "--length", str(LENGTH), "--effort", "quick"]
+    assert main(words) == 0
+    said = "".join(capsys.readouterr())
+    assert "piece 2: " in said and "--no-keep-rods --piece 2 takes it alone, --crop box:" in said
+    assert said.index("of the scan, ") < said.index("shape quality")
