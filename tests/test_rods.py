@@ -87,3 +87,15 @@ def test_the_command_names_the_pieces_and_how_to_take_one(hall, tmp_path, capsys
     said = "".join(capsys.readouterr())
     assert "piece 2: " in said and "--no-keep-rods --piece 2 takes it alone, --crop box:" in said
     assert said.index("of the scan, ") < said.index("shape quality")
+
+
+@pytest.mark.parametrize("length", [1.0, 3.0])
+def test_strays_are_left_out_however_long_the_members(length):
+    """Long members reach from stray to stray: then nothing passes until the strays are looked for."""
+    rng = np.random.default_rng(4)
+    strays = rng.uniform([-12, -9, -3], [12, 9, 10], (1500, 3))
+    points = np.concatenate([roof(rng), strays])
+    grid = st.grid_from_points(points, st.Settings(length=length, effort="quick"))
+    assert grid.certificate.passed and (grid.topology.components, grid.topology.boundary_loops) == (1, 1)
+    (part,) = (part for part in grid.certificate.left_out if part.kind == "outliers")
+    assert 1350 < part.points <= 1510

@@ -43,6 +43,7 @@ LENGTHS = (
     1.04,
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 COARSEST = 0.5  # largest of them, in desired lengths
 
 
@@ -72,9 +73,13 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     ):
         settings = settings.replace(ridge_angle=0.0)
         yield from _same_scan(settings)
+    if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
+        settings = settings.replace(judge_outliers="always")
+        yield from _same_scan(settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
+    samples = sample_surface(cloud, settings)
     if settings.method == "default":
         if samples.smooth:
             yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
@@ -82,6 +87,12 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if size <= COARSEST:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
+
+
+def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
+    always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
+    return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:

@@ -32,6 +32,8 @@ COVER_REACH = (
     0.5  # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
 )
 
+MOST_FAULTS = 3  # faults that a refusal names
+
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
     """Return the certificate of a grid.
@@ -85,7 +87,9 @@ def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     grid = grid.replace(certificate=certificate)
     if certificate.passed:
         return grid
-    words = " and ".join(fault.words for fault in certificate.faults)
+    words = " and ".join(fault.words for fault in certificate.faults[:MOST_FAULTS])
+    more = len(certificate.faults) - MOST_FAULTS
+    words += f" and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
     advice = "try another length, or clean the scan; --keep-failed gives the grid all the same"
     raise CertificateError(f"the grid {words}; {advice}", grid, where)

@@ -118,6 +118,10 @@ def make_grid(
         except FrontError:
             note_pieces(bars, cloud, settings)
             raise
+    if grid.settings is not None and grid.settings.judge_outliers != settings.judge_outliers:
+        bars.note(
+            "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always"
+        )
     if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
         bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,11 @@ BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which t
 POINTS_OF_MIDDLE = 2_000  # points that show where the middle half lies
 FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
+RASTER = 4.0  # different x of a raster, in square roots of its points, at most
+NO_DATA, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points that may have a value for no data
+CLIFF = 0.1  # gap to the other heights, in their range, that no terrain has
+STEEP_CLIFF = 10.0  # steepness towards the nearest others, in the usual one, that no shore has
+SOME_OF_RASTER = 20_000  # points of the rest that are looked at
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS = (1e-30, 1e30)  # of a scan in any unit; swapped bytes make less of a whole number, and more of others
 CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
@@ -127,6 +133,48 @@ def invalid_values_note(points: np.ndarray) -> str:
         f"{len(points):,} points with coordinates up to {most:.3g}, a million times farther away than the scan is wide,"
         " are left out"
     )
+
+
+def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None where none has.
+
+    Many points then share exactly the least or the greatest height, and there is a cliff between them and their neighbours: a lake
+    has a shore.
+    """
+    z = points[:, 2]
+    if len(points) < FEWEST_POINTS or len(np.unique(points[:, 0])) > RASTER * math.sqrt(len(points)):
+        return None
+    for value in (z.min(), z.max()):
+        at: np.ndarray = z == value
+        count, rest = int(at.sum()), z[~at]
+        if not NO_DATA[0] * len(z) <= count <= NO_DATA[1] * len(z) or count < FEWEST_NO_DATA or not np.ptp(rest) > 0:
+            continue
+        gap = float(np.abs(rest - value).min())
+        if gap > CLIFF * np.ptp(rest) or _has_cliff(points[at], points[~at]):
+            return at, float(value)
+    return None
+
+
+def _has_cliff(level: np.ndarray, rest: np.ndarray) -> bool:
+    """Whether the nearest points of the rest (M, 3) lie far more steeply above or below level points (K, 3) than points of the rest do."""
+    rest = rest[:: len(rest) // SOME_OF_RASTER + 1]
+
+    def steepness(some: np.ndarray, itself: bool) -> float:
+        some = some[:: len(some) // 200 + 1]
+        away = np.hypot(*(some[:, None, axis] - rest[:, axis] for axis in (0, 1)))
+        if itself:
+            away[away == 0.0] = np.inf
+        nearest = away.argmin(axis=1)
+        near = away[np.arange(len(some)), nearest]
+        shore = near <= 3.0 * np.median(near)
+        return float(np.median(np.abs(some[:, 2] - rest[nearest, 2])[shore] / near[shore]))
+
+    return steepness(level, itself=False) > STEEP_CLIFF * steepness(rest, itself=True)
+
+
+def no_data_note(count: int, value: float) -> str:
+    """Return a note on points that are left out for this."""
+    return f"{count:,} points have exactly z = {value:.10g}, a value for no data, and are left out"
 
 
 def check_sensible(extent: float, said: str) -> None:

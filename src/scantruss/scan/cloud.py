@@ -10,12 +10,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .checks import CAUSE, check_sensible, find_invalid, invalid_values_note
+from .checks import CAUSE, check_sensible, find_invalid, find_no_data, invalid_values_note, no_data_note
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
-INVALID = "with a value that stands for no echo"
+INVALID = "with coordinates a million times too large"
+NO_DATA = "with a height that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
@@ -96,6 +97,12 @@ class PointCloud:
             notes = (invalid_values_note(clean[invalid]),)
             left_out = ((INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
+            lower, upper = bounds_of(clean)
+        if (no_data := find_no_data(clean)) is not None:
+            at, value = no_data
+            notes = (*notes, no_data_note(int(at.sum()), value + 0.0))
+            left_out = (*left_out, (NO_DATA, int(at.sum())))
+            clean = np.ascontiguousarray(clean[~at])
             lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)

@@ -122,6 +122,7 @@ class _Asked(NamedTuple):
     wish: Wish | None
     keep_rods: bool
     piece: str
+    judge_always: bool  #: look for outliers whether samples stand alone or not
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
@@ -129,10 +130,9 @@ class _Asked(NamedTuple):
         outliers = settings.outlier_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
-        wish = wish_of(settings, origin)
-        return cls(
-            settings.length, settings.box_size, outliers, repeated, uneven, wish, settings.keep_rods, settings.piece
-        )
+        wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
+        rods, piece = settings.keep_rods, settings.piece
+        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, always)
 
 
 class _Chosen(NamedTuple):
@@ -316,7 +316,7 @@ def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
     """Return larger samples where nobody said how large and the scan is dense, smooth and without outliers; else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    if asked.box_size is not None or spacing > SPARSE * length:
+    if asked.box_size is not None or asked.judge_always or spacing > SPARSE * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
@@ -331,7 +331,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
     radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
-    if asked.outlier_distance and has_outliers(found.neighbors):
+    if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
         outlier, sparse = judge_points(points, asked.outlier_distance, length)
         if outlier.any() or sparse.any():
             judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
