@@ -67,6 +67,9 @@ def run(words: Sequence[str]) -> None:
         print(parser.format_help(), end="")
         return
     values = parser.read(words[1:])
+    from ..report import terminal
+
+    terminal.quiet = values.quiet
     import_numba_without_blas()
     command(values)
 

@@ -36,6 +36,7 @@ class Parser(argparse.ArgumentParser):
             allow_abbrev=False,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
+        self.add_argument("-q", "--quiet", action="store_true", help="print nothing but errors")
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of printing the usage and leaving."""
@@ -54,10 +55,12 @@ class Parser(argparse.ArgumentParser):
         return values
 
     def _nearest(self, word: str) -> str:
-        """Guess which option was meant."""
+        """Guess which option was meant: one that begins like it, else the one most like it."""
         from difflib import get_close_matches
 
-        near = get_close_matches(word.partition("=")[0], self._option_string_actions, 1)
+        word = word.partition("=")[0]
+        begin = sorted((name for name in self._option_string_actions if name.startswith(word)), key=len)
+        near = begin[:1] if len(word) > 2 and begin else get_close_matches(word, self._option_string_actions, 1, 0.7)
         return f" (did you mean {near[0]}?)" if near else ""
 
 
@@ -100,9 +103,18 @@ def length_or_field(text: str) -> float | str:
     """Return the value of ``--length``: a number, else "curvature:MIN:MAX" or the name of a file of lengths as it stands."""
     with suppress(ValueError):
         return float(text)
-    if not text.startswith(CURVATURE) and not Path(text).is_file():
-        raise argparse.ArgumentTypeError(f"needs a number, a file of lengths or {CURVATURE}MIN:MAX, got {text!r}")
-    return text
+    if text.startswith(CURVATURE) or Path(text).is_file():
+        return text
+    needs = f"needs a number, a file of lengths or {CURVATURE}MIN:MAX"
+    if re.fullmatch(r"-?\d+,\d+", text):
+        raise argparse.ArgumentTypeError(f"{needs}; write {text.replace(',', '.')} with a point, not {text}")
+    if found := re.fullmatch(r"(-?\d*\.?\d+)\s*([a-z]+|\"|')", text, re.IGNORECASE):
+        raise argparse.ArgumentTypeError(
+            f"{needs}; write {found[1]} in the unit of the scan, without {found[2]} (--unit says which unit that is)"
+        )
+    if "." in text or "/" in text or "\\" in text:
+        raise argparse.ArgumentTypeError(f"{needs}; there is no file {text}")
+    raise argparse.ArgumentTypeError(f"{needs}, got {text!r}")
 
 
 def number_or_none(text: str) -> float | None:

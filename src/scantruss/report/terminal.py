@@ -13,8 +13,11 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 
+quiet = False  #: print nothing: neither bars nor notes nor results
+
+
 class Bars(AbstractContextManager["Bars"]):
-    """A progress bar a stage on stderr; nothing at all where stderr is not a terminal.
+    """A progress bar a stage on stderr, none where stderr is not a terminal; notes on stderr.
 
     An object is a ``progress(stage, share)`` for the functions of the library.
     """
@@ -27,7 +30,7 @@ class Bars(AbstractContextManager["Bars"]):
 
     def __enter__(self) -> Bars:
         """Start drawing, if there is somebody to look."""
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not quiet:
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -57,10 +60,12 @@ class Bars(AbstractContextManager["Bars"]):
 
     def note(self, line: str) -> None:
         """Say one line, above the bars where there are any."""
+        if quiet:
+            return
         if self._rich is not None:
             self._rich.console.print(line, highlight=False, markup=False)
         else:
-            print(line, flush=True)
+            print(line, file=sys.stderr, flush=True)
 
     def note_once(self, line: str) -> None:
         """Say one line, unless it was said in this way before."""
@@ -71,12 +76,14 @@ class Bars(AbstractContextManager["Bars"]):
 
 def print_lines(lines: list[str]) -> None:
     """Print plain lines as they are."""
-    if lines:
+    if lines and not quiet:
         print("\n".join(lines))
 
 
 def print_table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     """Print a table: drawn by rich on a terminal, plain columns elsewhere."""
+    if quiet:
+        return
     if sys.stdout.isatty():
         from rich.console import Console
         from rich.table import Table
