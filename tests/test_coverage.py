@@ -52,9 +52,9 @@ def test_the_distance_to_a_triangle_is_that_of_the_slow_twin(seed: int) -> None:
 
 
 @settings(max_examples=20)
-@given(some.integers(0, 10_000), some.sampled_from([0.0, 0.3, 30.0]), some.sampled_from([1, 900]))
+@given(some.integers(0, 10_000), some.sampled_from([0.0, 0.3, 30.0]), some.sampled_from([1, 30]))
 def test_the_plane_of_the_nearest_points_is_that_of_least_squares(seed: int, spread: float, copies: int) -> None:
-    """Far from the points too, and where hundreds lie at one place: then the nearest of them counts."""
+    """Far from the points too, and where dozens lie at one place: then the nearest of them counts."""
     rng = np.random.default_rng(seed)
     points = np.repeat(rng.normal(size=(40, 3)) * [1.0, 1.0, 0.1], copies, axis=0)
     places = rng.normal(size=(15, 3)) * [1.0, 1.0, 0.1] + spread * rng.normal(size=(15, 3))

@@ -63,7 +63,7 @@ def clean(package, folder):
     words = [sys.executable, "-m", "scantruss", *CLEAN]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return "compiling kernels" in done.stdout, sorted(path.name for path in (folder / "cache").rglob("*.nbc"))
+    return "compiling kernels" in done.stderr, sorted(path.name for path in (folder / "cache").rglob("*.nbc"))
 
 
 @handed_over

@@ -64,8 +64,8 @@ def unread(place, monkeypatch):
         ("sweep a.xyz --settings out/grid.json -o out", "out/grid.json would overwrite the settings"),
         ("thin a.xyz b.xyz -o b.xyz --spacing 1", "the thinned scan b.xyz would overwrite the scan"),
         ("clean *.xyz a.xyz", "the clean cloud a.xyz would overwrite the scan"),
-        ("splice a.xyz b.xyz -o ./b.xyz", "the whole b.xyz would overwrite the scan"),
-        ("splice a.xyz b.xyz -o poses.txt --poses poses.txt", "the whole poses.txt would overwrite the poses"),
+        ("splice a.xyz b.xyz -o ./b.xyz", "the merged cloud b.xyz would overwrite the scan"),
+        ("splice a.xyz b.xyz -o poses.txt --poses poses.txt", "the merged cloud poses.txt would overwrite the poses"),
         ("grid a.xyz out/grid.json --settings out/grid.json", "the grid out/grid.json would overwrite the settings"),
         ("grid a.xyz out/table.csv --length 1 --fixed-file out/table.csv", "would overwrite the list of fixed nodes"),
         (

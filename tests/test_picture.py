@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
+import scantruss as st
 from scantruss.export.drawing.camera import choose_camera, map_depth
 from scantruss.export.drawing.picture import PANELS, SIZE, draw_panels, encode_picture
 from scantruss.export.drawing.strokes import MARK, PAPER
@@ -43,8 +44,9 @@ def test_picture_does_not_depend_on_what_was_drawn_before_or_on_the_users_settin
         assert encode_picture(grid, cloud_over(grid)) == first
 
 
-def test_picture_says_nothing_of_when_or_with_what_it_was_made():
-    assert set(Image.open(io.BytesIO(encode_picture(fan()))).info) <= {"dpi"}
+def test_picture_says_that_it_is_ours_and_nothing_of_when_it_was_made():
+    said = Image.open(io.BytesIO(encode_picture(fan()))).info
+    assert set(said) <= {"dpi", "Software"} and said["Software"] == f"ScanTruss {st.__version__}"
 
 
 def test_fixed_nodes_are_marked():

@@ -147,11 +147,11 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     words = ["grid", "scan.npy", "grid.obj", "--length", "4", "--effort", "quick"]
     assert main([*words, "--memory", "1MB"]) == 0
-    assert "thinned while it was read, from 5" in capsys.readouterr().out
+    assert "thinned while it was read, from 5" in capsys.readouterr().err
     first = (place / "grid.obj").read_bytes()
     assert json.loads((place / "grid.settings.json").read_text())["thin_spacing"] == 0.2
     assert main(["grid", "scan.npy", "again.obj", "--settings", "grid.settings.json"]) == 0  # on a larger machine
-    assert "thinned" in capsys.readouterr().out
+    assert "thinned" in capsys.readouterr().err
     assert (place / "again.obj").read_bytes() == first
     assert main([*words, "--memory", "1MB", "--thin-spacing", "0"]) == 0
     assert "thinned" not in capsys.readouterr().out
@@ -160,9 +160,9 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
 def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatch):
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     assert main(["info", "scan.npy"]) == 0
-    whole = capsys.readouterr().out
+    whole = "".join(capsys.readouterr())
     assert main(["info", "scan.npy", "--memory", "1MB"]) == 0
-    said = capsys.readouterr().out
+    said = "".join(capsys.readouterr())
     assert "thinned while it was read, from 5" in said and "thinned" not in whole
     wished, sizes = ([text.split(word)[1].split("\n")[0] for text in (whole, said)] for word in ("try ", "extent   "))
     assert wished[0] == wished[1]
@@ -170,10 +170,10 @@ def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatc
     assert np.allclose(one, other, rtol=0.01)
     assert said.split("boundary  length")[1].count("external") == 1 and said.count("internal") == 1
     assert main(["info", "scan.npy", "--memory", "1MB", "--length", "4"]) == 0
-    assert "in boxes of 0.2;" in capsys.readouterr().out
+    assert "in boxes of 0.2;" in capsys.readouterr().err
     for words in (["--thin-spacing", "0"], ["--length", "4", "--thin-spacing", "0"]):
         assert main(["info", "scan.npy", "--memory", "1MB", *words]) == 0
-        assert "thinned" not in capsys.readouterr().out
+        assert "thinned" not in "".join(capsys.readouterr())
     np.save("none.npy", np.full((2000, 3), np.nan))
     assert "no points but NaN" in refused(capsys, "info", "none.npy", "--memory", "1kB")
 
@@ -195,7 +195,7 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, mo
     assert looks[1] == pytest.approx(looks[0], rel=0.02)
     assert shares[-1] == ("look", 1.0)
     assert main(["info", "holes.npy", "--memory", "1MB"]) == 0
-    assert "thinned while it was read" in capsys.readouterr().out
+    assert "thinned while it was read" in capsys.readouterr().err
 
 
 def test_a_first_look_sees_thin_far_ends(place):
@@ -300,9 +300,9 @@ def test_a_sweep_into_a_file_is_refused(place, capsys):
 def test_several_workers_are_announced_and_change_no_byte(place, capsys):
     words = ["thin", "scan.npy", "--spacing", "2", "--keep", "nearest", "--boundary"]
     assert main([*words, "-o", "alone.npy", "--workers", "1"]) == 0
-    assert "processes" not in capsys.readouterr().out
+    assert "processes" not in capsys.readouterr().err
     assert main([*words, "-o", "shared.npy", "--workers", "2"]) == 0
-    assert "on 2 processes of this machine" in capsys.readouterr().out
+    assert "on 2 processes of this machine" in capsys.readouterr().err
     assert (place / "shared.npy").read_bytes() == (place / "alone.npy").read_bytes()
 
 

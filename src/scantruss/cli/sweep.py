@@ -99,11 +99,15 @@ def sweep(values: Namespace) -> None:
 def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) -> None:
     """Refuse a folder in which a result cannot be written, or would be where something else is."""
     from ..runtime.files import check_place
+    from ..runtime.ours import check_ours
 
-    for name in (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png"))):
-        claim(folder / name, "result", taken, force=force)
+    names = (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
+    for name in names:
+        claim(folder / name, "result", taken, force=True)
         if folder.exists():
             check_place(folder / name, (Path(name).suffix,))
+    for name in () if force else names:
+        check_ours(folder / name, "result")
     _refuse_earlier_sweep(folder, {trial.name for trial in trials})
 
 

@@ -77,5 +77,6 @@ def _spreads(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray
 def _moments(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return mean products (S, 3, 3), mean (S, 3) and number (S,) of the living samples within reach of each."""
     moments, middle = np.empty((len(found.mean), 3, 3)), np.empty((len(found.mean), 3))
-    count = spreads_around(found.mean, found.boxes, alive, reach, moments, middle)
+    count = np.empty(len(found.mean), np.int64)
+    spreads_around(found.mean, found.boxes, alive, reach, moments, middle, count)
     return moments, middle, count

@@ -10,15 +10,21 @@ from ..geometry.boxes import SearchBoxes, box_index, slot_of
 
 @kernel
 def spreads_around(
-    mean: np.ndarray, boxes: SearchBoxes, alive: np.ndarray, reach: float, moments: np.ndarray, middle: np.ndarray
-) -> np.ndarray:
-    """Mean products of the coordinates of the living samples within reach of each about their mean; returns how many there are (S,).
+    mean: np.ndarray,
+    boxes: SearchBoxes,
+    alive: np.ndarray,
+    reach: float,
+    moments: np.ndarray,
+    middle: np.ndarray,
+    counts: np.ndarray,
+) -> None:
+    """Mean products of the coordinates of the living samples within reach of each about their mean, (S, 3, 3).
 
-    moments : (S, 3, 3), filled. middle : (S, 3), filled with their mean. A sample itself counts if it lives.
+    middle, counts : (S, 3) and (S,), filled with their mean and their number. A sample itself counts if it lives.
     """
-    counts = np.zeros(len(mean), np.int64)
     for s in range(len(mean)):
         x, y, z = mean[s, 0], mean[s, 1], mean[s, 2]
+        counts[s] = 0
         total = np.zeros(3)
         square = np.zeros((3, 3))
         for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
@@ -39,4 +45,3 @@ def spreads_around(
             middle[s, a] = mean[s, a] + total[a] / many
             for b in range(3):
                 moments[s, a, b] = square[a, b] / many - total[a] / many * total[b] / many
-    return counts
