@@ -60,7 +60,7 @@ class Grid(GridTables):
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
             changes = {"certificate": None, **changes}
         copy = replace(self, **changes)
-        known = {name: value for name, value in vars(self).items() if name not in vars(copy)}
+        known = {name: value for name, value in vars(self).copy().items() if name not in vars(copy)}
         if changes.keys() <= PROVENANCE:
             vars(copy).update(known)
         elif "triangles" not in changes and len(copy.nodes) == len(self.nodes):
