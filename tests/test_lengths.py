@@ -132,7 +132,10 @@ def test_info_takes_a_field(plate, capsys):
         ("curvature:1:20", "the longest length of the length field, 20, is larger than the scan"),
         ("5 0 9 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 9)"),
         ("5 0 1.6 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 1.6)"),
-        ("missing.csv", "--length: needs a number, a file of lengths or curvature:MIN:MAX, got 'missing.csv'"),
+        (
+            "missing.csv",
+            "--length: needs a number, a file of lengths or curvature:MIN:MAX; there is no file missing.csv",
+        ),
     ],
 )
 def test_a_field_that_the_scan_cannot_carry_is_refused(plate, tmp_path, capsys, monkeypatch, length, words):

@@ -352,7 +352,7 @@ def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(place, c
     result = replace(result, left_out=("x.xyz", "y.xyz"), doubtful=("y.xyz",))
     monkeypatch.setattr("scantruss.scan.register.splice_scans", lambda *_, **__: result)
     assert main(["splice", "*.xyz", "-o", "out.ply"]) == 0
-    said = capsys.readouterr().out
+    said = "".join(capsys.readouterr())
     assert "x.xyz fits nowhere" in said and "y.xyz fits in more ways than one" in said and "4 of 6 scans" in said
     assert json.loads(Path("out.poses.json").read_text())["left_out"] == ["x.xyz", "y.xyz"]
     assert main(["splice", "*.xyz", "-o", "all.ply", "--all"]) == 2

@@ -253,7 +253,7 @@ def test_saved_settings_select_the_same_without_the_file(tmp_path: Path, monkeyp
     Path("a.las").write_bytes(las(plate(8000), classification=np.arange(8000) % 10 // 9))
     Path("ring.csv").write_text("2,2\n38,2\n38,28\n2,28\n")
     assert main(["grid", "a.las", "a.obj", "--length", "4", "--class", "0", "--crop", "ring.csv"]) == 0
-    said = capsys.readouterr().out
+    said = "".join(capsys.readouterr())
     assert "800 points of other classes are left out" in said and "points outside the polygon are left out" in said
     Path("ring.csv").unlink()
     assert main(["grid", "a.las", "b.obj", "--settings", "a.settings.json"]) == 0

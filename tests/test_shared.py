@@ -25,7 +25,7 @@ def place(tmp_path, monkeypatch):
 )
 def test_points_that_are_no_numbers_are_told_of_in_the_same_words(words, capsys):
     assert main(words.split()) == 0
-    assert "\n1,250 points with NaN or infinite coordinates are left out\n" in "\n" + capsys.readouterr().out
+    assert "\n1,250 points with NaN or infinite coordinates are left out\n" in "\n" + capsys.readouterr().err
 
 
 def test_one_of_several_clouds_is_named(capsys):
@@ -37,4 +37,4 @@ def test_one_of_several_clouds_is_named(capsys):
     for name in ("", "a.las"):
         report_cloud(Bars(), cloud, name)
     nans = "2 points with NaN or infinite coordinates are left out"
-    assert capsys.readouterr().out.splitlines() == [*notes, nans, f"a.las: {notes[0]}", notes[1], f"a.las: {nans}"]
+    assert capsys.readouterr().err.splitlines() == [*notes, nans, f"a.las: {notes[0]}", notes[1], f"a.las: {nans}"]

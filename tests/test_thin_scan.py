@@ -230,7 +230,7 @@ def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys):
     Path("ring.txt").write_text("\n".join(f"{x} {y}" for x, y in RING))
     words = ["--spacing", "1.7", "--class", "2,6", "--crop", "ring.txt"]
     assert main(["thin", "a.las", "-o", "thin.ply", *words]) == 0
-    said = capsys.readouterr().out
+    said = "".join(capsys.readouterr())
     assert "of other classes are left out" in said and "the heights are brought to m" in said
     taken = Selection(classes=(2, 6), crop=(polygon_text([RING]),))
     thin = read_points("thin.ply")
@@ -254,7 +254,7 @@ def test_grid_thins_what_is_selected_and_repeats_it(capsys, monkeypatch):
     Path("a.las").write_bytes(las(points, records=(wkt(BOTH),), classification=np.arange(len(points)) % 3))
     words = ["--length", "4", "--effort", "quick", "--class", "0,1", "--crop", "box:0,0,40,25"]
     assert main(["grid", "a.las", "a.obj", *words, "--memory", "100kB"]) == 0
-    said = capsys.readouterr().out
+    said = "".join(capsys.readouterr())
     assert "of other classes are left out" in said and "thinned while it was read, from 1" in said and "0.2 m" in said
     kept = json.loads(Path("a.settings.json").read_text())
     assert kept["thin_spacing"] == 0.2 and kept["classes"] == [0, 1]
