@@ -234,3 +234,14 @@ def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length():
     cloud = st.PointCloud.from_array(shape.points)
     found = {sample_surface(cloud, st.Settings(length=share * shape.length)).outliers for share in (0.5, 1.0)}
     assert found == {int(outliers.find_outliers(cloud.points, 3.0).sum())}
+
+
+@pytest.mark.kernels
+def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go():
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(24) * 1.0, np.arange(24) * 1.0))
+    middle = (np.abs(x - 11.5) < 9) & (np.abs(y - 11.5) < 9)
+    kept = ~middle | ((x % 5 == 1) & (y % 5 == 1))
+    sheet = np.column_stack([x, y, 0.01 * (x - 11) ** 2])[kept]
+    strays = np.array([[5.0, 5.0, 9.0], [12.0, 3.0, -8.0], [20.0, 18.0, 12.0]])
+    outlier = outliers.find_outliers(np.concatenate([sheet, strays]), 2.0)
+    assert outlier[-3:].all() and outlier[:-3].mean() < 0.05

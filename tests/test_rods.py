@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import scantruss as st
+from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
+from scantruss.kernels.surface.rods import spreads_around
 from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.rods import rod_points
 
@@ -99,3 +101,17 @@ def test_strays_are_left_out_however_long_the_members(length):
     assert grid.certificate.passed and (grid.topology.components, grid.topology.boundary_loops) == (1, 1)
     (part,) = (part for part in grid.certificate.left_out if part.kind == "outliers")
     assert 1350 < part.points <= 1530
+
+
+@pytest.mark.kernels
+def test_spreads_around_are_those_of_plain_sums():
+    rng = np.random.default_rng(1)
+    mean, alive = rng.normal(size=(150, 3)), rng.random(150) < 0.7
+    moments, middle, counts = np.empty((150, 3, 3)), np.empty((150, 3)), np.empty(150, np.int64)
+    spreads_around(mean, boxes_of(mean, 0.4), alive, 0.8, moments, middle, counts)
+    for s in range(150):
+        near = mean[alive & (np.linalg.norm(mean - mean[s], axis=1) <= 0.8)]
+        assert counts[s] == len(near)
+        if len(near):
+            assert middle[s] == pytest.approx(near.mean(axis=0))
+            assert moments[s] == pytest.approx(np.cov(near.T, bias=True), abs=1e-9) if len(near) > 1 else True
