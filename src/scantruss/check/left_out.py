@@ -28,50 +28,62 @@ def parts_left_out(
     ----------
     members, reach : (N,) desired member length at each point, and how far it may lie from the grid [scan unit]
     """
-    count = len(samples.scan)
-    parts = [*_of_kind("outliers", samples.judged == OUTLIER, samples, found)]
-    parts += _of_kind("sparse", samples.judged == SPARSE_POINT, samples, found)
-    parts += _of_kind("rods", samples.judged == ROD, samples, found)
-    parts += _of_kind("duplicates", samples.judged == DUPLICATE, samples, found)
-    away = np.flatnonzero((samples.judged == KEPT) & (found.scan > reach))
+    total = len(samples.scan) + sum(number for _, number in samples.unread)
+    return (
+        *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
+        *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
+        *_closed_holes(samples),
+    )
+
+
+def points_left_out(
+    samples: SurfaceSamples, distance: np.ndarray, members: np.ndarray, reach: np.ndarray
+) -> list[tuple[LeftOut, np.ndarray]]:
+    """Return what a grid leaves out of the points that were read, each with the numbers (K,) of its points.
+
+    Parameters
+    ----------
+    distance : (N,) of each point from the grid [scan unit]
+    members, reach : as in `parts_left_out`
+    """
+    parts = []
+    for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
+        if len(which := np.flatnonzero(samples.judged == judged)):
+            parts.append(_part(kind, which, samples, distance))
+    away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
     owner = _owners(samples, away)
     small = (owner >= 0) & ~samples.kept[owner]
     other = small & np.isin(samples.piece[owner], samples.not_chosen)
-    parts += _places("pieces", away[small & ~other], samples.piece[owner[small & ~other]], samples, found)
-    far = ~small & (found.scan[away] > members[away])
-    parts += _places("far", away[far], _groups(samples, owner[far]), samples, found)
-    parts.sort(key=lambda part: -part.points)
-    chosen_out = _places("not chosen", away[other], samples.piece[owner[other]], samples, found)
-    parts += [replace(part, asked=True) for part in chosen_out]
-    total = count + sum(number for _, number in samples.unread)
-    parts += [LeftOut(words, number, number / total, asked=True) for words, number in samples.unread]
-    return (*parts, *_closed_holes(samples))
+    parts += _places("pieces", away[small & ~other], samples.piece[owner[small & ~other]], samples, distance)
+    far = ~small & (distance[away] > members[away])
+    parts += _places("far", away[far], _groups(samples, owner[far]), samples, distance)
+    parts.sort(key=lambda part: -part[0].points)
+    chosen_out = _places("not chosen", away[other], samples.piece[owner[other]], samples, distance)
+    return [*parts, *((replace(part, asked=True), which) for part, which in chosen_out)]
 
 
-def _part(kind: str, which: np.ndarray, samples: SurfaceSamples, found: Distances, placed: bool = True) -> LeftOut:
+def _part(
+    kind: str, which: np.ndarray, samples: SurfaceSamples, distance: np.ndarray, placed: bool = True
+) -> tuple[LeftOut, np.ndarray]:
     """Return some points of the scan (K,), K > 0, as one entry."""
     points = samples.scan[which]
     where = place_of(np.median(points, axis=0) + samples.origin) if placed else None
     size = float(np.ptp(points, axis=0).max()) if placed else None
-    return LeftOut(kind, len(which), len(which) / len(samples.scan), where, size, float(found.scan[which].max()))
-
-
-def _of_kind(kind: str, which: np.ndarray, samples: SurfaceSamples, found: Distances) -> list[LeftOut]:
-    """Return the points marked in `which` (N,) bool as one entry; none where none is."""
-    return [_part(kind, np.flatnonzero(which), samples, found)] if which.any() else []
+    share, farthest = len(which) / len(samples.scan), float(distance[which].max())
+    return LeftOut(kind, len(which), share, where, size, farthest), which
 
 
 def _places(
-    kind: str, which: np.ndarray, group: np.ndarray, samples: SurfaceSamples, found: Distances
-) -> list[LeftOut]:
+    kind: str, which: np.ndarray, group: np.ndarray, samples: SurfaceSamples, distance: np.ndarray
+) -> list[tuple[LeftOut, np.ndarray]]:
     """Return an entry for each of the largest groups of points (K,), and one for the rest."""
     if not len(which):
         return []
     _, number, counts = np.unique(group, return_inverse=True, return_counts=True)
     largest = np.argsort(-counts, kind="stable")
-    parts = [_part(kind, which[number == each], samples, found) for each in largest[:MOST_PLACES]]
+    parts = [_part(kind, which[number == each], samples, distance) for each in largest[:MOST_PLACES]]
     rest = np.isin(number, largest[MOST_PLACES:])
-    return [*parts, *([_part(kind, which[rest], samples, found, placed=False)] if rest.any() else [])]
+    return [*parts, *([_part(kind, which[rest], samples, distance, placed=False)] if rest.any() else [])]
 
 
 def _owners(samples: SurfaceSamples, which: np.ndarray) -> np.ndarray:

@@ -15,20 +15,27 @@ import numpy as np
 from ..grid.grid import Grid
 from .obj import own_frame
 
+Table = tuple[Iterable[str], Iterable[Iterable[Any]]]  # header and rows
+
 
 def nodes_path(path: Path) -> Path:
     """Return the path of the nodes that belong to a file of members: `grid.csv` -> `grid_nodes.csv`."""
     return path.with_name(f"{path.stem}_nodes{path.suffix}")
 
 
-def encode_csv(grid: Grid, path: Path) -> dict[Path, bytes]:
-    """Return the two files: members at `path`, nodes beside it."""
-    return {path: _members(grid), nodes_path(path): _nodes(grid)}
+def encode_csv(grid: Grid, path: Path, *, decimal_comma: bool = False) -> dict[Path, bytes]:
+    """Return the two files: members at `path`, nodes beside it; with a decimal comma and semicolons if asked for."""
+    tables = {path: _members(grid), nodes_path(path): _nodes(grid)}
+    return {place: _encoded(*table, decimal_comma=decimal_comma) for place, table in tables.items()}
 
 
-def _table(header: Iterable[str], rows: Iterable[Iterable[Any]]) -> bytes:
+def _encoded(header: Iterable[str], rows: Iterable[Iterable[Any]], *, decimal_comma: bool) -> bytes:
     """Return the text of a table; numbers with every digit of a float64, nothing for None."""
-    lines = [",".join(header), *(",".join("" if value is None else repr(value) for value in row) for row in rows)]
+    between = ";" if decimal_comma else ","
+    words = (["" if value is None else repr(value) for value in row] for row in rows)
+    if decimal_comma:
+        words = ([word.replace(".", ",") for word in row] for row in words)
+    lines = [between.join(header), *(between.join(row) for row in words)]
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 
@@ -37,7 +44,7 @@ def _with_unit(names: str, unit: str) -> list[str]:
     return [f"{name} [{unit}]" if unit else name for name in names.split()]
 
 
-def _members(grid: Grid) -> bytes:
+def _members(grid: Grid) -> Table:
     """Return the table of members: both nodes, their places, the length, whether on a boundary."""
     nodes = own_frame(grid)
     start, end = grid.edges[:, 0], grid.edges[:, 1]
@@ -45,10 +52,10 @@ def _members(grid: Grid) -> bytes:
     places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
     boundary = (grid.edge_triangles[:, 1] < 0).astype(int)
     rows = zip(range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), strict=True)
-    return _table(["id", "start", "end", *columns, "boundary"], rows)
+    return (["id", "start", "end", *columns, "boundary"], rows)
 
 
-def _nodes(grid: Grid) -> bytes:
+def _nodes(grid: Grid) -> Table:
     """Return the table of nodes: place, members meeting there, whether on a boundary, fixed, distance from the scan."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
@@ -61,4 +68,4 @@ def _nodes(grid: Grid) -> bytes:
     if grid.desired is not None:
         header += _with_unit("desired_length", grid.unit)
         columns.append(np.asarray(grid.desired, float).tolist())
-    return _table(header, zip(range(len(grid.nodes)), *columns, strict=True))
+    return (header, zip(range(len(grid.nodes)), *columns, strict=True))

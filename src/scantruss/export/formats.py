@@ -14,16 +14,17 @@ from .drawing.picture import encode_picture
 from .json import encode_json
 from .obj import encode_obj
 from .ply import encode_ply
+from .style import FileStyle
 
-Encoder = Callable[[Grid, Path, PointCloud | None], dict[Path, bytes]]
+Encoder = Callable[[Grid, Path, PointCloud | None, FileStyle], dict[Path, bytes]]
 
 #: suffix -> what the files of that format hold: pure functions of the grid, and of the cloud where it is drawn
 FORMATS: dict[str, Encoder] = {
-    ".csv": lambda grid, path, cloud: encode_csv(grid, path),
-    ".json": lambda grid, path, cloud: {path: encode_json(grid)},
-    ".obj": lambda grid, path, cloud: {path: encode_obj(grid)},
-    ".ply": lambda grid, path, cloud: {path: encode_ply(grid)},
-    ".png": lambda grid, path, cloud: {path: encode_picture(grid, cloud)},
+    ".csv": lambda grid, path, cloud, style: encode_csv(grid, path, decimal_comma=style.decimal_comma),
+    ".json": lambda grid, path, cloud, style: {path: encode_json(grid)},
+    ".obj": lambda grid, path, cloud, style: {path: encode_obj(grid, style.obj)},
+    ".ply": lambda grid, path, cloud, style: {path: encode_ply(grid)},
+    ".png": lambda grid, path, cloud, style: {path: encode_picture(grid, cloud, style=style)},
 }
 
 SOLID_SUFFIXES = (".3mf", ".stl")
@@ -49,7 +50,9 @@ def check_output(path: str | Path) -> Path:
     return path
 
 
-def write(grid: Grid, path: str | Path, *, cloud: PointCloud | None = None) -> list[Path]:
+def write(
+    grid: Grid, path: str | Path, *, cloud: PointCloud | None = None, style: FileStyle | None = None
+) -> list[Path]:
     """Write a grid; the suffix of the path tells the format.
 
     Parameters
@@ -60,6 +63,8 @@ def write(grid: Grid, path: str | Path, *, cloud: PointCloud | None = None) -> l
         File ending in .csv, .json, .obj, .ply or .png.
     cloud : PointCloud, optional
         The scan, drawn in the picture (.png).
+    style : FileStyle, optional
+        Views and size of a picture, faces or lines in OBJ, decimal comma in CSV.
 
     Returns
     -------
@@ -72,4 +77,4 @@ def write(grid: Grid, path: str | Path, *, cloud: PointCloud | None = None) -> l
         Unknown suffix, no such folder, no space; nothing half-written is left.
     """
     path = check_output(path)
-    return write_files(FORMATS[path.suffix.lower()](grid, path, cloud))
+    return write_files(FORMATS[path.suffix.lower()](grid, path, cloud, style or FileStyle()))

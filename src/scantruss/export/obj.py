@@ -1,4 +1,4 @@
-"""Wavefront OBJ: nodes and triangles in the scan's own frame."""
+"""Wavefront OBJ: nodes, triangles and members in the scan's own frame."""
 
 from __future__ import annotations
 
@@ -26,9 +26,19 @@ def own_frame(grid: Grid) -> np.ndarray:
     return np.asarray(grid.nodes, np.float64).reshape(-1, 3) + np.asarray(grid.origin, np.float64)
 
 
-def encode_obj(grid: Grid) -> bytes:
-    """Return the text of an OBJ file: `v` with every digit of a float64, `f` counted from 1."""
+def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
+    """Return the text of an OBJ file: `v` with every digit of a float64, then `f` and `l` counted from 1.
+
+    Parameters
+    ----------
+    grid : Grid
+    elements : str
+        faces for the triangles, lines for the members, or both.
+    """
     lines = [f"# {line}" for line in header_lines(grid)]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in own_frame(grid).tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
+    if elements in ("faces", "both"):
+        lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
+    if elements in ("lines", "both"):
+        lines += [f"l {a} {b}" for a, b in (grid.edges + 1).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")

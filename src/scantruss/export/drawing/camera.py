@@ -7,7 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..style import angles_of
+
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
+OPEN = 0.5  # mean normal by area from which on a shell is open: it faces one way on the whole
+FACING = 0.08  # ... from which on it tells which way is up where no flat face does
+FACE_DEPTH = 0.02  # how even a face is on which something stands [longest side]
+FLAT_FACE = 0.1  # least share of such a face in the plan
+UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
+DIRECTIONS = 64  # in which a convex polygon is looked for
+ANGLES = {  # azimuth and elevation of the views of a drawing [degree]
+    "top": (0.0, 90.0), "bottom": (0.0, -90.0), "front": (0.0, 0.0), "back": (180.0, 0.0),
+    "left": (-90.0, 0.0), "right": (90.0, 0.0),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +61,13 @@ class Camera:
         return replace(self, zoom=float(zoom), shift=shift)
 
 
-def choose_camera(nodes: np.ndarray, triangles: np.ndarray) -> Camera:
-    """Return a camera that looks from above and aside, from the side to which the triangles face.
+def choose_camera(
+    nodes: np.ndarray, triangles: np.ndarray, upward: np.ndarray | None = None, view: str = "auto"
+) -> Camera:
+    """Return a camera that looks at a grid from a side.
 
-    Open shells face one way on the whole: that way is up, and the more they do, the more the eye looks down on them.
-    What is nearly closed stands upright along its longest side, or lies flat if it is flat.
+    "auto" looks from above and aside: the more an open shell faces upwards, the more from above. The other views are those of a
+    drawing: the front is where one looks along y, or against z where y is up.
 
     Parameters
     ----------
@@ -61,20 +75,71 @@ def choose_camera(nodes: np.ndarray, triangles: np.ndarray) -> Camera:
         (V, 3) [scan unit].
     triangles : np.ndarray
         (T, 3) ids of nodes.
+    upward : np.ndarray, optional
+        (3,) unit vector against gravity; what is likely if it is not known, see `likely_upward`.
+    view : str
+        One of `VIEWS`, or "AZIMUTH,ELEVATION".
     """
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    a, b, c = nodes[triangles.T]
-    normal = np.cross(b - a, c - a)
-    area = float(np.linalg.norm(normal, axis=1).sum()) or 1.0
-    facing = normal.sum(axis=0) / area
-    openness = float(np.linalg.norm(facing))
-    ground, openness = (_upward(facing / openness), openness) if openness > 0.08 else _standing(high - low)
-    front = _front(nodes, ground, openness)
-    rise = math.radians(12 + 36 * min(openness / 0.8, 1.0))
+    facing = facing_of(nodes, triangles)
+    ground = likely_upward(nodes, facing) if upward is None else upward
+    if view in ("auto", "behind"):
+        openness = max(float(facing @ ground), 0.0)
+        front = _front(nodes, ground, facing, openness)
+        lying = _is_lying(nodes, ground)
+        rise = math.radians(12 + 36 * min(max(openness / 0.8, 0.45 if lying else 0.0), 1.0))
+        front = -front if view == "behind" else front
+    else:
+        azimuth, elevation = angles_of(view) or ANGLES[view]
+        first, second = _sides(ground)
+        turn, rise = math.radians(azimuth), math.radians(elevation)
+        front = math.cos(turn) * first + math.sin(turn) * second
     back = math.cos(rise) * front + math.sin(rise) * ground
-    right = np.cross(ground, back)
+    right = np.cross(ground, front)
     right /= np.linalg.norm(right)
     return Camera(np.zeros(3), right, np.cross(back, right), back, ground, 1.0).around(nodes)
+
+
+def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the mean normal of a surface by area (3,): the shorter, the more closed it is."""
+    a, b, c = nodes[triangles.T]
+    normal = np.cross(b - a, c - a)
+    facing: np.ndarray = normal.sum(axis=0) / (float(np.linalg.norm(normal, axis=1).sum()) or 1.0)
+    return facing
+
+
+def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
+    """Return the direction that is probably up (3,), where nothing tells of gravity: what is there lies on its largest flat face.
+
+    An open shell stands on its opening. What has no flat face stands along its longest side, or lies where it is flat.
+    """
+    openness = float(np.linalg.norm(facing))
+    if openness > OPEN:
+        return _upward(facing / openness)
+    extent = np.ptp(nodes, axis=0)
+    faces = {}
+    for axis in range(3):
+        across = np.delete(nodes, axis, axis=1)
+        whole = float(np.prod(np.ptp(across, axis=0))) or 1.0
+        for sign in (1.0, -1.0):
+            height = sign * nodes[:, axis]
+            down = height <= height.min() + FACE_DEPTH * extent.max()
+            usual = UPRIGHT if sign > 0.0 and axis in (1, 2) else 1.0  # most files have y or z up
+            faces[axis, sign] = (usual * _area_around(across[down]), _area_around(across[down]) / whole)
+    (axis, sign), (_, share) = max(faces.items(), key=lambda item: item[1][0])
+    if share > FLAT_FACE:
+        return sign * np.eye(3)[axis]
+    return _upward(facing / openness) if openness > FACING else _standing(extent)
+
+
+def _area_around(flat: np.ndarray) -> float:
+    """Return about the area of the smallest convex polygon around points (N, 2)."""
+    if len(flat) < 3:
+        return 0.0
+    turn = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
+    rays = np.stack([np.cos(turn), np.sin(turn)])
+    corner = flat[(flat @ rays).argmax(axis=0)]
+    after = np.roll(corner, -1, axis=0)
+    return float(0.5 * abs((corner[:, 0] * after[:, 1] - corner[:, 1] * after[:, 0]).sum()))
 
 
 def _upward(facing: np.ndarray) -> np.ndarray:
@@ -83,27 +148,40 @@ def _upward(facing: np.ndarray) -> np.ndarray:
     return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > math.cos(math.radians(25)) else facing
 
 
-def _standing(extent: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the axis along which something closed stands, and how much one should look down on it: 0 to 1."""
+def _standing(extent: np.ndarray) -> np.ndarray:
+    """Return the axis along which something without a flat face stands."""
     short, middle, long = np.argsort(extent, kind="stable")
     if extent[long] > 1.15 * extent[middle]:
-        return np.eye(3)[long], 0.0
-    if extent[short] < 0.5 * extent[middle]:
-        return np.eye(3)[short], 0.45
-    return np.eye(3)[1], 0.1
+        return np.eye(3)[long]
+    return np.eye(3)[short] if extent[short] < 0.5 * extent[middle] else np.eye(3)[1]
 
 
-def _front(nodes: np.ndarray, ground: np.ndarray, openness: float) -> np.ndarray:
-    """Return a horizontal direction to the eye: a little aside of the front; across the longer side of what lies."""
+def _is_lying(nodes: np.ndarray, ground: np.ndarray) -> bool:
+    """Whether something is much wider than it is high."""
+    height, across = np.ptp(nodes @ ground), max(float(np.ptp(nodes @ side)) for side in _sides(ground))
+    return bool(height < 0.5 * across)
+
+
+def _sides(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the horizontal directions to the one who looks from the front, and to the right of him."""
     forward = np.array([0.0, 0.0, 1.0]) if abs(ground[1]) > 0.8 else np.array([0.0, -1.0, 0.0])
     first = forward - (forward @ ground) * ground
     first /= np.linalg.norm(first)
-    second = np.cross(ground, first)  # to the right of one who looks from the front
+    return first, np.cross(ground, first)
+
+
+def _front(nodes: np.ndarray, ground: np.ndarray, facing: np.ndarray, openness: float) -> np.ndarray:
+    """Return a horizontal direction to the eye: a little aside of the front; across the longer side of what lies."""
+    first, second = _sides(ground)
+    level = facing - (facing @ ground) * ground
     turn = math.radians(28)
     if openness > 0.5:
         width, depth = np.ptp(nodes @ second), np.ptp(nodes @ first)
         if depth > 1.1 * width:
             first, second = second, -first
+    elif np.linalg.norm(level) > OPEN:  # as a facade does
+        first = level / np.linalg.norm(level)
+        second = np.cross(ground, first)
     front: np.ndarray = math.cos(turn) * first - math.sin(turn) * second
     return front
 

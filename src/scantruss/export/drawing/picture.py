@@ -17,9 +17,13 @@ from ...grid.grid import Grid
 from ...runtime.files import check_place, write_files
 from ...runtime.ours import MARK
 from ...scan.cloud import PointCloud
-from .camera import choose_camera
+from ..style import FileStyle
+from .camera import Camera, choose_camera
+from .left_out import Shown, shown_points
+from .legend import Ring, Text, marks_of, scale_bar
 from .strokes import (
     INK,
+    MOST_POINTS,
     PAPER,
     Strokes,
     cloud_strokes,
@@ -27,16 +31,24 @@ from .strokes import (
     framed,
     grid_strokes,
     look,
+    missed_strokes,
+    placed,
     shadow_strokes,
     solid_strokes,
+    some_of,
 )
 
 SIZE = (1600, 1200)  #: of a picture [pixel]
-PANELS = (2400, 800)  #: of three panels [pixel]
+PANELS = (2400, 800)  #: of three panels, or of several views [pixel]
+UP = np.array([0.0, 0.0, 1.0])
+SURVEY_UNITS = ("m", "foot")  #: scans in them have z up
+SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  #: ... and those of these files
 
 
-def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool = True) -> bytes:
-    """Return a shaded picture of the grid over its scan, PNG.
+def encode_picture(
+    grid: Grid, cloud: PointCloud | None = None, *, caption: bool = True, style: FileStyle | None = None
+) -> bytes:
+    """Return a shaded picture of the grid over its scan, PNG; what the grid leaves out of the scan is coloured.
 
     Parameters
     ----------
@@ -45,15 +57,70 @@ def encode_picture(grid: Grid, cloud: PointCloud | None = None, *, caption: bool
     cloud : PointCloud, optional
         The scan, drawn as fine dots.
     caption : bool
-        Whether to write the figures of the grid below it.
+        Whether to write the figures of the grid below it, a scale bar, what the colours mean and where to look.
+    style : FileStyle, optional
+        Views and size of the picture.
     """
-    wide, tall = SIZE
-    strokes = []
+    style = style or FileStyle()
+    wide, tall = style.size or (SIZE if len(style.views) == 1 else PANELS)
+    em = 15.0 * min(wide / SIZE[0], tall / PANELS[1])  # height of the letters
+    strokes: list[Strokes] = []
+    texts = [Text(wide / 2, 2.7 * em, caption_of(grid), em)] if caption else []
+    rings: list[Ring] = []
+    lines: list[np.ndarray] = []
     if len(grid.triangles):
-        camera = choose_camera(grid.nodes, grid.triangles)
-        camera = framed(grid.nodes, grid.triangles, camera, (90, 90, wide - 90, tall - 80))
-        strokes = grid_strokes(grid, cloud, look(grid.nodes, grid.triangles, camera, SIZE))
-    return _paint(SIZE, strokes, [(wide / 2, 40, caption_of(grid), 15)] if caption else [])
+        shown = shown_points(grid, cloud) if cloud is not None else None
+        width = wide / len(style.views)
+        for number, name in enumerate(style.views):
+            camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud), name)
+            box = (
+                width * number + 6 * em,
+                (7.5 if caption else 5) * em,
+                width * (number + 1) - 6 * em,
+                tall - 5.5 * em,
+            )
+            more = None if shown is None else some_of(shown.framed, MOST_POINTS[True])
+            view = look(grid.nodes, grid.triangles, framed(grid.nodes, grid.triangles, camera, box, more), (wide, tall))
+            strokes += grid_strokes(grid, None if shown is None else shown.followed, view)
+            strokes += [missed_strokes(part.points, part.colour, view) for part in (shown.missed if shown else ())]
+            if caption:
+                line, words = scale_bar(view.camera, box[2], 4.7 * em, width, grid.unit, em)
+                lines, texts = [*lines, line], [*texts, words]
+                rings += _rings(grid, view.camera, em, texts)
+                if len(style.views) > 1:
+                    texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
+        if caption:
+            _legend(grid, shown, texts, (6 * em, tall - 3.7 * em), em)
+    return _paint((wide, tall), strokes, texts, rings, lines)
+
+
+def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
+    """Return the direction against gravity (3,) where unit or file tell: scans of buildings and terrain have z up."""
+    name = "" if cloud is None else cloud.name
+    return UP if grid.unit in SURVEY_UNITS or name.lower().endswith(SURVEY_FILES) else None
+
+
+def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:
+    """Return rings at the places to look at, and add their numbers to the texts."""
+    marks = marks_of(grid)
+    if not marks:
+        return []
+    flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
+    for number, (mark, (x, y)) in enumerate(zip(marks, flat.tolist(), strict=True), 1):
+        texts.append(Text(x + 1.3 * em, y + 1.0 * em, str(number), em, colour=mark.colour))
+    return [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
+
+
+def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[float, float], em: float) -> None:
+    """Add what colours and numbers mean, from a corner downwards."""
+    x, y = corner
+    rows = [(part.words, part.colour, "\u25cf") for part in (shown.missed if shown else ())]
+    rows += [(words, INK, "") for words in (shown.unread if shown else ())]
+    rows += [(mark.words, mark.colour, str(number)) for number, mark in enumerate(marks_of(grid), 1)]
+    for words, colour, sign in rows:
+        texts.append(Text(x, y, sign, em, "left", colour))
+        texts.append(Text(x + 1.4 * em, y, words, em, "left"))
+        y -= 1.6 * em
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:
@@ -92,26 +159,30 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
     """
     path = check_place(path, (".png",))
     wide, tall = PANELS
-    camera = choose_camera(grid.nodes, grid.triangles)
+    camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud))
     boxes = [(wide / 3 * k + 40, 80, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
     eyes = [framed(grid.nodes, grid.triangles, camera, box) for box in boxes[:2]]
     scan, net = (look(grid.nodes, grid.triangles, eye, PANELS) for eye in eyes)
     own = framed(vertices, triangles, camera.around(vertices), boxes[2])
     strokes = [
-        dot_strokes(cloud, grid, scan, over=False),
+        dot_strokes(placed(cloud, grid), float(np.mean(grid.lengths)), scan, over=False),
         *grid_strokes(grid, None, net),
         shadow_strokes(vertices, triangles, own),
         solid_strokes(look(vertices, triangles, own, PANELS, mapped=False)),
     ]
     titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
-    texts = [(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
+    texts = [Text(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
     return write_files({path: _paint(PANELS, strokes, texts)})[0]
 
 
 def _paint(
-    size: tuple[int, int], strokes: Sequence[Strokes], texts: Iterable[tuple[float, float, str, float]]
+    size: tuple[int, int],
+    strokes: Sequence[Strokes],
+    texts: Iterable[Text],
+    rings: Sequence[Ring] = (),
+    lines: Iterable[np.ndarray] = (),
 ) -> bytes:
-    """Return the picture as PNG: strokes back to front, then texts (x, y, words, size) [pixel]."""
+    """Return the picture as PNG: strokes back to front, then lines (N, 2) [pixel], rings and texts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -121,8 +192,14 @@ def _paint(
     axes.set_axis_off()
     if strokes:
         axes.add_collection(_collection(strokes), autolim=False)
-    for x, y, words, points in texts:
-        axes.text(x, y, words, fontsize=points * 0.72, color=tuple(INK), ha="center", va="center", family="DejaVu Sans")
+    for line in lines:
+        axes.plot(*line.T, color=tuple(INK), linewidth=1.5, solid_capstyle="butt", solid_joinstyle="miter")
+    for ring in rings:
+        axes.plot([ring.x], [ring.y], "o", markersize=0.72 * ring.size, markeredgecolor=tuple(ring.colour),
+                  markerfacecolor="none", markeredgewidth=1.6)  # fmt: skip
+    for text in texts:
+        axes.text(text.x, text.y, text.words, fontsize=text.size * 0.72, color=tuple(text.colour), ha=text.align,
+                  va="center", family="DejaVu Sans", parse_math=False)  # fmt: skip
     stream = io.BytesIO()
     canvas.print_png(stream, metadata={"Software": MARK})  # unlike savefig it asks no settings of the user
     return stream.getvalue()

@@ -20,6 +20,7 @@ INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # s
 CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
 PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
 MARK = np.array([0.851, 0.290, 0.180])  # fixed nodes
+BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,21 +140,31 @@ def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> 
     return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))
 
 
-def framed(nodes: np.ndarray, triangles: np.ndarray, camera: Camera, box: tuple[float, float, float, float]) -> Camera:
-    """Return the camera with a surface and its shadow filling a box (left, bottom, right, top) [pixel]."""
+def framed(
+    nodes: np.ndarray,
+    triangles: np.ndarray,
+    camera: Camera,
+    box: tuple[float, float, float, float],
+    more: np.ndarray | None = None,
+) -> Camera:
+    """Return the camera with a surface, its shadow and further points (N, 3) filling a box (left, bottom, right, top) [pixel]."""
     used = np.unique(triangles)
-    return camera.framed(np.concatenate([nodes[used], fallen_shadow(nodes, triangles, camera)[used]]), box)
+    shown = [nodes[used], fallen_shadow(nodes, triangles, camera)[used], *([] if more is None else [more])]
+    everything = np.concatenate(shown)
+    if more is not None and len(more):
+        camera = camera.around(np.concatenate([nodes[used], more]))
+    return camera.framed(everything, box)
 
 
-def grid_strokes(grid: Grid, cloud: PointCloud | None, view: View) -> list[Strokes]:
-    """Return shadow, triangles, members, fixed nodes and, if given, the scan."""
+def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Strokes]:
+    """Return shadow, triangles, members, fixed nodes and, if given, the points of the scan (N, 3)."""
     strokes = [
         shadow_strokes(grid.nodes, grid.triangles, view.camera),
         _surface_strokes(view, OUTSIDE, INSIDE),
         _member_strokes(grid, view),
     ]
-    if cloud is not None:
-        strokes.append(dot_strokes(cloud, grid, view, over=True))
+    if scan is not None:
+        strokes.append(dot_strokes(scan, float(np.mean(grid.lengths)), view, over=True))
     if grid.fixed.any():
         strokes += _mark_strokes(grid, view)
     return strokes
@@ -175,25 +186,26 @@ def _member_strokes(grid: Grid, view: View) -> Strokes:
     return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
 
 
-def _thin(cloud: PointCloud, grid: Grid, most: int) -> np.ndarray:
-    """Return at most so many points of the scan in the frame of the grid; always the same ones."""
-    points = cloud.points
-    if len(points) > most:
-        points = points[np.sort(np.random.default_rng(0).permutation(len(points))[:most])]
-    placed: np.ndarray = points + (np.asarray(cloud.origin, float) - grid.origin)
-    return placed
+def placed(cloud: PointCloud, grid: Grid) -> np.ndarray:
+    """Return the points of a scan in the frame of its grid (N, 3)."""
+    points: np.ndarray = cloud.points + (np.asarray(cloud.origin, float) - grid.origin)
+    return points
 
 
-def dot_strokes(cloud: PointCloud, grid: Grid, view: View, *, over: bool) -> Strokes:
-    """Return the points of the scan that are seen, as dots: over the triangles, or alone and shaded."""
-    points = _thin(cloud, grid, MOST_POINTS[over])
-    flat, near = view.camera.project(points)
-    rows, columns = view.front.shape
-    pixel = np.rint(flat / 2).astype(int)
-    inside = (pixel >= 0).all(axis=1) & (pixel[:, 0] < columns) & (pixel[:, 1] < rows)
-    points, flat, near, pixel = points[inside], flat[inside], near[inside], pixel[inside]
-    triangle, nearest = view.front[pixel[:, 1], pixel[:, 0]], view.nearest[pixel[:, 1], pixel[:, 0]]
-    slack = 0.5 * float(np.mean(grid.lengths))
+def some_of(points: np.ndarray, most: int) -> np.ndarray:
+    """Return at most so many of some points (N, 3); always the same ones."""
+    if len(points) <= most:
+        return points
+    chosen: np.ndarray = points[np.sort(np.random.default_rng(0).permutation(len(points))[:most])]
+    return chosen
+
+
+def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) -> Strokes:
+    """Return the points of the scan (N, 3) that are seen, as dots: over the triangles, or alone and shaded."""
+    flat, near = view.camera.project(some_of(points, MOST_POINTS[over]))
+    inside, triangle, nearest = _in_front(flat, view)
+    flat, near, triangle, nearest = flat[inside], near[inside], triangle[inside], nearest[inside]
+    slack = 0.5 * member
     seen = (triangle < 0) | (near > nearest - slack)
     flat, near, triangle, nearest = flat[seen], near[seen], triangle[seen], nearest[seen]
     on = (triangle >= 0) & (near < nearest + slack)
@@ -201,6 +213,26 @@ def dot_strokes(cloud: PointCloud, grid: Grid, view: View, *, over: bool) -> Str
     light = np.where(triangle >= 0, view.light[triangle], 0.5)
     colour = _hazy(_mix((INK, OUTSIDE[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
+
+
+def missed_strokes(points: np.ndarray, colour: np.ndarray, view: View) -> Strokes:
+    """Return points that the grid leaves out (N, 3) in a colour (3,); faint where they lie behind the grid."""
+    flat, near = view.camera.project(some_of(points, MOST_POINTS[True]))
+    inside, _, nearest = _in_front(flat, view)
+    shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
+    shown[:, 3] = np.where(inside & (near < nearest), BEHIND, 1.0)
+    return Strokes(
+        near + 1e-6 * view.camera.distance, _dots(flat), np.zeros_like(shown), shown, np.full(len(flat), 3.0)
+    )
+
+
+def _in_front(flat: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which places of a picture (N, 2) lie in it, and the triangle in front there and its nearness."""
+    rows, columns = view.front.shape
+    pixel = np.rint(flat / 2).astype(int)
+    inside = (pixel >= 0).all(axis=1) & (pixel[:, 0] < columns) & (pixel[:, 1] < rows)
+    column, row = np.clip(pixel, 0, (columns - 1, rows - 1)).T
+    return inside, view.front[row, column], view.nearest[row, column]
 
 
 def cloud_strokes(cloud: PointCloud, size: tuple[int, int]) -> Strokes:
@@ -227,14 +259,13 @@ def _dots(flat: np.ndarray) -> np.ndarray:
 def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
     """Return the marks of the fixed nodes: full where they are seen, faint behind the grid."""
     flat, near = view.camera.project(grid.nodes[grid.fixed])
-    rows, columns = view.front.shape
-    pixel = np.clip(np.rint(flat / 2).astype(int), 0, (columns - 1, rows - 1))
-    seen = near > view.nearest[pixel[:, 1], pixel[:, 0]] - 0.5 * float(np.mean(grid.lengths))
+    _, _, nearest = _in_front(flat, view)
+    seen = near > nearest - 0.5 * float(np.mean(grid.lengths))
     shape = _dots(flat)
     strokes = []
     for colour, width in ((PAPER, 15.0), (MARK, 11.0)):
         shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-        shown[:, 3] = np.where(seen, 1.0, 0.25)
+        shown[:, 3] = np.where(seen, 1.0, BEHIND)
         front = np.full(len(flat), np.inf)
         strokes.append(Strokes(front, shape, np.zeros_like(shown), shown, np.full(len(flat), width)))
     return strokes

@@ -1,0 +1,70 @@
+"""What of a scan is drawn over its grid: the points that the grid follows, and those that it leaves out by what they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...check.certify import COVER_REACH
+from ...check.distances import distances_to_grid
+from ...check.left_out import points_left_out
+from ...grid.certificate import KINDS_LEFT_OUT
+from ...surface.samples import sample_surface
+from .strokes import placed
+
+if TYPE_CHECKING:
+    from ...grid.grid import Grid
+    from ...scan.cloud import PointCloud
+
+RED, VIOLET, AMBER = np.array([0.80, 0.10, 0.10]), np.array([0.45, 0.25, 0.65]), np.array([0.85, 0.55, 0.05])
+COLOURS = {"far": RED, "pieces": VIOLET, "not chosen": VIOLET, "rods": VIOLET, "outliers": AMBER, "sparse": AMBER}
+
+
+@dataclass(frozen=True, eq=False)
+class Missed:
+    """Points that a grid leaves out for one reason."""
+
+    words: str
+    points: np.ndarray  #: (K, 3) in the frame of the grid [scan unit]
+    colour: np.ndarray  #: (3,)
+    framed: bool  #: whether the picture is made to hold them; outliers may lie anywhere
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """The points of a scan as a picture shows them."""
+
+    followed: np.ndarray  #: (N, 3) in the frame of the grid [scan unit]
+    missed: tuple[Missed, ...] = ()
+    unread: tuple[str, ...] = ()  #: what is not shown, in words
+
+    @property
+    def framed(self) -> np.ndarray:
+        """The points that the picture is made to hold (M, 3)."""
+        return np.concatenate([self.followed, *(part.points for part in self.missed if part.framed)])
+
+
+def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
+    """Return the points of a scan sorted by what its grid makes of them; all as followed where nobody knows how it was made."""
+    points = placed(cloud, grid)
+    if grid.settings is None:
+        return Shown(points)
+    length, samples = grid.settings.length, sample_surface(cloud, grid.settings)
+    distance, nearest = distances_to_grid(points, grid, length)
+    desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    members = desired[grid.triangles].mean(axis=1)[nearest]
+    kinds: dict[str, list[np.ndarray]] = {}
+    for part, which in points_left_out(samples, distance, members, COVER_REACH * members):
+        kinds.setdefault(part.kind, []).append(which)
+    left = np.zeros(len(points), bool)
+    missed = []
+    for kind, groups in kinds.items():
+        which = np.concatenate(groups)
+        left[which] = True
+        if kind in COLOURS:
+            words = f"{len(which):,} points {KINDS_LEFT_OUT[kind]}"
+            missed.append(Missed(words, points[which], COLOURS[kind], kind not in ("outliers", "sparse")))
+    unread = tuple(f"{count:,} points {words}, not shown" for words, count in samples.unread)
+    return Shown(points[~left], tuple(missed), unread)
