@@ -75,6 +75,8 @@ class _Checked:
                 raise InputError(f"{name} must be a number, got {value!r}")
             if above is not None and not value > above:
                 raise InputError(f"{name} must be greater than {above:g}, got {value}")
+            if name == "outlier_distance" and 0 < value < 1:
+                raise InputError(f"{name} {value:g} would leave out most of the scan; it must be 0, or 1 or more")
             if low is not None and not low <= value <= high:
                 needed = f"between {low:g} and {high:g}" if math.isfinite(high) else f"{low:g} or more"
                 raise InputError(f"{name} must be {needed}, got {value}")

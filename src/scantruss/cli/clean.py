@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..scan.clean.steps import CleanCloud
     from .options import Parser
 
+LARGEST = {"duplicates": 1.0, "loose-pieces": 0.5, "layer-distance": 20.0}  # beyond these most of a scan is lost
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "remove points closer to an earlier one than this share of the spacing"),
     "outlier-distance": (
@@ -123,6 +124,14 @@ def _steps(values: Namespace) -> dict[str, Any]:
         steps[field] = None if given[KEEP[name][0].replace("-", "_")] else given[field]
         if steps[field] is not None and not 0 <= steps[field] < float("inf"):
             raise InputError(f"--{name} must be a number of 0 or more, got {given[field]:g}")
+        if (steps[field] or 0.0) > LARGEST.get(name, float("inf")):
+            _, default, words = SHARES[name]
+            raise InputError(
+                f"--{name} {given[field]:g} would {words.partition(',')[0]}, and so most of the scan;"
+                f" it must be at most {LARGEST[name]:g} (default {default:g})"
+            )
+        if name == "outlier-distance" and 0 < (steps[field] or 0.0) < 1:
+            raise InputError(f"--{name} {given[field]:g} would remove most of the scan; it must be 0, or 1 or more")
     if values.spacing is not None and not 0 < values.spacing < float("inf"):
         raise InputError(f"--spacing must be a positive length in the scan's unit, got {values.spacing:g}")
     return steps

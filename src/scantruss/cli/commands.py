@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from .clean import clean, clean_parser
+from .completion import completion, completion_parser
 from .demo import demo, demo_parser
 from .grid import grid, grid_parser
 from .info import info, info_parser
@@ -30,4 +31,5 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "print": (print_parser, print_solid),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, demo),
+    "completion": (completion_parser, completion),
 }

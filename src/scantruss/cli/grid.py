@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError, FrontError
+from ..export.style import OBJ_ELEMENTS, VIEWS, FileStyle
 from .outputs import claim, inputs_of, outs_of
 from .shared import SCAN, add_memory, note_compiling, note_outliers, note_pieces, read_scan, thin_to_fit
 
@@ -22,12 +23,13 @@ if TYPE_CHECKING:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_outs, add_settings
+    from .options import Parser, add_outs, add_settings, picture_size
 
     parser = Parser(
         "grid",
         "SCAN OUT [OUT ...] --length L [options]",
-        "Turn a scan into a triangular grid truss of a desired member length.",
+        "Turn a scan into a triangular grid truss of a desired member length.\n"
+        "The options come in three parts: every day, expert, and for the method of the paper only.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
     add_outs(parser, "results; the suffix names the format", "*")
@@ -43,8 +45,29 @@ def grid_parser() -> Parser:
         help="write a grid that fails its certificate too; the exit status is 3 either way",
     )
     add_memory(parser)
+    styles = parser.add_argument_group("pictures and tables")
+    styles.add_argument(
+        "--view",
+        dest="views",
+        metavar="NAME",
+        action="append",
+        help=f"side from which a picture is seen: {', '.join(VIEWS)} or AZIMUTH,ELEVATION in degrees; repeatable, side by side",
+    )
+    styles.add_argument("--size", metavar="WIDTHxHEIGHT", type=picture_size, help="size of a picture in pixels")
+    styles.add_argument(
+        "--obj", metavar="|".join(OBJ_ELEMENTS), default="faces", help="what .obj holds: triangles, members, or both"
+    )
+    styles.add_argument(
+        "--decimal-comma", action="store_true", help="write .csv with decimal commas and semicolons between columns"
+    )
     add_settings(parser)
     return parser
+
+
+def style_of(values: Namespace) -> FileStyle:
+    """Return how the command line asks files to be written."""
+    views = tuple(values.views or ("auto",))
+    return FileStyle(views=views, size=values.size, obj=values.obj, decimal_comma=values.decimal_comma)
 
 
 def grid(values: Namespace) -> None:
@@ -54,7 +77,7 @@ def grid(values: Namespace) -> None:
     from ..runtime.files import SaveTogether
     from .options import settings_of
 
-    outs = outs_of(values)
+    outs, style = outs_of(values), style_of(values)
     settings = settings_of(values)
     settings_file = outs[0].with_suffix(".settings.json")
     report = Path(values.report) if values.report else None
@@ -70,7 +93,7 @@ def grid(values: Namespace) -> None:
     written: list[Path] = []
     with SaveTogether("" if values.force else "result") as save:
         for out in outs:
-            written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud)]
+            written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud, style=style)]
         save.json(settings_file, (result.settings or settings).to_dict())
         if report is not None:
             save.json(report, report_of(result, len(cloud.points)))

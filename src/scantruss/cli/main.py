@@ -32,6 +32,7 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with members of
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
   scantruss demo  [FOLDER]                 do all of it on a bundled scan
+  scantruss completion bash|zsh|fish       print a script with which a shell completes commands and options
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.
 

@@ -138,6 +138,14 @@ def size_of_memory(text: str) -> float:
     return float(found[1]) * 1000.0 ** " kmgt".index(found[2] or " ")
 
 
+def picture_size(text: str) -> tuple[int, int]:
+    """Return width and height of "1600x1200" [pixel]."""
+    found = re.fullmatch(r"(\d+)\s*[x,]\s*(\d+)", text.strip().lower())
+    if not found:
+        raise argparse.ArgumentTypeError(f"needs WIDTHxHEIGHT in pixels such as 1600x1200, got {text!r}")
+    return int(found[1]), int(found[2])
+
+
 def position(text: str) -> Position:
     """Return the three coordinates of "X,Y,Z" (comma, semicolon or space between them)."""
     try:
@@ -246,13 +254,30 @@ def describe(spec: Field[Any]) -> str:
     return (str(about["help"]) + (f" ({'; '.join(notes)})" if notes else "")).replace("%", "%%")
 
 
+#: settings of every day, and those that only `--method paper` and fronts without rows heed; the others are for experts
+EVERY_DAY = (
+    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
+)  # fmt: skip
+PAPER_ONLY = (
+    "advance_from", "shape_weight", "size_weight", "length_weight", "search_range", "nearness", "merge_angle", "case3",
+    "max_deviation", "smooth_forward", "smooth_backward", "smooth_passes",
+)  # fmt: skip
+
+
 def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
-    """Add one option for every field of `Settings`, or for the named ones; only what is said explicitly is set."""
+    """Add one option for every field of `Settings` in three parts, or for the named ones; only what is said explicitly is set."""
+    specs = [spec for record in RECORDS for spec in fields(record) if spec.name != "length_field"]
+    if names:
+        _add_options(parser.add_argument_group("the scan"), (spec for spec in specs if spec.name in names))
+        return
+    by_name = {spec.name: spec for spec in specs}
+    _add_options(parser.add_argument_group("EVERY DAY"), (by_name[name] for name in EVERY_DAY))
     for record in RECORDS:
-        wanted = [spec for spec in fields(record) if spec.name != "length_field" and (not names or spec.name in names)]
-        if wanted:
-            title = (record.__doc__ or "").rstrip(".").lower()
-            _add_options(parser.add_argument_group(title), wanted)
+        title = f"EXPERT: {(record.__doc__ or '').rstrip('.').lower()}"
+        own = [spec for spec in specs if spec in fields(record) and spec.name not in EVERY_DAY + PAPER_ONLY]
+        if own:
+            _add_options(parser.add_argument_group(title), own)
+    _add_options(parser.add_argument_group("PAPER: for --method paper"), (by_name[name] for name in PAPER_ONLY))
 
 
 def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) -> None:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..grid.grid import Grid
-from .obj import own_frame
 
 Table = tuple[Iterable[str], Iterable[Iterable[Any]]]  # header and rows
 
@@ -46,7 +45,7 @@ def _with_unit(names: str, unit: str) -> list[str]:
 
 def _members(grid: Grid) -> Table:
     """Return the table of members: both nodes, their places, the length, whether on a boundary."""
-    nodes = own_frame(grid)
+    nodes = grid.scan_nodes
     start, end = grid.edges[:, 0], grid.edges[:, 1]
     columns = _with_unit("start_x start_y start_z end_x end_y end_z length", grid.unit)
     places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
@@ -61,7 +60,7 @@ def _nodes(grid: Grid) -> Table:
     boundary = np.zeros(len(grid.nodes), int)
     boundary[grid.edges[grid.edge_triangles[:, 1] < 0].ravel()] = 1
     header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed"]
-    columns = [*own_frame(grid).T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
+    columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
     if grid.deviation is not None:
         header += _with_unit("deviation", grid.unit)
         columns.append([None if value != value else value for value in np.asarray(grid.deviation, float).tolist()])

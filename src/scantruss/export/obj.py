@@ -21,11 +21,6 @@ def header_lines(grid: Grid) -> list[str]:
     return lines
 
 
-def own_frame(grid: Grid) -> np.ndarray:
-    """Return the nodes in the scan's own frame, (V, 3) float64 [scan unit]."""
-    return np.asarray(grid.nodes, np.float64).reshape(-1, 3) + np.asarray(grid.origin, np.float64)
-
-
 def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
     """Return the text of an OBJ file: `v` with every digit of a float64, then `f` and `l` counted from 1.
 
@@ -36,7 +31,7 @@ def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
         faces for the triangles, lines for the members, or both.
     """
     lines = [f"# {line}" for line in header_lines(grid)]
-    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in own_frame(grid).tolist()]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in grid.scan_nodes.tolist()]
     if elements in ("faces", "both"):
         lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
     if elements in ("lines", "both"):

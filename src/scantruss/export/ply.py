@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..grid.grid import Grid
-from .obj import header_lines, own_frame
+from .obj import header_lines
 
 
 def encode_ply(grid: Grid) -> bytes:
@@ -25,4 +25,4 @@ def encode_ply(grid: Grid) -> bytes:
     faces = np.zeros(len(grid.triangles), np.dtype([("count", "u1"), ("nodes", "<i4", 3)]))
     faces["count"] = 3
     faces["nodes"] = grid.triangles
-    return ("\n".join(header) + "\n").encode("ascii") + own_frame(grid).astype("<f8").tobytes() + faces.tobytes()
+    return ("\n".join(header) + "\n").encode("ascii") + grid.scan_nodes.astype("<f8").tobytes() + faces.tobytes()

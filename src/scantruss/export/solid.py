@@ -16,6 +16,7 @@ from ..runtime.files import check_place, write_files
 from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
+SLENDEREST = 2_000  #: length of a member in its diameters that nobody prints
 PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
 
 
@@ -126,6 +127,11 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
         )
     shortest = int(np.argmin(grid.lengths))
     length = float(grid.lengths[shortest]) * scale
+    if member_diameter < length / SLENDEREST:
+        raise InputError(
+            f"members {length:.4g}{unit} long at scale {scale:g} would be {member_diameter:g}{unit} thick, thinner than one in"
+            f" {SLENDEREST:,}; give a smaller scale or a larger diameter"
+        )
     for name, value in (("member", member_diameter), ("node", node_diameter)):
         if value >= length:
             a, b = grid.edges[shortest].tolist()

@@ -13,6 +13,11 @@ from .tables import GridTables
 from .topology import Topology, measure_topology
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from PIL.Image import Image
+
+    from ..scan.cloud import PointCloud
     from ..settings import Settings
     from .certificate import Certificate
 
@@ -66,6 +71,28 @@ class Grid(GridTables):
         elif "triangles" not in changes and len(copy.nodes) == len(self.nodes):
             vars(copy).update({name: known[name] for name in OF_TRIANGLES & known.keys()})
         return copy
+
+    def plot(
+        self,
+        cloud: PointCloud | None = None,
+        *,
+        view: str | Sequence[str] = "auto",
+        size: tuple[int, int] | None = None,
+    ) -> Image:
+        """Return a picture of the grid: a notebook shows it, `.show()` opens it in a window, `.save("grid.png")` keeps it.
+
+        Parameters
+        ----------
+        cloud : PointCloud, optional
+            The scan, drawn over the grid; what the grid leaves out is coloured.
+        view : str or sequence of str
+            auto, behind, top, bottom, front, back, left, right or "AZIMUTH,ELEVATION"; several side by side.
+        size : tuple of int, optional
+            Width and height [pixel].
+        """
+        from ..export.drawing.picture import plot_grid
+
+        return plot_grid(self, cloud, (view,) if isinstance(view, str) else tuple(view), size)
 
     @cached_property
     def quality(self) -> GridQuality:

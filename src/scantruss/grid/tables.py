@@ -18,6 +18,7 @@ class GridTables:
     deviation: np.ndarray | None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     desired: np.ndarray | None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
     unit: str
+    origin: np.ndarray  #: (3,) [scan unit]
 
     @cached_property
     def _half_edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -54,6 +55,16 @@ class GridTables:
     def edges(self) -> np.ndarray:
         """(E, 2) the members, smaller node first, sorted."""
         return self._half_edges[1]
+
+    @property
+    def members(self) -> np.ndarray:
+        """(E, 2) the members as pairs of nodes: another name of `edges`."""
+        return self.edges
+
+    @property
+    def scan_nodes(self) -> np.ndarray:
+        """(V, 3) float64 the nodes in the scan's own frame, `nodes` + `origin` [scan unit]."""
+        return np.asarray(self.nodes, np.float64).reshape(-1, 3) + np.asarray(self.origin, np.float64)
 
     @cached_property
     def edge_triangles(self) -> np.ndarray:

@@ -19,51 +19,46 @@ LARGEST_PER_EXTENT = 6.0  #: above a sixth of the scan's extent a grid says litt
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:
-    """Refuse a member length that this scan cannot carry.
+    """Refuse a member length outside of the range that this scan can carry; see `length_range`.
 
     Raises
     ------
     InputError
-        The length is larger than the scan, or smaller than about three point spacings.
+        The length is too small for the distance between the points, or too large for the extent of the scan.
     """
-    extent = cloud.extent
-    spacing = cloud.spacing
-    unit = f" {cloud.unit}" if cloud.unit else ""
+    low, high = exact_range(cloud)
+    shortest, longest, what = settings.length, settings.length, "length"
     if settings.length_field:
-        _check_field(settings, extent, spacing)
-    if settings.length > extent:
+        field = shortest_and_longest(settings.length_field)
+        longest, what = settings.length * field[1] / field[0], "the {} length of the length field,"
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    extent = f"a scan whose longest side is {_usual_extent(cloud):.4g}{unit}"
+    apart = f"points that are {cloud.spacing:.3g}{unit} apart"
+    if low > high:
         raise InputError(
-            f"length {settings.length:g}{unit} is larger than the scan, whose longest side is {extent:.4g}{unit};"
-            f" use at most {length_range(cloud)[1]:g}"
+            f"this scan carries no grid: members must be at least {round_length(low, 'up'):g}{unit} long for {apart}, and at most"
+            f" {round_length(high, 'down'):g} for {extent}; scan it more densely"
         )
-    if settings.length < SPACINGS * spacing * (1 - 1e-9):
+    if longest > high * (1 + 1e-9):
         raise InputError(
-            f"length {settings.length:g}{unit} is too small for points that are {spacing:.3g}{unit} apart;"
-            f" use at least {length_range(cloud)[0]:g}"
+            f"{what.format('longest')} {longest:g}{unit} is too large for {extent};"
+            f" use at most {round_length(high, 'down'):g}"
+        )
+    if shortest < low * (1 - 1e-9):
+        raise InputError(
+            f"{what.format('shortest')} {shortest:g}{unit} is too small for {apart}; use at least {round_length(low, 'up'):g}"
         )
 
 
-def _check_field(settings: Settings, extent: float, spacing: float) -> None:
-    """Refuse a length field of which a part cannot be carried."""
-    shortest, longest = shortest_and_longest(settings.length_field)
-    scale = settings.length / shortest
-    unit = f" {settings.unit}" if settings.unit else ""
-    if scale * longest > extent:
-        raise InputError(
-            f"the longest length of the length field, {scale * longest:g}{unit}, is larger than the scan,"
-            f" whose longest side is {extent:.4g}{unit}; use shorter ones"
-        )
-    if settings.length < SPACINGS * spacing * (1 - 1e-9):
-        raise InputError(
-            f"the shortest length of the length field, {settings.length:g}{unit}, is too small for points that are"
-            f" {spacing:.3g}{unit} apart; use at least {round_length(SPACINGS * spacing, 'up'):g}"
-        )
+def exact_range(cloud: PointCloud) -> tuple[float, float]:
+    """Return the smallest and the largest member length that a scan carries [scan unit]."""
+    return max(SPACINGS * cloud.spacing, GAPS * cloud.gap), _usual_extent(cloud) / LARGEST_PER_EXTENT
 
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the smallest and the largest sensible member length, rounded to two digits [scan unit]."""
-    low = max(SPACINGS * cloud.spacing, GAPS * cloud.gap)
-    return round_length(low, "up"), round_length(_usual_extent(cloud) / LARGEST_PER_EXTENT, "down")
+    """Return the smallest and the largest member length that a scan carries, rounded to two digits [scan unit]."""
+    low, high = exact_range(cloud)
+    return round_length(low, "up"), round_length(high, "down")
 
 
 def _usual_extent(cloud: PointCloud) -> float:

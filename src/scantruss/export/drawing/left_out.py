@@ -64,7 +64,7 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
         which = np.concatenate(groups)
         left[which] = True
         if kind in COLOURS:
-            words = f"{len(which):,} points {KINDS_LEFT_OUT[kind]}"
+            words = f"{len(which):,} points: {KINDS_LEFT_OUT[kind]}"
             missed.append(Missed(words, points[which], COLOURS[kind], kind not in ("outliers", "sparse")))
-    unread = tuple(f"{count:,} points {words}, not shown" for words, count in samples.unread)
+    unread = tuple(f"{count:,} points: {words}, not shown" for words, count in samples.unread)
     return Shown(points[~left], tuple(missed), unread)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,7 @@ MOST_MARKS = 5  # marks of a kind in a picture
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
 
 
-@dataclass(frozen=True, eq=False)
-class Text:
+class Text(NamedTuple):
     """Words in a picture."""
 
     x: float  #: [pixel]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from .strokes import (
     solid_strokes,
     some_of,
 )
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS = (2400, 800)  #: of three panels, or of several views [pixel]
@@ -82,7 +85,7 @@ def encode_picture(
             more = None if shown is None else some_of(shown.framed, MOST_POINTS[True])
             view = look(grid.nodes, grid.triangles, framed(grid.nodes, grid.triangles, camera, box, more), (wide, tall))
             strokes += grid_strokes(grid, None if shown is None else shown.followed, view)
-            strokes += [missed_strokes(part.points, part.colour, view) for part in (shown.missed if shown else ())]
+            strokes += [missed_strokes(part.points, part.colour, view, box) for part in (shown.missed if shown else ())]
             if caption:
                 line, words = scale_bar(view.camera, box[2], 4.7 * em, width, grid.unit, em)
                 lines, texts = [*lines, line], [*texts, words]
@@ -92,6 +95,13 @@ def encode_picture(
         if caption:
             _legend(grid, shown, texts, (6 * em, tall - 3.7 * em), em)
     return _paint((wide, tall), strokes, texts, rings, lines)
+
+
+def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size: tuple[int, int] | None) -> Image:
+    """Return the picture of `encode_picture` as an image that notebooks show."""
+    from PIL.Image import open as open_image
+
+    return open_image(io.BytesIO(encode_picture(grid, cloud, style=FileStyle(views=views, size=size))))
 
 
 def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:

@@ -215,9 +215,13 @@ def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) ->
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
 
 
-def missed_strokes(points: np.ndarray, colour: np.ndarray, view: View) -> Strokes:
-    """Return points that the grid leaves out (N, 3) in a colour (3,); faint where they lie behind the grid."""
+def missed_strokes(
+    points: np.ndarray, colour: np.ndarray, view: View, box: tuple[float, float, float, float]
+) -> Strokes:
+    """Return points that the grid leaves out (N, 3) in a colour (3,), as far as they lie in a box; faint where they lie behind the grid."""
     flat, near = view.camera.project(some_of(points, MOST_POINTS[True]))
+    shown = ((flat >= box[:2]) & (flat <= box[2:])).all(axis=1)
+    flat, near = flat[shown], near[shown]
     inside, _, nearest = _in_front(flat, view)
     shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
     shown[:, 3] = np.where(inside & (near < nearest), BEHIND, 1.0)
