@@ -215,18 +215,24 @@ def test_points_that_span_no_surface_are_refused(place, capsys, points, line, co
 
 @pytest.mark.parametrize("command", ["grid scan.xyz a.obj", "info scan.xyz"])
 def test_a_length_larger_than_the_scan_is_refused(place, capsys, command):
-    assert "larger than the scan" in refused(capsys, *command.split(), "--length", "41")
+    line = refused(capsys, *command.split(), "--length", "41")
+    assert "length 41 is too large for a scan whose longest side is 40; use at most " in line
+    largest = float(line.split("at most")[1])
+    cloud = PointCloud.from_array(plate())
+    assert largest == member_length.length_range(cloud)[1]
+    member_length.check_length(cloud, st.Settings(length=largest))
 
 
-def test_a_length_of_less_than_three_spacings_is_refused_with_one_that_does(place, capsys):
+def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(place, capsys):
     line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
     smallest = float(line.split("at least")[1].split()[0])
     cloud = PointCloud.from_array(plate())
+    assert smallest == member_length.length_range(cloud)[0]
     member_length.check_length(cloud, st.Settings(length=smallest))
-    spacing = measure_spacing(cloud.points)
-    member_length.check_length(cloud, st.Settings(length=3.01 * spacing))
+    least = max(3.0 * measure_spacing(cloud.points), 1.75 * measure_gap(cloud.points))
+    member_length.check_length(cloud, st.Settings(length=1.001 * least))
     with pytest.raises(st.InputError, match="too small"):
-        member_length.check_length(cloud, st.Settings(length=2.99 * spacing))
+        member_length.check_length(cloud, st.Settings(length=0.999 * least))
 
 
 def test_the_gap_is_that_of_a_known_pattern():

@@ -128,8 +128,11 @@ def test_info_takes_a_field(plate, capsys):
     ("length", "words"),
     [
         ("curvature:2:1", "curvature:2:1: the shortest length is above the longest; write curvature:1:2"),
-        ("curvature:0.5:1", "the shortest length of the length field, 0.5, is too small for points that are"),
-        ("curvature:1:20", "the longest length of the length field, 20, is larger than the scan"),
+        ("curvature:0.5:1", "the shortest length of the length field, 0.5 is too small for points that are"),
+        (
+            "curvature:1:20",
+            "the longest length of the length field, 20 is too large for a scan whose longest side is 12",
+        ),
         ("5 0 9 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 9)"),
         ("5 0 1.6 1.2", "1 of 2 given lengths lie off the scan, as that at (5, 0, 1.6)"),
         (

@@ -64,6 +64,9 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
+    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+        settings = settings.replace(keep_rods=False)
+        yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
     if (
         settings.ridge_angle > 0.0
@@ -75,9 +78,6 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
         yield from _same_scan(settings)
     if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
         settings = settings.replace(judge_outliers="always")
-        yield from _same_scan(settings)
-    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
-        settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
     if settings.method == "default":

@@ -154,7 +154,10 @@ class CleaningSettings(_Checked):
         True,
         "keep columns, scaffold and cables, thinner than a member; they are left out where no grid passes with them",
     )
-    piece: str = _setting("all", "pieces of the scan to make a grid of: all, largest, or numbers such as 1 or 1,3")
+    piece: str = _setting(
+        "auto",
+        "pieces of the scan to make a grid of: auto (all but a floor under the others), all, largest, or numbers such as 1 or 1,3",
+    )
     outlier_distance: float = _setting(
         3.0,
         "leave out points this many times farther from others than their neighbours are; 0 keeps all",
@@ -380,11 +383,11 @@ class Settings(
 
 
 def check_piece(given: Any) -> str:
-    """Return which pieces are chosen, "all", "largest" or numbers from 1 with commas between them, or refuse it."""
+    """Return which pieces are chosen, "auto", "all", "largest" or numbers from 1 with commas between them, or refuse it."""
     text = str(given).replace(" ", "").lower()
-    if text in ("all", "largest") or all(word.isdecimal() and int(word) > 0 for word in text.split(",")):
+    if text in ("auto", "all", "largest") or all(word.isdecimal() and int(word) > 0 for word in text.split(",")):
         return text
-    raise InputError(f"piece must be all, largest or numbers from 1 such as 1 or 1,3, got {given!r}")
+    raise InputError(f"piece must be auto, all, largest or numbers from 1 such as 1 or 1,3, got {given!r}")
 
 
 def _positions(given: Any) -> tuple[tuple[float, ...], ...]:

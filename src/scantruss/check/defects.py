@@ -90,7 +90,7 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
     pieces = sum(
-        part.share for part in found.left_out if part.kind in ("pieces", "not chosen")
+        part.share for part in found.left_out if part.kind in ("pieces", "not chosen", "floor")
     )  # they may be dense; see `faults_on_sheets`
     lost = 1.0 - found.scan_within_reach - pieces
     if lost > LEFT_OUT and found.scan_distance:

@@ -54,7 +54,12 @@ def points_left_out(
     owner = _owners(samples, away)
     small = (owner >= 0) & ~samples.kept[owner]
     other = small & np.isin(samples.piece[owner], samples.not_chosen)
-    parts += _places("pieces", away[small & ~other], samples.piece[owner[small & ~other]], samples, distance)
+    floor = other & (samples.piece[owner] == (-1 if samples.floor is None else samples.floor))
+    if floor.any():
+        parts.append(_part("floor", away[floor], samples, distance))
+        other &= ~floor
+    too_small = small & ~other & ~floor
+    parts += _places("pieces", away[too_small], samples.piece[owner[too_small]], samples, distance)
     far = ~small & (distance[away] > members[away])
     parts += _places("far", away[far], _groups(samples, owner[far]), samples, distance)
     parts.sort(key=lambda part: -part[0].points)

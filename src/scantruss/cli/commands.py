@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from .clean import clean, clean_parser
-from .completion import completion, completion_parser
+from .completion import completion_parser, print_completion
 from .demo import demo, demo_parser
 from .grid import grid, grid_parser
 from .info import info, info_parser
@@ -21,6 +21,12 @@ from .thin import thin, thin_parser
 
 if TYPE_CHECKING:
     from .options import Parser
+
+
+def completion(values: Namespace) -> None:
+    """Print the script with which a shell completes all commands."""
+    print_completion(values, {name: make() for name, (make, _) in COMMANDS.items()})
+
 
 COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = {
     "info": (info_parser, info),

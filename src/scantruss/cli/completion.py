@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .options import Parser
 
+Parsers = dict[str, "Parser"]
 SHELLS = ("bash", "zsh", "fish")
 
 _BASH = """\
@@ -47,17 +48,11 @@ def completion_parser() -> Parser:
     return parser
 
 
-def completion(values: Namespace) -> None:
-    """Print the script for a shell."""
+def print_completion(values: Namespace, parsers: Parsers) -> None:
+    """Print the script for a shell, of the parsers of all commands by their names."""
     from ..report.terminal import print_lines
 
-    print_lines([_fish() if values.shell == "fish" else _bash(values.shell)])
-
-
-def _parsers() -> dict[str, Parser]:
-    from .commands import COMMANDS
-
-    return {name: make() for name, (make, _) in COMMANDS.items()}
+    print_lines([_fish(parsers) if values.shell == "fish" else _bash(values.shell, parsers)])
 
 
 def _options(parser: Parser) -> dict[str, tuple[str, str]]:
@@ -71,9 +66,9 @@ def _options(parser: Parser) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _bash(shell: str) -> str:
+def _bash(shell: str, parsers: Parsers) -> str:
     """Return the script for bash; zsh reads it by its own translation."""
-    parsers, options, values = _parsers(), [], []
+    options, values = [], []
     for name, parser in parsers.items():
         known = _options(parser)
         options.append(f'            {name}) words="{" ".join(known)}" ;;')
@@ -83,9 +78,8 @@ def _bash(shell: str) -> str:
     return ("autoload -U +X bashcompinit && bashcompinit\n" if shell == "zsh" else "") + script.rstrip()
 
 
-def _fish() -> str:
+def _fish(parsers: Parsers) -> str:
     """Return the script for fish."""
-    parsers = _parsers()
     lines = [f"complete -c scantruss -n __fish_use_subcommand -f -a '{' '.join(parsers)}'"]
     for name, parser in parsers.items():
         when = f"-n '__fish_seen_subcommand_from {name}'"

@@ -9,9 +9,19 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError, FrontError
-from ..export.style import OBJ_ELEMENTS, VIEWS, FileStyle
+from ..export.drawing.style import VIEWS
+from ..export.style import OBJ_ELEMENTS, FileStyle
 from .outputs import claim, inputs_of, outs_of
-from .shared import SCAN, add_memory, note_compiling, note_outliers, note_pieces, read_scan, thin_to_fit
+from .shared import (
+    SCAN,
+    add_memory,
+    note_compiling,
+    note_layers,
+    note_outliers,
+    note_pieces,
+    read_to_choose,
+    with_some_length,
+)
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -27,7 +37,7 @@ def grid_parser() -> Parser:
 
     parser = Parser(
         "grid",
-        "SCAN OUT [OUT ...] --length L [options]",
+        "SCAN OUT [OUT ...] [--length L] [options]",
         "Turn a scan into a triangular grid truss of a desired member length.\n"
         "The options come in three parts: every day, expert, and for the method of the paper only.",
     )
@@ -75,18 +85,19 @@ def grid(values: Namespace) -> None:
     from ..report.figures import report_of
     from ..report.terminal import Bars
     from ..runtime.files import SaveTogether
-    from .options import settings_of
+    from .options import has_length, settings_of
 
     outs, style = outs_of(values), style_of(values)
-    settings = settings_of(values)
+    settings = settings_of(with_some_length(values))
     settings_file = outs[0].with_suffix(".settings.json")
     report = Path(values.report) if values.report else None
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
         started = perf_counter()
-        settings = thin_to_fit(values.scan, settings, values.memory)
-        cloud = read_scan(values.scan, settings, bars)
+        cloud, settings = read_to_choose(values, settings, bars)
         spent = perf_counter() - started
+        if not has_length(values):
+            settings = choose_length(cloud, settings, bars)
         result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
     from ..export.formats import write
 
@@ -138,9 +149,10 @@ def make_grid(
     with note_compiling(bars):
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
-        except FrontError:
+        except FrontError as error:
             note_pieces(bars, cloud, settings)
-            raise
+            note_nearby(bars, cloud, settings)
+            raise error
     if grid.settings is not None and grid.settings.judge_outliers != settings.judge_outliers:
         bars.note(
             "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always"
@@ -156,8 +168,34 @@ def make_grid(
     if grid.settings is not None and grid.settings.method != settings.method:
         bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
     note_outliers(bars, cloud, grid.settings or settings)
+    note_layers(bars, cloud, grid.settings or settings)
     note_pieces(bars, cloud, grid.settings or settings)
     return grid
+
+
+def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:
+    """Return the settings with the length that `info` suggests, and say so."""
+    from ..report.advice import Advice
+
+    with note_compiling(bars):
+        length = Advice(cloud, settings, bars).suggest()
+    bars.note(
+        f"no --length is given; {length:g}{f' {cloud.unit}' if cloud.unit else ''} is taken, as scantruss info suggests"
+    )
+    return settings.replace(length=length)
+
+
+def note_nearby(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Name the nearest length at which a grid passes, tried by quick runs; nothing where lengths vary over the scan."""
+    from ..report.advice import Advice
+
+    if settings.length_field:
+        return
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
+        bars.note(f"a grid passes with --length {length:g}{unit} (tried with --effort quick)")
+    else:
+        bars.note(f"no grid passes with the lengths tried near {settings.length:g}{unit} either")
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:

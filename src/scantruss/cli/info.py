@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .shared import SCAN, add_memory, note_compiling, note_outliers, read_scan, thin_to_fit
+from .shared import SCAN, add_memory, note_compiling, note_layers, note_outliers, read_to_choose, with_some_length
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -16,7 +16,9 @@ def info_parser() -> Parser:
     from .options import READING, Parser, add_settings
 
     parser = Parser(
-        "info", "SCAN [options]", "Points, extent, spacing and boundaries of a scan, and a sensible range for --length."
+        "info",
+        "SCAN [options]",
+        "Points, extent, spacing, noise and boundaries of a scan, and what comes of three member lengths.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
     add_memory(parser)
@@ -26,29 +28,33 @@ def info_parser() -> Parser:
 
 def info(values: Namespace) -> None:
     """Print what a scan holds."""
-    from ..report.figures import cloud_lines, loop_rows
+    from ..boundary.find import find_boundary
+    from ..report.advice import Advice
+    from ..report.figures import advice_lines, advice_rows, cloud_lines, loop_rows
     from ..report.terminal import Bars, print_lines, print_table
-    from ..scan.member_length import check_length, suggest_length
-    from .options import settings_of
+    from ..scan.member_length import check_length, length_range
+    from ..surface.samples import sample_surface
+    from .options import has_length, settings_of
 
-    given = "length" in values
-    settings = settings_of(values if given else Namespace(**vars(values), length=1.0))
+    settings = settings_of(with_some_length(values))
     with Bars() as bars:
-        settings = thin_to_fit(values.scan, settings, values.memory)
-        if settings.thin_spacing and not given and "thin_spacing" not in values:
-            from ..scan.stream.fit import spacing_to_look
-
-            settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings, bars))
-        cloud = read_scan(values.scan, settings, bars)
+        cloud, settings = read_to_choose(values, settings, bars)
         print_lines(cloud_lines(cloud))
-        settings = settings if given else settings.replace(length=suggest_length(cloud))
-        check_length(cloud, settings)
+        low, high = length_range(cloud)
+        if has_length(values):
+            check_length(cloud, settings)
+        elif low > high:  # no length is possible, as the lines say
+            return
         with note_compiling(bars):
-            from ..boundary.find import find_boundary
-            from ..surface.samples import sample_surface
-
+            if not settings.length_field:
+                advice = Advice(cloud, settings, bars)
+                length = settings.length if has_length(values) else advice.suggest()
+                print_table(*advice_rows(advice, length, cloud))
+                print_lines(advice_lines(advice, length, cloud))
+                settings = advice.settings.replace(length=length)
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")
+        note_layers(bars, cloud, settings)
     field = samples.surface.field
     longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])

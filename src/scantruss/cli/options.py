@@ -326,6 +326,11 @@ def _with_crops(given: dict[str, Any]) -> dict[str, Any]:
     return given | ({"crop": tuple(map(read_crop, given["crop"]))} if "crop" in given else {})
 
 
+def has_length(values: argparse.Namespace) -> bool:
+    """Whether the command line says a member length, or settings do."""
+    return "length" in vars(values) or bool(vars(values).get("settings"))
+
+
 def settings_of(values: argparse.Namespace) -> Settings:
     """Return the settings of a command line: those of ``--settings``, overridden by explicit options."""
     given = vars(values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -73,6 +74,25 @@ def thin_to_fit(path: str, settings: Settings, memory: float | None) -> Settings
     return settings.replace(thin_spacing=spacing) if spacing else settings
 
 
+def with_some_length(values: Namespace) -> Namespace:
+    """Return the values of a command line with a length that is to be chosen later, where none is given."""
+    from .options import has_length
+
+    return values if has_length(values) else Namespace(**(vars(values) | {"length": 1.0}))
+
+
+def read_to_choose(values: Namespace, settings: Settings, bars: Bars) -> tuple[PointCloud, Settings]:
+    """Return a scan, and the settings; of one larger than memory for which no length is given yet, a first look."""
+    from .options import has_length
+
+    settings = thin_to_fit(values.scan, settings, values.memory)
+    if settings.thin_spacing and not has_length(values) and "thin_spacing" not in values:
+        from ..scan.stream.fit import spacing_to_look
+
+        settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings, bars))
+    return read_scan(values.scan, settings, bars), settings
+
+
 def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     """Read a scan that is thinned while it is read, and say so."""
     from ..scan.stream.fit import read_thinned
@@ -105,23 +125,39 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
         )
 
 
+def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Say that the scan has two layers closer than half a member, where it has, and what to do."""
+    from ..surface.samples import sample_surface
+
+    distance, share = sample_surface(cloud, settings).layers
+    if share > 0.0:
+        unit = f" {cloud.unit}" if cloud.unit else ""
+        bars.note(
+            f"the scan has two layers about {distance:.2g}{unit} apart on {share:.0%} of its surface, such as top and underside;"
+            " the grid is one sheet between or on them: crop one layer away for a grid of the other"
+        )
+
+
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """Name the pieces of a scan with their sizes, and how to take one alone; nothing where there is one."""
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
-    if len(samples.pieces) < 2:
+    if len(samples.pieces) + len(samples.not_chosen) < 2:
         return
+    if samples.floor is not None:
+        bars.note("a level, flat piece under the others is taken for the floor and left out; --piece all keeps it")
     unit = f" {cloud.unit}" if cloud.unit else ""
+    large = sorted({*samples.pieces, *samples.not_chosen})
     option = "--piece" if settings.keep_rods else "--no-keep-rods --piece"
-    for number, piece in enumerate(samples.pieces[:MOST_PIECES], 1):
+    for number, piece in enumerate(large[:MOST_PIECES], 1):
         places = samples.surface.mean[samples.piece == piece] + cloud.origin
         low, high = places.min(axis=0), places.max(axis=0)
         size = " x ".join(f"{side:.3g}" for side in high - low)
         box = ",".join(f"{c:.6g}" for c in (*low - samples.surface.radius, *high + samples.surface.radius))
         bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone, --crop box:{box} all in its box")
-    if len(samples.pieces) > MOST_PIECES:
-        bars.note(f"and {len(samples.pieces) - MOST_PIECES} smaller pieces")
+    if len(large) > MOST_PIECES:
+        bars.note(f"and {len(large) - MOST_PIECES} smaller pieces")
 
 
 @contextmanager

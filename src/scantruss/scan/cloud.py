@@ -18,6 +18,8 @@ Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordina
 INVALID = "with coordinates a million times too large"
 NO_DATA = "with a height that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
+SURVEY_UNITS = ("m", "foot")  # scans in these have z up
+SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # ... and those of these files
 COPIES = 5  # times that a place may be repeated in a scan that is stored so often
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
 ROUGHLY = 60  # of them at which it is guessed first
@@ -48,6 +50,11 @@ class PointCloud:
     def bounds(self) -> Bounds:
         """Smallest and largest coordinates, (3,) each [scan unit]."""
         return bounds_of(self.points)
+
+    @property
+    def z_is_up(self) -> bool:
+        """Whether z certainly points upwards: in surveys of buildings and terrain, as their unit or their file tells."""
+        return self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES)
 
     @property
     def extent(self) -> float:

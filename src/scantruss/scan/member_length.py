@@ -12,10 +12,10 @@ from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud
 
 SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a boundary from a gap
-GAPS = 2.2  #: ... and where points lie at random, this many distances to the sixth neighbour
+GAPS = 1.75  #: ... and where points lie at random, this many distances to the sixth neighbour
 USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
 USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
-LARGEST_PER_EXTENT = 6.0  #: above a sixth of the scan's extent a grid says little of its shape
+LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:

@@ -21,6 +21,7 @@ from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
 from ..scan.vectors import dots
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
+from .floor import find_floor
 from .linked_samples import (
     MANY_ROUGH,
     PATCH_SPACING,
@@ -37,6 +38,7 @@ from .linked_samples import (
     thin_dense,
 )
 from .rods import rod_points
+from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
@@ -64,6 +66,7 @@ class SurfaceSamples:
     scan: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  #: (N, 3) all points that were read [scan unit]
     judged: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))  #: (N,) KEPT, DUPLICATE or OUTLIER
     not_chosen: tuple[int, ...] = ()  #: numbers of the pieces that are large enough and that the settings leave out
+    floor: int | None = None  #: number of the piece that was taken for a floor and left out
     unread: tuple[tuple[str, int], ...] = ()  #: why points of the file were not read, and how many
     measured: int = 0  #: samples with measured points; those from this number on have made-up ones only
     whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
@@ -100,6 +103,11 @@ class SurfaceSamples:
         small = np.delete(samples, self.pieces)
         return len(small), float(small.sum() / samples.sum())
 
+    @cached_property
+    def layers(self) -> tuple[float, float]:
+        """How far apart two layers lie that are closer than half a member, and the share of the scan that has them; 0, 0 for one."""
+        return find_layers(self)
+
     @property
     def density(self) -> float:
         """Points for an area [1 / scan unit^2]."""
@@ -122,17 +130,18 @@ class _Asked(NamedTuple):
     wish: Wish | None
     keep_rods: bool
     piece: str
+    z_is_up: bool
     judge_always: bool  #: look for outliers whether samples stand alone or not
 
     @classmethod
-    def of(cls, settings: Settings, origin: np.ndarray) -> _Asked:
+    def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
         """Return it for a cloud with this origin."""
         outliers = settings.outlier_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece = settings.keep_rods, settings.piece
-        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, always)
+        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always)
 
 
 class _Chosen(NamedTuple):
@@ -159,11 +168,12 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         `length` and `box_size` decide how far apart samples are, `clean`, `outlier_distance` and `drop_duplicates` which points are left
         out, `length_field` where members are to be longer.
     """
-    asked = _Asked.of(settings, cloud.origin)
+    asked = _Asked.of(settings, cloud.origin, cloud.z_is_up)
     kept = _KEPT.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+        check_is_surface(made)
         unread = (*cloud.left_out, *((NOT_FINITE, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)
     return kept[asked]
@@ -183,7 +193,9 @@ def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings)
     """Return the samples of the same points and of made-up ones (F, 3) [scan unit]."""
     points = samples.surface.points
     both = np.concatenate([points, added])
-    asked = _Asked.of(settings, samples.origin)._replace(outlier_distance=0.0, drop_duplicates=False)
+    asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
+        outlier_distance=0.0, drop_duplicates=False
+    )
     if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
@@ -286,7 +298,8 @@ def _prepare(
     area = _sample_areas(surface)
     graded = area / surface.field**2
     large = _large_pieces(piece, area, graded, length)
-    pieces = _chosen_pieces(large, asked.piece)
+    floor = find_floor(surface.mean, piece, large, length) if asked.piece == "auto" and asked.z_is_up else None
+    pieces = _chosen_pieces(large, asked.piece, floor)
     return SurfaceSamples(
         surface,
         found.boxes,
@@ -299,6 +312,7 @@ def _prepare(
         scan,
         judged,
         tuple(sorted(set(large) - set(pieces))),
+        floor,
         (),
         len(found.chosen) if measured is None else int((found.chosen < measured).sum()),
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
@@ -392,16 +406,16 @@ def _sample_areas(surface: Surface) -> np.ndarray:
     return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
 
 
-def _chosen_pieces(large: tuple[int, ...], wanted: str) -> tuple[int, ...]:
-    """Return those of the large pieces that the settings choose: all, the largest, or some by their numbers from 1.
+def _chosen_pieces(large: tuple[int, ...], wanted: str, floor: int | None) -> tuple[int, ...]:
+    """Return those of the large pieces that the settings choose: all but the floor, all, the largest, or some by their numbers from 1.
 
     Raises
     ------
     InputError
         There is no piece of that number.
     """
-    if wanted == "all":
-        return large
+    if wanted in ("auto", "all"):
+        return tuple(number for number in large if number != floor)
     numbers = [1] if wanted == "largest" else [int(word) for word in wanted.split(",")]
     if max(numbers) > len(large):
         raise InputError(f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..style import angles_of
+from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
 OPEN = 0.5  # mean normal by area from which on a shell is open: it faces one way on the whole

@@ -19,7 +19,15 @@ if TYPE_CHECKING:
     from ...scan.cloud import PointCloud
 
 RED, VIOLET, AMBER = np.array([0.80, 0.10, 0.10]), np.array([0.45, 0.25, 0.65]), np.array([0.85, 0.55, 0.05])
-COLOURS = {"far": RED, "pieces": VIOLET, "not chosen": VIOLET, "rods": VIOLET, "outliers": AMBER, "sparse": AMBER}
+COLOURS = {
+    "far": RED,
+    "pieces": VIOLET,
+    "not chosen": VIOLET,
+    "rods": VIOLET,
+    "floor": VIOLET,
+    "outliers": AMBER,
+    "sparse": AMBER,
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ import numpy as np
 from ...grid.grid import Grid
 from ...runtime.files import check_place, write_files
 from ...runtime.ours import MARK
-from ...scan.cloud import PointCloud
-from ..style import FileStyle
+from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
 from .legend import Ring, Text, marks_of, scale_bar
@@ -37,6 +36,7 @@ from .strokes import (
     solid_strokes,
     some_of,
 )
+from .style import PictureStyle
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -44,12 +44,10 @@ if TYPE_CHECKING:
 SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS = (2400, 800)  #: of three panels, or of several views [pixel]
 UP = np.array([0.0, 0.0, 1.0])
-SURVEY_UNITS = ("m", "foot")  #: scans in them have z up
-SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  #: ... and those of these files
 
 
 def encode_picture(
-    grid: Grid, cloud: PointCloud | None = None, *, caption: bool = True, style: FileStyle | None = None
+    grid: Grid, cloud: PointCloud | None = None, *, caption: bool = True, style: PictureStyle | None = None
 ) -> bytes:
     """Return a shaded picture of the grid over its scan, PNG; what the grid leaves out of the scan is coloured.
 
@@ -61,10 +59,10 @@ def encode_picture(
         The scan, drawn as fine dots.
     caption : bool
         Whether to write the figures of the grid below it, a scale bar, what the colours mean and where to look.
-    style : FileStyle, optional
+    style : PictureStyle, optional
         Views and size of the picture.
     """
-    style = style or FileStyle()
+    style = style or PictureStyle()
     wide, tall = style.size or (SIZE if len(style.views) == 1 else PANELS)
     em = 15.0 * min(wide / SIZE[0], tall / PANELS[1])  # height of the letters
     strokes: list[Strokes] = []
@@ -101,13 +99,13 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
     """Return the picture of `encode_picture` as an image that notebooks show."""
     from PIL.Image import open as open_image
 
-    return open_image(io.BytesIO(encode_picture(grid, cloud, style=FileStyle(views=views, size=size))))
+    return open_image(io.BytesIO(encode_picture(grid, cloud, style=PictureStyle(views=views, size=size))))
 
 
 def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
     """Return the direction against gravity (3,) where unit or file tell: scans of buildings and terrain have z up."""
-    name = "" if cloud is None else cloud.name
-    return UP if grid.unit in SURVEY_UNITS or name.lower().endswith(SURVEY_FILES) else None
+    known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up)
+    return UP if known else None
 
 
 def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:
