@@ -88,7 +88,6 @@ def refused(capsys, *words, status=2):
         ("cut a b", "no command 'cut'"),
         ("grid", "missing SCAN"),
         ("grid scan.xyz", "missing OUT"),
-        ("grid scan.xyz a.obj", "--length is missing"),
         ("grid scan.xyz a.obj --length", "--length: expected one argument"),
         (
             "grid scan.xyz a.obj --length abc",
@@ -417,10 +416,10 @@ def test_pieces_that_are_too_small_are_counted(place, capsys):
 def test_info_says_what_a_length_can_be(place, capsys):
     assert main(["info", "scan.xyz", "--unit", "mm"]) == 0
     said = capsys.readouterr().out
-    for word in ("points   8000", "extent   ", "spacing  ", "unit     mm", "--length ", "external", "4"):
+    for word in ("points   8000", "extent   ", "spacing  ", "unit     mm", "length   ", "external", "4"):
         assert word in said
-    low, high = (float(word) for word in said.split("--length ")[1].split(" mm")[0].split(" to "))
-    wished = float(said.split("try ")[1].split()[0])
+    low, high = (float(word) for word in said.split("length   ")[1].split(" mm")[0].split(" to "))
+    wished = float(said.split("try --length ")[1].split()[0])
     assert low <= wished <= high
     assert main(["info", "scan.xyz", "--length", "3"]) == 0
     assert "members of 3:" in capsys.readouterr().out

@@ -8,10 +8,14 @@ from PIL import Image
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
 import scantruss as st
-from scantruss.export.drawing.camera import choose_camera, map_depth
-from scantruss.export.drawing.picture import PANELS, SIZE, draw_panels, encode_picture
+from scantruss.export.drawing.camera import choose_camera, facing_of, likely_upward, map_depth
+from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
+from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
+from scantruss.export.drawing.picture import PANELS, SIZE, draw_panels, encode_picture, known_upward
 from scantruss.export.drawing.strokes import MARK, PAPER
+from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
+from scantruss.grid.certificate import Certificate, Fault
 
 
 def pixels(data):
@@ -126,3 +130,126 @@ def test_panels_show_scan_grid_and_solid(tmp_path):
 def test_flat_and_empty_grids_are_drawn():
     assert len(encode_picture(make_grid([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]))) > 1000
     assert len(encode_picture(make_grid([], []))) > 1000
+
+
+def test_what_the_grid_leaves_out_is_coloured_and_named_and_outliers_do_not_shrink_the_picture():
+    points, grid = scan_and_grid()
+    near = np.concatenate([points, [(0.0, 0.0, 60.0)] * 3 + [(1.0, 0.0, 60.0)] * 3])
+    cloud = st.PointCloud.from_array(near)
+    shown = shown_points(grid, cloud)
+    kinds = {part.words.split(": ")[1] for part in shown.missed}
+    assert any(word.startswith(("outliers", "farther than a member")) for word in kinds)
+    total = len(shown.followed) + sum(len(part.points) for part in shown.missed)
+    assert total == len(near)
+    bare, full = (pixels(encode_picture(grid, c)) for c in (st.PointCloud.from_array(points), cloud))
+    for colour in (RED, AMBER):
+        assert has_colour(full, colour) >= has_colour(bare, colour)
+    assert has_colour(full, RED) + has_colour(full, AMBER) > has_colour(bare, RED) + has_colour(bare, AMBER)
+
+
+def scan_and_grid():
+    """A flat scan and the grid of its left half, made with settings that say so."""
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.uniform(-10, 10, (4000, 2)), np.zeros(4000)])
+    return points, st.grid_from_points(points, st.Settings(length=2.0, effort="quick"))
+
+
+def test_scan_beyond_the_grid_is_red_and_inside_the_picture():
+    points, grid = scan_and_grid()
+    more = np.concatenate([points, points + [0, 25.0, 0]])
+    part = grid.replace(origin=grid.origin)
+    shown = shown_points(part, st.PointCloud.from_array(more))
+    assert sum(len(p.points) for p in shown.missed if p.framed) > 3900
+    picture = pixels(encode_picture(part, st.PointCloud.from_array(more)))
+    assert has_colour(picture, RED) + has_colour(picture, VIOLET) > 500
+
+
+@pytest.mark.parametrize(
+    ("view", "back", "up"),
+    [
+        ("top", (0, 0, 1), (0, 1, 0)),
+        ("bottom", (0, 0, -1), (0, -1, 0)),
+        ("front", (0, -1, 0), (0, 0, 1)),
+        ("back", (0, 1, 0), (0, 0, 1)),
+        ("left", (-1, 0, 0), (0, 0, 1)),
+        ("right", (1, 0, 0), (0, 0, 1)),
+        ("90,0", (1, 0, 0), (0, 0, 1)),
+        ("0,30", (0, -np.sqrt(0.75), 0.5), (0, 0.5, np.sqrt(0.75))),
+    ],
+)
+def test_views_look_from_where_their_names_say(view, back, up):
+    grid = dome()
+    camera = choose_camera(grid.nodes, grid.triangles, np.array([0.0, 0.0, 1.0]), view)
+    assert np.allclose(camera.back, back, atol=1e-12)
+    assert abs(np.linalg.det([camera.right, camera.up, camera.back]) - 1) < 1e-9
+    if "bottom" not in view:
+        assert np.allclose(camera.up, up, atol=1e-12)
+
+
+def test_behind_is_the_other_side_of_auto():
+    grid = dome()
+    one, other = (choose_camera(grid.nodes, grid.triangles, view=view) for view in ("auto", "behind"))
+    level = one.back - (one.back @ one.ground) * one.ground
+    assert np.allclose(other.back - (other.back @ one.ground) * one.ground, -level)
+
+
+def test_a_dome_without_a_unit_stands_on_its_opening_and_a_cup_on_its_foot():
+    turn, high = np.meshgrid(np.linspace(0, 2 * np.pi, 24, endpoint=False), np.linspace(0, 3, 8))
+    wide = 1.0 + 0.2 * high
+    wall = np.column_stack([(wide * np.cos(turn)).ravel(), (wide * np.sin(turn)).ravel(), high.ravel()])
+    foot = np.column_stack([np.cos(turn[0]), np.sin(turn[0]), np.zeros(24)]) * 0.5
+    assert np.allclose(likely_upward(np.concatenate([wall, foot]), np.array([0.0, 0.0, -0.1])), [0, 0, 1])
+    grid = dome()
+    facing = facing_of(grid.nodes, grid.triangles)
+    assert np.allclose(likely_upward(grid.nodes, facing), [0, 0, 1])
+
+
+def test_gravity_is_z_where_the_unit_or_the_file_tells():
+    grid = dome()
+    assert known_upward(grid, None) is None and known_upward(grid, cloud_over(grid)) is None
+    assert np.array_equal(known_upward(grid.replace(unit="m"), None), [0, 0, 1])
+    tile = st.PointCloud.from_array(grid.nodes, name="tile.laz")
+    assert np.array_equal(known_upward(grid, tile), [0, 0, 1])
+
+
+@pytest.mark.parametrize("longest", [0.034, 0.99, 1.0, 3.7, 5.0, 780.0])
+def test_a_scale_bar_is_round_and_as_long_as_it_says(longest):
+    bar = round_bar(longest)
+    assert bar <= longest < 2.5 * bar
+    assert float(f"{bar:.0e}".split("e")[0]) in (1, 2, 5)
+    grid = dome()
+    camera = choose_camera(grid.nodes, grid.triangles).framed(grid.nodes, (0, 0, 800, 600))
+    line, words = scale_bar(camera, 700, 30, 800, "m", 15)
+    length = float(words.words.removesuffix(" m"))
+    ends = np.stack([camera.middle, camera.middle + length * camera.right])
+    assert np.ptp(line[:, 0]) == pytest.approx(np.ptp(camera.project(ends)[0][:, 0]), rel=1e-6)
+
+
+def test_size_and_number_of_views_are_as_asked():
+    grid = dome()
+    assert pixels(encode_picture(grid, style=PictureStyle(size=(500, 300)))).shape == (300, 500, 3)
+    both = pixels(encode_picture(grid, style=PictureStyle(views=("top", "front"))))
+    assert both.shape == (PANELS[1], PANELS[0], 3)
+    for half in np.split(both, 2, axis=1):
+        assert (np.abs(half - np.round(PAPER * 255)).max(axis=2) > 40).mean() > 0.03
+    for bad in ({"views": ("sideways",)}, {"views": ("10,95",)}, {"views": ()}, {"size": (10, 5000)}):
+        with pytest.raises(st.InputError):
+            PictureStyle(**bad)
+
+
+def test_places_of_faults_and_warnings_are_marked_with_their_words():
+    grid = dome()
+    fault, warning = (
+        Fault("angle", "has an angle of 3.0 degrees", (0.0, 0.0, 0.0)),
+        Fault("far", "misses it", (1.0, 1.0, 0.0)),
+    )
+    nothing = dict.fromkeys(("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1)
+    found = Certificate(unit="", manifold=True, orientable=True, **nothing, faults=(fault,), warnings=(warning,))
+    assert [mark.words for mark in marks_of(grid.replace(certificate=found))] == [fault.words, warning.words]
+    plain, marked = (pixels(encode_picture(g)) for g in (grid, grid.replace(certificate=found)))
+    assert has_colour(marked, FAULT) > 20 + has_colour(plain, FAULT)
+
+
+def test_a_grid_plots_itself_as_an_image():
+    image = dome().plot(view=("top", "front"), size=(600, 400))
+    assert image.size == (600, 400) and hasattr(image, "_repr_png_")

@@ -78,7 +78,7 @@ def test_pieces_that_are_not_there_and_words_that_are_none_are_refused(hall):
     with pytest.raises(st.InputError, match="piece 7 is asked for, but the scan has 2"):
         st.grid_from_points(hall[0], st.Settings(length=LENGTH, keep_rods=False, piece="7"))
     for piece in ("some", "0", "1,", "-1", ""):
-        with pytest.raises(st.InputError, match="piece must be all, largest or numbers"):
+        with pytest.raises(st.InputError, match="piece must be auto, all, largest or numbers"):
             st.Settings(length=1.0, piece=piece)
 
 

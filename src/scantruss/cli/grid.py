@@ -19,7 +19,8 @@ from .shared import (
     note_layers,
     note_outliers,
     note_pieces,
-    read_to_choose,
+    read_scan,
+    settings_to_read,
     with_some_length,
 )
 
@@ -94,7 +95,8 @@ def grid(values: Namespace) -> None:
     check_outputs(values, outs, settings_file, report)
     with Bars() as bars:
         started = perf_counter()
-        cloud, settings = read_to_choose(values, settings, bars)
+        settings = settings_to_read(values, settings, bars)
+        cloud = read_scan(values.scan, settings, bars)
         spent = perf_counter() - started
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)

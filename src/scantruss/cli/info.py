@@ -5,7 +5,16 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .shared import SCAN, add_memory, note_compiling, note_layers, note_outliers, read_to_choose, with_some_length
+from .shared import (
+    SCAN,
+    add_memory,
+    note_compiling,
+    note_layers,
+    note_outliers,
+    read_scan,
+    settings_to_read,
+    with_some_length,
+)
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -38,7 +47,8 @@ def info(values: Namespace) -> None:
 
     settings = settings_of(with_some_length(values))
     with Bars() as bars:
-        cloud, settings = read_to_choose(values, settings, bars)
+        settings = settings_to_read(values, settings, bars)
+        cloud = read_scan(values.scan, settings, bars)
         print_lines(cloud_lines(cloud))
         low, high = length_range(cloud)
         if has_length(values):

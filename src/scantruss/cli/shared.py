@@ -81,8 +81,8 @@ def with_some_length(values: Namespace) -> Namespace:
     return values if has_length(values) else Namespace(**(vars(values) | {"length": 1.0}))
 
 
-def read_to_choose(values: Namespace, settings: Settings, bars: Bars) -> tuple[PointCloud, Settings]:
-    """Return a scan, and the settings; of one larger than memory for which no length is given yet, a first look."""
+def settings_to_read(values: Namespace, settings: Settings, bars: Bars) -> Settings:
+    """Return the settings with which a scan fits into memory; for one without a length yet, those of a first look."""
     from .options import has_length
 
     settings = thin_to_fit(values.scan, settings, values.memory)
@@ -90,7 +90,7 @@ def read_to_choose(values: Namespace, settings: Settings, bars: Bars) -> tuple[P
         from ..scan.stream.fit import spacing_to_look
 
         settings = settings.replace(thin_spacing=spacing_to_look(values.scan, settings, bars))
-    return read_scan(values.scan, settings, bars), settings
+    return settings
 
 
 def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:

@@ -17,7 +17,8 @@ MOST_SAMPLES = 5_000  # samples that show how the points spread around a place
 LINE = 0.02  # second spread of what lies along a line, in its first
 VOLUME = 0.45  # least spread of what fills a volume, in its largest
 MOST_PLACES = 0.6  # share of the places from which on all is called so
-LAYER_REACH = 0.5  # distance within which two layers are looked for [member lengths]
+LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
+CLOSE_LAYERS = 0.5  # distance below which two layers are one to a grid [member lengths]
 EACH_LAYER = 0.2  # share of the points that each of two layers has at least
 CLEAR = 4.0  # distance of two layers, in the rms thickness of each
 MANY_LAYERS = 0.3  # share of the places with two layers from which on that is said
@@ -69,7 +70,7 @@ def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
         if len(points) < 20:
             continue
         looked += 1
-        if (distance := _layer_distance(points)) > 0.0:
+        if 0.0 < (distance := _layer_distance(points)) < CLOSE_LAYERS * surface.length:
             apart.append(distance)
     share = len(apart) / max(looked, 1)
     return (float(np.median(apart)), share) if share >= MANY_LAYERS else (0.0, 0.0)

@@ -1,0 +1,101 @@
+"""Advice on member lengths: what is suggested was tried and passes, here and at the next length above."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import make
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.report.advice import Advice
+from scantruss.scan.member_length import length_range
+
+
+def cloud_of(name, count=6000):
+    return st.PointCloud.from_array(make(name, count).points)
+
+
+@pytest.mark.parametrize("name", ["cloth", "limpet", "torus"])
+def test_the_suggested_length_and_the_next_above_pass(name):
+    cloud = cloud_of(name)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    length = advice.suggest()
+    low, high = length_range(cloud)
+    assert low <= length <= high
+    for each in (length, advice.next_above(length)):
+        grid = st.grid_from_points(cloud.points, st.Settings(length=each))
+        assert grid.certificate.passed and grid.certificate.judged_out <= 0.01
+
+
+def test_a_length_is_tried_once_and_none_out_of_range():
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    length = advice.suggest()
+    assert advice.try_length(length) is advice.try_length(length)
+    assert advice.try_length(1e-6) is None and advice.try_length(1e6) is None
+
+
+def test_a_sphere_has_its_own_radius_and_a_plate_none():
+    rng = np.random.default_rng(0)
+    ball = rng.normal(size=(20_000, 3))
+    ball *= 7.0 / np.linalg.norm(ball, axis=1, keepdims=True)
+    assert Advice(st.PointCloud.from_array(ball), st.Settings(length=1.0)).radius() == pytest.approx(7.0, rel=0.1)
+    flat = np.column_stack([rng.uniform(0, 20, (8000, 2)), np.zeros(8000)])
+    assert Advice(st.PointCloud.from_array(flat), st.Settings(length=1.0)).radius() > 200.0
+
+
+def test_members_are_estimated_from_the_area():
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    length = advice.suggest()
+    trial = advice.try_length(length)
+    assert advice.members(length) == pytest.approx(len(trial.grid.members), rel=0.2)
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("limpet.xyz", make("limpet", 6000).points, fmt="%.5f")
+    return tmp_path
+
+
+def test_grid_without_a_length_takes_the_one_that_info_suggests_and_says_so(place, capsys):
+    assert main(["info", "limpet.xyz"]) == 0
+    said = capsys.readouterr().out
+    wished = said.split("try --length ")[1].split()[0]
+    row = next(line for line in said.splitlines() if line.split()[:1] == [wished])
+    assert row.rstrip().endswith(("passes", "passes with warnings"))
+    assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick"]) == 0
+    assert f"no --length is given; {wished} is taken, as scantruss info suggests" in capsys.readouterr().err
+    assert st.read_grid("a.json").settings.length == float(wished)
+
+
+def test_info_prints_three_lengths_with_members_sag_and_spacings(place, capsys):
+    assert main(["info", "limpet.xyz", "--unit", "m"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    head = next(number for number, line in enumerate(lines) if line.startswith("length [m]"))
+    radius = float(next(line for line in lines if line.startswith("R = ")).split()[2])
+    for line in lines[head + 1 : head + 4]:
+        length, members, sag = line.split()[:3]
+        assert float(sag) == pytest.approx(float(length) ** 2 / (8 * radius), rel=0.1)
+        assert int(members.replace(",", "")) > 10
+
+
+def test_a_refused_length_comes_with_one_that_passes(place, capsys, monkeypatch):
+    """Where the grid of one length fails, another is named that was tried."""
+    from scantruss.check.certify import certified
+    from scantruss.scan.member_length import suggest_length
+
+    failing = suggest_length(st.read_points("limpet.xyz"))
+
+    def fails_there(grid, samples, boundary, settings):
+        if abs(settings.length - failing) < 0.01 * failing:
+            raise st.FrontError("the front cannot close")
+        return certified(grid, samples, boundary, settings)
+
+    monkeypatch.setattr("scantruss.candidates.certified", fails_there)
+    words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
+    assert main([*words, str(failing)]) == 2
+    said = capsys.readouterr().err
+    named = said.split("a grid passes with --length ")[1].split()[0]
+    assert float(named) != failing
+    assert main([*words, named]) == 0
