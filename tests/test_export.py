@@ -347,3 +347,40 @@ def test_files_get_the_usual_permissions(tmp_path):
     (tmp_path / "plain").touch()
     write_files({tmp_path / "a.obj": b"new"})
     assert (tmp_path / "a.obj").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+@pytest.mark.parametrize("elements", ["faces", "lines", "both"])
+@pytest.mark.parametrize("make", GRIDS)
+def test_obj_holds_lines_as_well_as_faces_on_request(make, elements, tmp_path):
+    grid = make(origin=UTM)
+    st.write(grid, tmp_path / "a.obj", style=st.FileStyle(obj=elements))
+    text = (tmp_path / "a.obj").read_text()
+    nodes, triangles = naive_obj(text)
+    lines = np.array([[int(w) - 1 for w in row.split()[1:]] for row in text.splitlines() if row.startswith("l ")])
+    assert same(nodes, grid.scan_nodes)
+    assert np.array_equal(triangles, grid.triangles) if elements != "lines" else not len(triangles)
+    assert np.array_equal(lines, grid.members) if elements != "faces" else not len(lines)
+
+
+@pytest.mark.parametrize("make", GRIDS)
+def test_tables_with_a_decimal_comma_hold_the_same_numbers(make, tmp_path):
+    grid = make(origin=UTM)
+    st.write(grid, tmp_path / "a.csv")
+    st.write(grid, tmp_path / "b.csv", style=st.FileStyle(decimal_comma=True))
+    for end in ("", "_nodes"):
+        point, comma = ((tmp_path / f"{name}{end}.csv").read_text(encoding="utf-8") for name in "ab")
+        rows = list(csv.reader(io.StringIO(comma), delimiter=";"))
+        plain = list(csv.reader(io.StringIO(point)))
+        assert rows[0] == plain[0] and "." not in "".join(map("".join, rows[1:]))
+        assert [[word.replace(",", ".") for word in row] for row in rows[1:]] == plain[1:]
+
+
+def test_members_and_nodes_in_the_scans_frame_have_names():
+    grid = rich(origin=UTM)
+    assert np.array_equal(grid.members, grid.edges)
+    assert same(grid.scan_nodes, grid.nodes + UTM)
+
+
+def test_a_style_that_is_none_is_refused():
+    with pytest.raises(st.InputError, match="an OBJ file holds faces, lines, both, got 'points'"):
+        st.FileStyle(obj="points")

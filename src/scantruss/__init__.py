@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .export.formats import write as write
     from .export.json import read_grid as read_grid
     from .export.solid import print_model as print_model
+    from .export.style import FileStyle as FileStyle
     from .front.advance import advance_front as advance_front
     from .front.orientation_field import orientation_fields as orientation_fields
     from .grid.certificate import Certificate as Certificate
@@ -62,7 +63,7 @@ _HOMES = {
     "optimize_grid": "improve.optimize",
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
-    "write": "export.formats", "read_grid": "export.json",
+    "write": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
     "print_model": "export.solid",
 }  # fmt: skip
 

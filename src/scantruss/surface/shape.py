@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..kernels.surface.local_surface import Surface
     from .samples import SurfaceSamples
 
 PLACES = 40  # places that are looked at
@@ -16,6 +17,7 @@ FEWEST = 60  # samples below which nothing is said
 MOST_SAMPLES = 5_000  # samples that show how the points spread around a place
 LINE = 0.02  # second spread of what lies along a line, in its first
 VOLUME = 0.45  # least spread of what fills a volume, in its largest
+NEARER_VOLUME = 0.25  # the same within half as far
 MOST_PLACES = 0.6  # share of the places from which on all is called so
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which two layers are one to a grid [member lengths]
@@ -38,13 +40,16 @@ def check_is_surface(samples: SurfaceSamples) -> None:
     some = mean[:: len(mean) // MOST_SAMPLES + 1]
     lines = volumes = looked = 0
     for place in mean[_spread_evenly(len(mean))]:
-        near = some[((some - place) ** 2).sum(axis=1) <= samples.surface.length**2]
-        if len(near) < 5:
+        distance = np.linalg.norm(some - place, axis=1) / samples.surface.length
+        if np.count_nonzero(distance <= 1.0) < 5:
             continue
         looked += 1
-        least, second, largest = np.linalg.eigvalsh(np.cov(near.T))
+        least, second, largest = _spread(some[distance <= 1.0])
         lines += bool(second <= LINE * largest)
-        volumes += bool(least >= VOLUME * largest)
+        if least >= VOLUME * largest:  # so do two sheets, but not from half as far
+            points = _points_near(samples.surface, place, 0.5 * samples.surface.length)
+            least, _, largest = _spread(points)
+            volumes += bool(least >= NEARER_VOLUME * largest)
     if lines > MOST_PLACES * looked:
         raise InputError(
             "the points lie along lines, not on a surface; a grid needs a scan of a surface, or longer members if these are"
@@ -56,6 +61,17 @@ def check_is_surface(samples: SurfaceSamples) -> None:
         )
 
 
+def _spread(points: np.ndarray) -> np.ndarray:
+    """Return the three variances of points (N, 3), the least first; zeros for fewer than five."""
+    return np.linalg.eigvalsh(np.cov(points.T)) if len(points) >= 5 else np.zeros(3)
+
+
+def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
+    """Return the points (N, 3) of all samples within a radius of a place that has some."""
+    near = np.flatnonzero(((surface.mean - place) ** 2).sum(axis=1) <= radius**2)
+    return np.concatenate([surface.points[surface.start[s] : surface.start[s + 1]] for s in near])
+
+
 def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
     """Return how far apart two layers lie that are closer than half a member, and the share of places with two; 0, 0 for one."""
     surface = samples.surface
@@ -63,10 +79,7 @@ def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
         return 0.0, 0.0
     apart, looked = [], 0
     for sample in _spread_evenly(len(surface.mean)):
-        away = surface.mean - surface.mean[sample]
-        near = np.flatnonzero((away**2).sum(axis=1) <= (LAYER_REACH * surface.length) ** 2)
-        own = [surface.points[surface.start[s] : surface.start[s + 1]] for s in near]
-        points = np.concatenate(own) - surface.mean[sample]
+        points = _points_near(surface, surface.mean[sample], LAYER_REACH * surface.length) - surface.mean[sample]
         if len(points) < 20:
             continue
         looked += 1
