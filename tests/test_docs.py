@@ -45,3 +45,15 @@ def test_the_options_of_each_command_that_is_shown_exist(page):
             known = COMMANDS[words[1]][0]().format_help()
             for option in (word.partition("=")[0] for word in words if re.match("--?[a-z]", word)):
                 assert re.search(rf"(^|[\s,]){re.escape(option)}\b", known), f"{page}: {line}: {option}"
+
+
+def test_each_message_in_the_page_on_troubles_is_one_of_ours():
+    said = " ".join(re.sub(r'"\s*\n\s*f?"', "", path.read_text(encoding="utf-8")) for path in SOURCE.rglob("*.py"))
+    heads = re.findall(r'\*\*"([^"]+)"\*\*', (DOCS / "troubleshooting.md").read_text(encoding="utf-8"))
+    assert len(heads) > 20
+    assert [head for head in heads if head not in said] == []
+
+
+def test_every_page_is_in_the_navigation():
+    named = set(re.findall(r"([\w/-]+\.md)", (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")))
+    assert {str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")} == named
