@@ -19,6 +19,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 PLACE = Path("scantruss") / "machine_code"
 PATIENCE = 600.0  # most that the commands may take [s]
 COMMANDS = (
+    "info shell.npy",
     "grid {bust} bust.obj --length 24",
     "grid shell.npy shell.obj --length 1",
     "clean shell.npy clean.ply",
