@@ -269,11 +269,25 @@ def plate():
 
 @pytest.mark.parametrize("effort", ["quick", "best"])
 def test_a_failed_grid_is_kept_where_that_is_asked_for(plate, monkeypatch, effort):
-    monkeypatch.setattr("scantruss.check.defects.LEFT_OUT", -1.0)  # no grid can pass
+    monkeypatch.setattr("scantruss.check.defects.UNEVEN_LENGTHS", -1.0)  # no grid can pass
     settings = st.Settings(length=1.5, effort=effort)
     with pytest.raises(CertificateError) as refused:
         st.grid_from_points(plate, settings)
     grid = st.grid_from_points(plate, settings, keep_failed=True)
-    assert [fault.kind for fault in grid.certificate.faults] == ["cover"]
+    assert [fault.kind for fault in grid.certificate.faults] == ["uneven"]
     assert grid.settings == settings and grid.before is not None and grid.seconds["total"] > 0
     assert grid.nodes.tobytes() == refused.value.grid.nodes.tobytes()
+
+
+@pytest.mark.parametrize("share", [0.03, 0.08, 0.15])
+def test_a_lost_limb_is_a_fault_from_a_twentieth_of_the_scan_on(plate, share):
+    settings = st.Settings(length=1.0, effort="quick")
+    reached = 20.0 * (1.0 - share) - 0.5
+    grid = st.grid_from_points(plate[plate[:, 0] < reached], settings)
+    scan = steps_of(st.PointCloud(plate, np.zeros(3)), settings)[:2]
+    grid = grid.replace(nodes=grid.nodes + grid.origin - scan[0].origin, origin=scan[0].origin)
+    found = certify(grid, *scan, settings)
+    assert found.missing == pytest.approx((plate[:, 0] > reached + 0.5).mean(), abs=0.005)
+    assert [fault.kind for fault in found.faults] == (["cover"] if share > 0.05 else [])
+    accepted = certify(grid, *scan, settings.replace(allow_missing=0.2))
+    assert accepted.passed and accepted.widened == ("allow missing 0.2 instead of 0.05",)

@@ -286,6 +286,10 @@ class CheckSettings(_Checked):
     max_offset: float = _setting(
         0.1, "largest distance of a node from the scan beyond its noise, in member lengths", low=0.0
     )
+    allow_missing: float = _setting(
+        0.05, "largest share of the scan farther than half a member from the grid; pieces left out do not count",
+        low=0.0, high=1.0,
+    )  # fmt: skip
 
 
 #: the records in the order of the stages, from reading to checking

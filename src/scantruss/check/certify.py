@@ -13,12 +13,13 @@ import numpy as np
 from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
+from ..surface.samples import KEPT
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances
 from .folds import fold_angles
 from .irregular import count_irregular
-from .left_out import parts_left_out
+from .left_out import OTHER_PIECES, parts_left_out
 from .limits import limits_of, places_to_look_at, widened_limits
 from .sheets import faults_on_sheets, nodes_of_samples
 
@@ -120,9 +121,12 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
+    beyond = (samples.judged == KEPT) & (found.scan > COVER_REACH * members)
+    left_out = parts_left_out(samples, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
-        "left_out": parts_left_out(samples, found, members, COVER_REACH * members),
+        "left_out": left_out,
+        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind in OTHER_PIECES)),
         "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),

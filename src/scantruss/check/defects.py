@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..settings import Settings
 
-LEFT_OUT = 0.2  #: share of the scan that a grid may leave out of reach
 OFF_SURFACE = (
     0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
 )
@@ -89,12 +88,9 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
     if uneven > UNEVEN_LENGTHS and found.longest_member:
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
-    pieces = sum(
-        part.share for part in found.left_out if part.kind in ("pieces", "not chosen", "floor")
-    )  # they may be dense; see `faults_on_sheets`
-    lost = 1.0 - found.scan_within_reach - pieces
-    if lost > LEFT_OUT and found.scan_distance:
-        faults.append(Fault("cover", f"leaves out {lost:.0%} of the scan", found.scan_distance.largest.where))
+    if found.scan_distance and found.missing > settings.allow_missing:
+        words = f"leaves out {found.missing:.1%} of the scan; --allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
+        faults.append(Fault("cover", words, found.scan_distance.largest.where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     worst = found.triangle_distance.largest if found.triangle_distance else None
     if worst and worst.value > gone * _length_at(grid, worst.where, settings):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
 
+OTHER_PIECES = ("pieces", "not chosen", "floor")  # parts of the scan that are pieces by themselves, without a grid
 MOST_PLACES = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
 

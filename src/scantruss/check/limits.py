@@ -103,7 +103,7 @@ def widened_limits(settings: Settings) -> tuple[str, ...]:
     """Return the limits that the settings make wider than the defaults, in words."""
     said = []
     for spec in fields(CheckSettings):
-        value, wider = getattr(settings, spec.name), spec.name.startswith("max")
+        value, wider = getattr(settings, spec.name), not spec.name.startswith("min")
         if value != spec.default and (value > spec.default) == wider:
             said.append(f"{spec.name.replace('_', ' ')} {value:g} instead of {spec.default:g}")
     return tuple(said)

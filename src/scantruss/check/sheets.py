@@ -9,13 +9,13 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from ..kernels.mesh.sheets import first_disconnected, nearest_nodes
 from ..surface.scratch import with_own_scratch
-from .defects import LEFT_OUT
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
 COVER = 1.2  # distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
+LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
 DISCONNECTED = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
 

@@ -93,6 +93,7 @@ class Certificate:
     left_out: tuple[LeftOut, ...] = ()  #: what the grid does not follow, the most points first
     crossings: int = 0  #: pairs of triangles that cut, touch or cover each other; exact, and at most 100 are counted
     scan_within_reach: float = 0.0  #: share of all points that were read that lie within `reach` of a triangle
+    missing: float = 0.0  #: share of all points farther than `reach` though nothing else that is left out explains them
     grid_within_reach: float = (
         0.0  #: share of the triangles, middle and corners, within `reach` of a point, closed holes aside
     )
