@@ -150,7 +150,7 @@ class Terms(NamedTuple):
 
 def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     """Return the terms of a whole grid as it is now."""
-    energy, mean, count = total_energy(mesh.net, scratch, mesh.length, WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), USUAL_ENERGY), max(count, 1))
 
 
@@ -164,7 +164,7 @@ def grid_energy(grid: Grid, length: float) -> float:
 
 def energy_of_node(mesh: WorkingMesh) -> float:
     """The energy that falls, of an opened grid, for one node: grids of other numbers of nodes can be compared."""
-    energy, mean, count = total_energy(mesh.net, new_scratch(mesh), mesh.length, WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, WEIGHT)
     return energy / max(count, 1) + PRICE * (mean / mesh.length - 1.0) ** 2
 
 

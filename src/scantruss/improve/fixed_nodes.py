@@ -102,7 +102,7 @@ def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
         for way in _ways(mesh, place):
             _restore(mesh, start)
             _take(mesh, scratch, way, place)
-            energy = total_energy(mesh.net, scratch, mesh.length, WEIGHT)[0]
+            energy = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
             if energy < least:
                 best, least = _copy(mesh), energy
         if best is None:

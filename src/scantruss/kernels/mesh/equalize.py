@@ -13,6 +13,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, slide
+from ..surface.folds import BENT, chord_energy, chord_slope, fold_energy, fold_slope
 from ..surface.local_surface import onto_patch
 from .grid import INTERIOR, ON_CURVE, REST, Net
 
@@ -71,6 +72,19 @@ def star_energy(
             sx += h * (bx + cx) - f * (ey * uz - ez * uy)
             sy += h * (by + cy) - f * (ez * ux - ex * uz)
             sz += h * (bz + cz) - f * (ex * uy - ey * ux)
+    if patches[v, BENT] > 0.0:
+        energy += fold_energy(patches, v, x, y, z)
+        if slope:
+            fx, fy, fz = fold_slope(patches, v, x, y, z)
+            gx, gy, gz = gx + fx, gy + fy, gz + fz
+    for i in range(d):
+        w = net.ring[v, i]
+        if patches[v, BENT] > 0.0 and patches[w, BENT] > 0.0:
+            hx, hy, hz = 0.5 * (x + nodes[w, 0]), 0.5 * (y + nodes[w, 1]), 0.5 * (z + nodes[w, 2])
+            energy += chord_energy(patches, v, w, hx, hy, hz)
+            if slope:
+                fx, fy, fz = chord_slope(patches, v, w, hx, hy, hz)
+                gx, gy, gz = gx + 0.5 * fx, gy + 0.5 * fy, gz + 0.5 * fz
     side = 1.0 if shape >= 0.0 else -1.0
     return energy - side * shape, gx - side * sx, gy - side * sy, gz - side * sz
 

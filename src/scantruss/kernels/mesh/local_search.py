@@ -166,7 +166,7 @@ def try_move(
     rehearse = change > TOLERATED[move]  # whether flips make it good is seen before anything is settled
     for turn in range(2):
         if turn == 1 or not rehearse:
-            before = local_energy(net, scratch, length, weight)
+            before = local_energy(net, patches, scratch, length, weight)
             before += worth if move == SPLIT else (-worth if move == COLLAPSE else 0.0)
         added = make_move(net, patches, curves, scratch, move, a, b)
         if tidied:
@@ -182,7 +182,7 @@ def try_move(
             settle_node(net, patches, curves, scratch.around[i], length, weight, STILL * length, STRIDE)
         if turn == 0 and added >= 0:
             settle_node(net, patches, curves, added, length, weight, STILL * length, STRIDE)
-        after = local_energy(net, scratch, length, weight)
+        after = local_energy(net, patches, scratch, length, weight)
         if after > before + (EARLY[move] if turn == 0 else ALLOWANCE[move]):
             break
     if after < before - 1e-4:

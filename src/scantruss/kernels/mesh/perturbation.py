@@ -140,7 +140,7 @@ def added_node(net: Net, area: Area, k: int) -> int:
 
 
 @kernel
-def area_energy(net: Net, scratch: Scratch, area: Area, length: float, weight: float) -> float:
+def area_energy(net: Net, patches: np.ndarray, scratch: Scratch, area: Area, length: float, weight: float) -> float:
     """Energy of all members and triangles that have a node in the area."""
     scratch.trial[0] += 1
     count = 0
@@ -152,7 +152,7 @@ def area_energy(net: Net, scratch: Scratch, area: Area, length: float, weight: f
             scratch.around[count] = v
             count += 1
     scratch.gathered[0] = count
-    return local_energy(net, scratch, length, weight)
+    return local_energy(net, patches, scratch, length, weight)
 
 
 @kernel
@@ -289,13 +289,13 @@ def perturb(
     worth, bend : n more nodes may cost worth n - bend n^2
     allowance : what still costs more once it is searched is given up; below ALLOWANCE_SETTLED, so is what the search has undone
     """
-    before = area_energy(net, scratch, area, length, weight)
+    before = area_energy(net, patches, scratch, area, length, weight)
     if move_at_random(net, patches, curves, scratch, area) == 0:
         return False
     for turn in range(SEARCH_ROUNDS):
         forget_trials(scratch, area)
         settle_area(net, patches, curves, area, length, weight)
-        if area_energy(net, scratch, area, length, weight) - before > (ALLOWANCE_SETTLED if turn == 0 else allowance):
+        if area_energy(net, patches, scratch, area, length, weight) - before > (ALLOWANCE_SETTLED if turn == 0 else allowance):
             put_area_back(net, patches, area)
             return False
         if search_area(net, patches, curves, scratch, area, length, weight, worth) == 0:
@@ -304,7 +304,7 @@ def perturb(
             put_area_back(net, patches, area)
             return False
     settle_area(net, patches, curves, area, length, weight)
-    after = area_energy(net, scratch, area, length, weight)
+    after = area_energy(net, patches, scratch, area, length, weight)
     more = area.spare[0] - net.spare[0]
     luck = -temperature * math.log((random_choice(area, 100000) + 1.0) / 100001.0) if temperature > 0.0 else -1e-4
     if after - before < worth * more - bend * more * more + luck:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
+from ..surface.folds import BENT, chord_energy, fold_energy
 from .equalize import ROOT
 from .grid import Net, target_length, wings
 
@@ -103,7 +104,7 @@ def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: V
 
 
 @kernel
-def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> float:
+def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> float:
     """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
 
     A member is folded where its two triangles meet at less than 90 degrees; those with only a triangle in the neighbourhood count
@@ -116,6 +117,7 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
         d = net.degree[v]
         if d == 0:
             continue
+        energy += fold_energy(patches, v, nodes[v, 0], nodes[v, 1], nodes[v, 2])
         closed = net.is_open[v] == 0
         w = net.ring[v, d - 2 if closed else d - 1]
         cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
@@ -133,6 +135,9 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
             if at >= 0 and not counted:
                 stretch = math.sqrt(cc) / target_length(net, v, w, length) - 1.0
                 energy += weight * stretch * stretch
+                if patches[v, BENT] > 0.0 and patches[w, BENT] > 0.0:
+                    hx, hy, hz = nodes[v, 0] + 0.5 * cx, nodes[v, 1] + 0.5 * cy, nodes[v, 2] + 0.5 * cz
+                    energy += chord_energy(patches, v, w, hx, hy, hz)
             if at == 0 and not closed:
                 continue
             ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
@@ -151,7 +156,7 @@ def local_energy(net: Net, scratch: Scratch, length: float, weight: float) -> fl
 
 
 @kernel
-def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
+def total_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
     """Energy of the whole grid, mean length of its members where `length` is desired, and its nodes."""
     scratch.trial[0] += 1
     count = members = 0
@@ -168,4 +173,4 @@ def total_energy(net: Net, scratch: Scratch, length: float, weight: float) -> tu
                     target = 0.5 * (net.desired[v] + net.desired[u])
                     total += norm(subtract(row(net.nodes, u), row(net.nodes, v))) / target
     scratch.gathered[0] = count
-    return local_energy(net, scratch, length, weight), total / max(members, 1), count
+    return local_energy(net, patches, scratch, length, weight), total / max(members, 1), count

@@ -17,7 +17,7 @@ from ...runtime.jit import kernel
 from ..geometry.quadric import AWAY, COLUMNS, WEIGHT, fit_heights, project, second_moments
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, smallest_eigenvector, subtract
 
-PATCH = 20  # columns of a patch row
+PATCH = 31  # columns of a patch row
 HEIGHTS = 9  # first of its coefficients
 
 

@@ -1,0 +1,107 @@
+"""Folds: how far a place lies from the planes of the surface around it, which is least on the crest of a fold.
+
+The mean squared distance from the tangent planes of the samples around a node is a quadric (Garland and Heckbert 1997): where the surface
+is level or bends gently it says nothing of places on it, across a fold it grows on both sides, and at a corner in all directions. It is
+taken only where the normals differ enough, so that smooth surfaces keep their members.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...runtime.jit import kernel
+from ..geometry.vectors import dot, row, subtract
+from .local_surface import Surface
+
+QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the linear part, constant, weight
+BENT = 30  # column of the weight
+REACH = 0.6  # samples farther from the node do not count [member lengths]
+SMOOTH, SHARP = 0.04, 0.12  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: 23 and 40 degrees
+MOST = 1.5  # energy of a place far off the planes
+STRENGTH = 30.0  # energy of a place one member length off the planes
+BEHIND = -0.3  # samples that face farther away than this are another side's
+
+
+@kernel
+def fit_fold(surface: Surface, patch: np.ndarray, count: int) -> None:
+    """Fill in the quadric of a patch from the first `count` samples in surface.queue."""
+    place = (patch[0], patch[1], patch[2])
+    sample = int(patch[15])
+    facing = row(surface.normals, sample)
+    local = surface.length * surface.field[sample]
+    reach = REACH * local
+    xx = xy = xz = yy = yz = zz = bx = by = bz = c = total = mx = my = mz = 0.0
+    for i in range(count):
+        s = surface.queue[i]
+        normal = row(surface.normals, s)
+        d = subtract(row(surface.mean, s), place)
+        w = 1.0 - dot(d, d) / (reach * reach)
+        if w <= 0.0 or dot(normal, facing) < BEHIND:
+            continue
+        nx, ny, nz = normal
+        h = w * dot(normal, d)
+        xx, xy, xz = xx + w * nx * nx, xy + w * nx * ny, xz + w * nx * nz
+        yy, yz, zz = yy + w * ny * ny, yz + w * ny * nz, zz + w * nz * nz
+        bx, by, bz = bx + h * nx, by + h * ny, bz + h * nz
+        c += h * dot(normal, d)
+        mx, my, mz = mx + w * nx, my + w * ny, mz + w * nz
+        total += w
+    patch[BENT] = 0.0
+    if total <= 0.0:
+        return
+    spread = 1.0 - (mx * mx + my * my + mz * mz) / (total * total)
+    share = (spread - SMOOTH) / (SHARP - SMOOTH)
+    if share <= 0.0:
+        return
+    patch[20], patch[21], patch[22], patch[23], patch[24], patch[25] = (
+        xx / total, xy / total, xz / total, yy / total, yz / total, zz / total,
+    )  # fmt: skip
+    patch[26], patch[27], patch[28], patch[29] = bx / total, by / total, bz / total, c / total
+    patch[BENT] = STRENGTH * min(share, 1.0) / (local * local)
+
+
+@kernel
+def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> float:
+    """Energy of a place off the planes around node v, at most MOST; nothing where the surface is smooth."""
+    k = patches[v, BENT]
+    if k == 0.0:
+        return 0.0
+    x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
+    gx = patches[v, 20] * x + patches[v, 21] * y + patches[v, 22] * z - 2.0 * patches[v, 26]
+    gy = patches[v, 21] * x + patches[v, 23] * y + patches[v, 24] * z - 2.0 * patches[v, 27]
+    gz = patches[v, 22] * x + patches[v, 24] * y + patches[v, 25] * z - 2.0 * patches[v, 28]
+    q = k * (gx * x + gy * y + gz * z + patches[v, 29])
+    return q * MOST / (q + MOST) if q > 0.0 else 0.0
+
+
+@kernel
+def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Gradient of `fold_energy`."""
+    k = 2.0 * patches[v, BENT]
+    if k == 0.0:
+        return 0.0, 0.0, 0.0
+    f = 1.0 - fold_energy(patches, v, x, y, z) / MOST
+    k *= f * f
+    x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
+    return (
+        k * (patches[v, 20] * x + patches[v, 21] * y + patches[v, 22] * z - patches[v, 26]),
+        k * (patches[v, 21] * x + patches[v, 23] * y + patches[v, 24] * z - patches[v, 27]),
+        k * (patches[v, 22] * x + patches[v, 24] * y + patches[v, 25] * z - patches[v, 28]),
+    )
+
+
+@kernel
+def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: float) -> float:
+    """Energy of the middle of a member between nodes v and w: off the planes around both, as one of a fold's flanks is no fault."""
+    if patches[v, BENT] == 0.0 or patches[w, BENT] == 0.0:
+        return 0.0
+    return min(fold_energy(patches, v, x, y, z), fold_energy(patches, w, x, y, z))
+
+
+@kernel
+def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Gradient of `chord_energy`."""
+    if patches[v, BENT] == 0.0 or patches[w, BENT] == 0.0:
+        return 0.0, 0.0, 0.0
+    nearer = v if fold_energy(patches, v, x, y, z) <= fold_energy(patches, w, x, y, z) else w
+    return fold_slope(patches, nearer, x, y, z)
