@@ -7,9 +7,8 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
 from ..geometry.vectors import fill_row, norm, row, subtract
-from ..surface.folds import REACH as FOLD_REACH
-from ..surface.folds import fit_fold
-from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, walk
+from ..surface.folds import REACH, fit_fold
+from ..surface.local_surface import Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
 from .grid import INTERIOR, ON_CURVE, REST, Net
 
@@ -92,7 +91,7 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
-                fit_fold(surface, patches[v], flood(surface, int(patches[v, 15]), place, FOLD_REACH * surface.length * net.desired[v]))
+                fit_fold(surface, patches[v], REACH)
                 local = surface.length * net.desired[v]
                 if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > OFF_SHEET * local:
                     fill_row(patches[v], before)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, along, dot, fill_row, norm, row, subtract
+from ..surface.folds import fit_fold, onto_crest
 from ..surface.local_surface import Surface, fit_patch, onto_patch, patch_normal
 from .grid import INTERIOR, Net
 
@@ -13,6 +14,7 @@ LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, b
 SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
 EQUAL_PATCH_RATIO = 0.85  # patches of radii nearer to each other are as good as one
 LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
+CREST_REACH = 0.4  # samples that tell where the crest of a fold is [member lengths]
 TERMS = 6.0  # of a quadric: so many points it passes through
 FEWEST_FOR_WIDE_PATCH = (
     24  # a patch of fewer points, as there are at a boundary, has an edge that their noise moves too much
@@ -97,6 +99,10 @@ def project_nodes(
             if norm(subtract(foot, place)) < SETTLED * local:
                 stayed = True
                 break
+        if net.kind[v] == INTERIOR and not fixed[v]:
+            patches[v, 0], patches[v, 1], patches[v, 2] = row(net.nodes, v)
+            fit_fold(broad, patches[v], CREST_REACH)
+            net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))
         place = row(net.nodes, v)
         if not stayed:
             fit_patch(fine, narrow, int(patches[v, 15]), place)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.vectors import dot, row, subtract
-from .local_surface import Surface
+from ..geometry.vectors import Vector, along, dot, norm, row, subtract
+from .local_surface import Surface, flood
 
 QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the linear part, constant, weight
 BENT = 30  # column of the weight
@@ -19,17 +19,20 @@ REACH = 0.6  # samples farther from the node do not count [member lengths]
 SMOOTH, SHARP = 0.04, 0.12  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: 23 and 40 degrees
 MOST = 1.5  # energy of a place far off the planes
 STRENGTH = 30.0  # energy of a place one member length off the planes
+CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
+FARTHEST = 0.25  # way to a crest, at most [member lengths]
 BEHIND = -0.3  # samples that face farther away than this are another side's
 
 
 @kernel
-def fit_fold(surface: Surface, patch: np.ndarray, count: int) -> None:
-    """Fill in the quadric of a patch from the first `count` samples in surface.queue."""
+def fit_fold(surface: Surface, patch: np.ndarray, members: float) -> None:
+    """Fill in the quadric of a patch from the samples within some member lengths of its middle."""
     place = (patch[0], patch[1], patch[2])
     sample = int(patch[15])
     facing = row(surface.normals, sample)
     local = surface.length * surface.field[sample]
-    reach = REACH * local
+    reach = members * local
+    count = flood(surface, sample, place, reach)
     xx = xy = xz = yy = yz = zz = bx = by = bz = c = total = mx = my = mz = 0.0
     for i in range(count):
         s = surface.queue[i]
@@ -58,6 +61,34 @@ def fit_fold(surface: Surface, patch: np.ndarray, count: int) -> None:
     )  # fmt: skip
     patch[26], patch[27], patch[28], patch[29] = bx / total, by / total, bz / total, c / total
     patch[BENT] = STRENGTH * min(share, 1.0) / (local * local)
+
+
+@kernel
+def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
+    """Place on the crest of a fold or in its corner near a place on the rounded surface; the same place where there is no fold.
+
+    The least of the quadric with CLING times the squared distance moved; the way is at most FARTHEST.
+    """
+    local = surface.length * surface.field[int(patch[15])]
+    x, y, z = subtract(place, (patch[0], patch[1], patch[2]))
+    share = patch[BENT] * local * local / STRENGTH
+    if share <= 0.0:
+        return place
+    a, b, c, d, e, f = patch[20] + CLING, patch[21], patch[22], patch[23] + CLING, patch[24], patch[25] + CLING
+    p = patch[26] - (patch[20] * x + patch[21] * y + patch[22] * z)
+    q = patch[27] - (patch[21] * x + patch[23] * y + patch[24] * z)
+    r = patch[28] - (patch[22] * x + patch[24] * y + patch[25] * z)
+    xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
+    det = a * xx + b * xy + c * xz
+    step = (
+        share * (xx * p + xy * q + xz * r) / det,
+        share * (xy * p + (a * f - c * c) * q + (b * c - a * e) * r) / det,
+        share * (xz * p + (b * c - a * e) * q + (a * d - b * b) * r) / det,
+    )
+    size = norm(step)
+    if size > FARTHEST * local:
+        return place
+    return along(place, 1.0, step)
 
 
 @kernel
