@@ -79,7 +79,7 @@ def star_energy(
             gx, gy, gz = gx + fx, gy + fy, gz + fz
     for i in range(d):
         w = net.ring[v, i]
-        if patches[v, BENT] > 0.0 and patches[w, BENT] > 0.0:
+        if patches[v, BENT] > 0.0 or patches[w, BENT] > 0.0:
             hx, hy, hz = 0.5 * (x + nodes[w, 0]), 0.5 * (y + nodes[w, 1]), 0.5 * (z + nodes[w, 2])
             energy += chord_energy(patches, v, w, hx, hy, hz)
             if slope:

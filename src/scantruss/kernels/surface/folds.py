@@ -15,11 +15,14 @@ from .local_surface import Surface, flood
 
 QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the linear part, constant, weight
 BENT = 30  # column of the weight
-REACH = 0.6  # samples farther from the node do not count [member lengths]
+SIZE = 19  # column of the desired member length
+REACH = 0.75  # samples farther from the node do not count [member lengths]
 SMOOTH, SHARP = 0.04, 0.12  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: 23 and 40 degrees
 MOST = 1.5  # energy of a place far off the planes
 STRENGTH = 30.0  # energy of a place one member length off the planes
 CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
+CHORD = 30.0  # energy of the middle of a member that lies one length off the surface
+SAG = 0.06  # distance of that middle from a surface that bends gently [member lengths]
 FARTHEST = 0.25  # way to a crest, at most [member lengths]
 BEHIND = -0.3  # samples that face farther away than this are another side's
 
@@ -49,7 +52,7 @@ def fit_fold(surface: Surface, patch: np.ndarray, members: float) -> None:
         c += h * dot(normal, d)
         mx, my, mz = mx + w * nx, my + w * ny, mz + w * nz
         total += w
-    patch[BENT] = 0.0
+    patch[BENT], patch[SIZE] = 0.0, local
     if total <= 0.0:
         return
     spread = 1.0 - (mx * mx + my * my + mz * mz) / (total * total)
@@ -123,16 +126,37 @@ def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tup
 
 @kernel
 def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: float) -> float:
-    """Energy of the middle of a member between nodes v and w: off the planes around both, as one of a fold's flanks is no fault."""
-    if patches[v, BENT] == 0.0 or patches[w, BENT] == 0.0:
+    """Energy of the middle of a member between nodes v and w: what it is off the surface beyond the sag of a gentle bend."""
+    if patches[v, BENT] == 0.0 and patches[w, BENT] == 0.0:
         return 0.0
-    return min(fold_energy(patches, v, x, y, z), fold_energy(patches, w, x, y, z))
+    first, second = _height(patches, v, x, y, z)[0], _height(patches, w, x, y, z)[0]
+    q = CHORD * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
+    return q * MOST / (q + MOST) if q > 0.0 else 0.0
 
 
 @kernel
 def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gradient of `chord_energy`."""
-    if patches[v, BENT] == 0.0 or patches[w, BENT] == 0.0:
+    q = chord_energy(patches, v, w, x, y, z)
+    if q == 0.0:
         return 0.0, 0.0, 0.0
-    nearer = v if fold_energy(patches, v, x, y, z) <= fold_energy(patches, w, x, y, z) else w
-    return fold_slope(patches, nearer, x, y, z)
+    f = 1.0 - q / MOST
+    k = f * f * CHORD / patches[v, SIZE] ** 2
+    h, px, py, pz = _height(patches, v, x, y, z)
+    g, qx, qy, qz = _height(patches, w, x, y, z)
+    return k * (h * px + g * qx), k * (h * py + g * qy), k * (h * pz + g * qz)
+
+
+@kernel
+def _height(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """Height of a place over the patch of node v, and its gradient."""
+    p = patches[v]
+    x, y, z = x - p[0], y - p[1], z - p[2]
+    nx, ny, nz, ux, uy, uz = p[3], p[4], p[5], p[6], p[7], p[8]
+    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
+    a, b = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz
+    h = x * nx + y * ny + z * nz
+    h -= p[9] + a * (p[10] + a * p[12] + b * p[13]) + b * (p[11] + b * p[14])
+    s, t = p[10] + 2.0 * a * p[12] + b * p[13], p[11] + 2.0 * b * p[14] + a * p[13]
+    f = 1.0 / (1.0 + s * s + t * t)  # near to the distance where the patch is steep
+    return f**0.5 * h, f**0.5 * (nx - s * ux - t * vx), f**0.5 * (ny - s * uy - t * vy), f**0.5 * (nz - s * uz - t * vz)
