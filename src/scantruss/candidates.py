@@ -13,7 +13,7 @@ from .check.certify import certified
 from .constraints.ridges import find_ridges
 from .errors import FrontError
 from .front.advance import advance_front
-from .front.orientation_field import Field, FieldStart
+from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .runtime.parallel import processors
@@ -35,6 +35,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
+MISSING, DISTANCE = 4.0, 0.1  # energy a node of the share of the scan that is missed, of its distance at 95 % [members]
 POOR = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 BATCHES = 2  # times that finalists are tried
 LENGTHS = (
@@ -124,6 +125,14 @@ class Candidate:
         return energy_of_node(self.mesh)
 
     @property
+    def cost(self) -> float:
+        """The energy for a node, and what the grid misses of the scan."""
+        found = self.grid.certificate if self.grid is not None else None
+        if found is None or found.scan_distance is None:
+            return self.energy
+        return self.energy + MISSING * found.missing + DISTANCE * found.scan_distance.p95 / self.settings.length
+
+    @property
     def is_poor(self) -> bool:
         """Whether its worst triangle is a poor one."""
         return self.grid is not None and self.grid.quality.shape_min < POOR
@@ -182,10 +191,6 @@ def improve_fronts(
 
     found = _side_by_side(improve, fronts, _part(progress, "optimize", 0.0, 0.5))
     ordered = sorted(found, key=lambda candidate: candidate.energy) if len(found) > 1 else found
-    if settings.effort == "best" and len(ordered) > 1:
-        # the first once more as normal ends it: on thin parts annealing may lose
-        again = replace(improve(ordered[0].front), settings=settings.replace(effort="normal"))
-        ordered.insert(FULLY_IMPROVED["best"] - 1, again)
     return ordered
 
 
@@ -225,9 +230,44 @@ def best_that_passes(
         fault = candidates[0].fault
         assert fault is not None
         raise fault
-    best = min(passed, key=lambda candidate: (candidate.is_poor, candidate.energy)) if len(passed) > 1 else passed[0]
+    if settings.effort == "best" and settings.method == "default":
+        return no_worse(passed, samples, boundary, constraints, settings)
+    return chosen(passed)
+
+
+def chosen(passed: Sequence[Candidate]) -> Grid:
+    """Return the best grid of candidates that pass: of those without a poor triangle the one of least `cost`."""
+    best = min(passed, key=lambda candidate: (candidate.is_poor, candidate.cost)) if len(passed) > 1 else passed[0]
     assert best.grid is not None
     return best.grid
+
+
+def no_worse(
+    passed: Sequence[Candidate],
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+) -> Grid:
+    """Return the best grid that is in no figure worse than that of effort `normal`, or that one where there is none."""
+    lower = settings.replace(effort="normal")
+    try:
+        fields = orientation_fields(samples, boundary, lower)
+        fronts = advance_fronts(samples, boundary, constraints, fields, lower)
+        usual = optimize_fronts(fronts, samples, boundary, constraints, lower).replace(settings=settings)
+    except FrontError:
+        return chosen(passed)
+    better = [each for each in passed if each.grid is not None and _is_no_worse(each.grid, usual)]
+    return chosen(better) if better else usual
+
+
+def _is_no_worse(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
+    one, two = (
+        (each.quality.length_cv, -each.quality.shape_mean, each.certificate.scan_distance.p95, each.certificate.missing)
+        for each in (grid, other)
+    )
+    return all(a <= b for a, b in zip(one, two, strict=True))
 
 
 def optimize_fronts(

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
+FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}  # weight of folds: the longer search pays for them in even members
+
 Report = Callable[[float], None]
 
 
@@ -89,7 +91,7 @@ def improve_first(
     By the paper: Delaunay flips, then nodes moved to the fixed positions (Sec. 4.1, 4.2). By default: even members.
     """
     surface = with_own_scratch(samples.surface)
-    mesh = WorkingMesh.from_grid(grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines)
+    mesh = WorkingMesh.from_grid(grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines, FOLDS[settings.effort])
     if settings.method == "paper":
         flip_by_angle(mesh.net)
         if len(constraints.positions):

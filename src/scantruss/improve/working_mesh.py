@@ -137,10 +137,11 @@ class WorkingMesh:
     sharp: (
         np.ndarray
     )  #: (N,) bool for each curve of the boundary, whether it is a ridge, which the local surface rounds off
+    folds: float  #: weight of nodes and members off the folds of the scan
 
     @classmethod
     def from_grid(
-        cls, grid: Grid, surface: Surface, curves: Curves, corners: np.ndarray, length: float, lines: Lines = NO_LINES
+        cls, grid: Grid, surface: Surface, curves: Curves, corners: np.ndarray, length: float, lines: Lines = NO_LINES, folds: float = 1.0
     ) -> WorkingMesh:
         """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
 
@@ -155,6 +156,7 @@ class WorkingMesh:
         corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
         lines : the lines that the grid was made with
+        folds : weight of nodes and members off the folds of the scan, 1 as usual
         """
         net, source = open_net(grid)
         curves = Curves(*(np.ascontiguousarray(array) for array in curves))
@@ -168,7 +170,7 @@ class WorkingMesh:
         patches = np.zeros((len(net.degree), PATCH))
         queue, located = np.zeros((2, len(net.degree)), np.int64)
         point_location.locate_nodes(net, surface, patches, length, queue, located)
-        mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp)
+        mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp, folds)
         mesh.renew(0.0)
         return mesh
 
@@ -220,7 +222,7 @@ class WorkingMesh:
 
         def renew_part(part: int, begin: int, end: int) -> None:
             surface = self._scratch(part)
-            point_location.renew_patches(self.net, surface, self.patches, near * self.length, begin, end)
+            point_location.renew_patches(self.net, surface, self.patches, near * self.length, self.folds, begin, end)
             if self.graded:
                 point_location.renew_lengths(self.net, surface, self.patches, begin, end)
 

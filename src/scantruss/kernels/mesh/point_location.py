@@ -78,7 +78,9 @@ def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.
 
 
 @kernel
-def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, begin: int, end: int) -> int:
+def renew_patches(
+    net: Net, surface: Surface, patches: np.ndarray, near: float, strength: float, begin: int, end: int
+) -> int:
     """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
 
     Where the new one passes far from the node it is another sheet's, or follows too few points: the old one is kept. Returns how many.
@@ -91,7 +93,7 @@ def renew_patches(net: Net, surface: Surface, patches: np.ndarray, near: float, 
             if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, 15]), place)
-                fit_fold(surface, patches[v], REACH)
+                fit_fold(surface, patches[v], REACH, strength)
                 local = surface.length * net.desired[v]
                 if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > OFF_SHEET * local:
                     fill_row(patches[v], before)

@@ -101,7 +101,7 @@ def project_nodes(
                 break
         if net.kind[v] == INTERIOR and not fixed[v]:
             patches[v, 0], patches[v, 1], patches[v, 2] = row(net.nodes, v)
-            fit_fold(broad, patches[v], CREST_REACH)
+            fit_fold(broad, patches[v], CREST_REACH, 1.0)
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))
         place = row(net.nodes, v)
         if not stayed:

@@ -14,7 +14,7 @@ from ..geometry.vectors import Vector, along, dot, norm, row, subtract
 from .local_surface import Surface, flood
 
 QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the linear part, constant, weight
-BENT = 30  # column of the weight
+BENT = 30  # column of the weight: 0 where the surface is smooth, 1 on a sharp fold
 SIZE = 19  # column of the desired member length
 REACH = 0.75  # samples farther from the node do not count [member lengths]
 SMOOTH, SHARP = 0.04, 0.12  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: 23 and 40 degrees
@@ -28,8 +28,8 @@ BEHIND = -0.3  # samples that face farther away than this are another side's
 
 
 @kernel
-def fit_fold(surface: Surface, patch: np.ndarray, members: float) -> None:
-    """Fill in the quadric of a patch from the samples within some member lengths of its middle."""
+def fit_fold(surface: Surface, patch: np.ndarray, members: float, strength: float) -> None:
+    """Fill in the quadric of a patch from the samples within some member lengths of its middle; strength 1 is usual."""
     place = (patch[0], patch[1], patch[2])
     sample = int(patch[15])
     facing = row(surface.normals, sample)
@@ -63,7 +63,7 @@ def fit_fold(surface: Surface, patch: np.ndarray, members: float) -> None:
         xx / total, xy / total, xz / total, yy / total, yz / total, zz / total,
     )  # fmt: skip
     patch[26], patch[27], patch[28], patch[29] = bx / total, by / total, bz / total, c / total
-    patch[BENT] = STRENGTH * min(share, 1.0) / (local * local)
+    patch[BENT] = strength * min(share, 1.0)
 
 
 @kernel
@@ -74,7 +74,7 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
     """
     local = surface.length * surface.field[int(patch[15])]
     x, y, z = subtract(place, (patch[0], patch[1], patch[2]))
-    share = patch[BENT] * local * local / STRENGTH
+    share = patch[BENT]
     if share <= 0.0:
         return place
     a, b, c, d, e, f = patch[20] + CLING, patch[21], patch[22], patch[23] + CLING, patch[24], patch[25] + CLING
@@ -97,7 +97,7 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
 @kernel
 def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> float:
     """Energy of a place off the planes around node v, at most MOST; nothing where the surface is smooth."""
-    k = patches[v, BENT]
+    k = STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
     if k == 0.0:
         return 0.0
     x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
@@ -111,7 +111,7 @@ def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> fl
 @kernel
 def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gradient of `fold_energy`."""
-    k = 2.0 * patches[v, BENT]
+    k = 2.0 * STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
     if k == 0.0:
         return 0.0, 0.0, 0.0
     f = 1.0 - fold_energy(patches, v, x, y, z) / MOST
@@ -130,7 +130,7 @@ def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: flo
     if patches[v, BENT] == 0.0 and patches[w, BENT] == 0.0:
         return 0.0
     first, second = _height(patches, v, x, y, z)[0], _height(patches, w, x, y, z)[0]
-    q = CHORD * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
+    q = CHORD * max(patches[v, BENT], patches[w, BENT]) * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
     return q * MOST / (q + MOST) if q > 0.0 else 0.0
 
 
@@ -141,7 +141,7 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
     if q == 0.0:
         return 0.0, 0.0, 0.0
     f = 1.0 - q / MOST
-    k = f * f * CHORD / patches[v, SIZE] ** 2
+    k = f * f * CHORD * max(patches[v, BENT], patches[w, BENT]) / patches[v, SIZE] ** 2
     h, px, py, pz = _height(patches, v, x, y, z)
     g, qx, qy, qz = _height(patches, w, x, y, z)
     return k * (h * px + g * qx), k * (h * py + g * qy), k * (h * pz + g * qz)
