@@ -36,6 +36,7 @@ Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 MISSING, DISTANCE = 4.0, 0.1  # energy a node of the share of the scan that is missed, of its distance at 95 % [members]
+MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 POOR = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 BATCHES = 2  # times that finalists are tried
 LENGTHS = (
@@ -264,10 +265,10 @@ def no_worse(
 def _is_no_worse(grid: Grid, other: Grid) -> bool:
     """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
     one, two = (
-        (each.quality.length_cv, -each.quality.shape_mean, each.certificate.scan_distance.p95, each.certificate.missing)
-        for each in (grid, other)
+        (each.quality.length_cv, -each.quality.shape_mean, each.certificate.scan_distance.p95) for each in (grid, other)
     )
-    return all(a <= b for a, b in zip(one, two, strict=True))
+    more = grid.certificate.missing - other.certificate.missing
+    return more <= MISSED_MORE and all(a <= b for a, b in zip(one, two, strict=True))
 
 
 def optimize_fronts(

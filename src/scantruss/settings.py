@@ -67,6 +67,9 @@ class _Checked:
                 raise InputError(f"{name} must be one of {' '.join(choices)}, got {value!r}")
             if spec.type == "bool" and not isinstance(value, bool):
                 raise InputError(f"{name} must be true or false, got {value!r}")
+            if isinstance(value, int) and not isinstance(value, bool) and "float" in str(spec.type):
+                value = float(value)  # the kernels are compiled for it
+                object.__setattr__(self, name, value)
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(f"{name} must be a finite number, got {value}")
             if (low is None and above is None) or (value is None and spec.default is None):

@@ -91,7 +91,9 @@ def improve_first(
     By the paper: Delaunay flips, then nodes moved to the fixed positions (Sec. 4.1, 4.2). By default: even members.
     """
     surface = with_own_scratch(samples.surface)
-    mesh = WorkingMesh.from_grid(grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines, FOLDS[settings.effort])
+    mesh = WorkingMesh.from_grid(
+        grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines, FOLDS[settings.effort]
+    )
     if settings.method == "paper":
         flip_by_angle(mesh.net)
         if len(constraints.positions):

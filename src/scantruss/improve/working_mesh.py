@@ -141,7 +141,14 @@ class WorkingMesh:
 
     @classmethod
     def from_grid(
-        cls, grid: Grid, surface: Surface, curves: Curves, corners: np.ndarray, length: float, lines: Lines = NO_LINES, folds: float = 1.0
+        cls,
+        grid: Grid,
+        surface: Surface,
+        curves: Curves,
+        corners: np.ndarray,
+        length: float,
+        lines: Lines = NO_LINES,
+        folds: float = 1.0,
     ) -> WorkingMesh:
         """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
 

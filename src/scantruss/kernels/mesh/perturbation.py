@@ -295,7 +295,9 @@ def perturb(
     for turn in range(SEARCH_ROUNDS):
         forget_trials(scratch, area)
         settle_area(net, patches, curves, area, length, weight)
-        if area_energy(net, patches, scratch, area, length, weight) - before > (ALLOWANCE_SETTLED if turn == 0 else allowance):
+        if area_energy(net, patches, scratch, area, length, weight) - before > (
+            ALLOWANCE_SETTLED if turn == 0 else allowance
+        ):
             put_area_back(net, patches, area)
             return False
         if search_area(net, patches, curves, scratch, area, length, weight, worth) == 0:

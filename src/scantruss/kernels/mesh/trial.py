@@ -156,7 +156,9 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
 
 
 @kernel
-def total_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> tuple[float, float, int]:
+def total_energy(
+    net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float
+) -> tuple[float, float, int]:
     """Energy of the whole grid, mean length of its members where `length` is desired, and its nodes."""
     scratch.trial[0] += 1
     count = members = 0

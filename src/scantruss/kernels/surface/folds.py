@@ -17,7 +17,10 @@ QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the lin
 BENT = 30  # column of the weight: 0 where the surface is smooth, 1 on a sharp fold
 SIZE = 19  # column of the desired member length
 REACH = 0.75  # samples farther from the node do not count [member lengths]
-SMOOTH, SHARP = 0.04, 0.12  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: 23 and 40 degrees
+SMOOTH, SHARP = (
+    0.04,
+    0.07,
+)  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: turns of 23 and 31 degrees
 MOST = 0.5  # energy of a place far off the planes
 STRENGTH = 15.0  # energy of a place one member length off the planes
 CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
@@ -130,7 +133,11 @@ def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: flo
     if patches[v, BENT] == 0.0 and patches[w, BENT] == 0.0:
         return 0.0
     first, second = _height(patches, v, x, y, z)[0], _height(patches, w, x, y, z)[0]
-    q = CHORD * max(patches[v, BENT], patches[w, BENT]) * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
+    q = (
+        CHORD
+        * max(patches[v, BENT], patches[w, BENT])
+        * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
+    )
     return q * MOST / (q + MOST) if q > 0.0 else 0.0
 
 
