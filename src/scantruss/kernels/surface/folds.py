@@ -13,14 +13,14 @@ from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, along, dot, norm, row, subtract
 from .local_surface import Surface, flood
 
-QUADRIC = 20  # first of its columns in a patch: xx xy xz yy yz zz, 3 of the linear part, constant, weight
+# columns 20 to 29 of a patch are the quadric: xx xy xz yy yz zz, its linear part, its constant
 BENT = 30  # column of the weight: 0 where the surface is smooth, 1 on a sharp fold
 SIZE = 19  # column of the desired member length
 REACH = 0.75  # samples farther from the node do not count [member lengths]
 SMOOTH, SHARP = (
     0.04,
     0.07,
-)  # 1 - |mean normal|^2 below which a place is smooth, and above which it is folded: turns of 23 and 31 degrees
+)  # 1 - |mean normal|^2 at folds of 23 and 31 degrees; the term begins at one, is whole at the other
 MOST = 0.5  # energy of a place far off the planes
 STRENGTH = 15.0  # energy of a place one member length off the planes
 CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
@@ -100,9 +100,9 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
 @kernel
 def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> float:
     """Energy of a place off the planes around node v, at most MOST; nothing where the surface is smooth."""
-    k = STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
-    if k == 0.0:
+    if patches[v, BENT] == 0.0:
         return 0.0
+    k = STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
     x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
     gx = patches[v, 20] * x + patches[v, 21] * y + patches[v, 22] * z - 2.0 * patches[v, 26]
     gy = patches[v, 21] * x + patches[v, 23] * y + patches[v, 24] * z - 2.0 * patches[v, 27]
@@ -114,9 +114,9 @@ def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> fl
 @kernel
 def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gradient of `fold_energy`."""
-    k = 2.0 * STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
-    if k == 0.0:
+    if patches[v, BENT] == 0.0:
         return 0.0, 0.0, 0.0
+    k = 2.0 * STRENGTH * patches[v, BENT] / patches[v, SIZE] ** 2
     f = 1.0 - fold_energy(patches, v, x, y, z) / MOST
     k *= f * f
     x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
@@ -136,7 +136,7 @@ def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: flo
     q = (
         CHORD
         * max(patches[v, BENT], patches[w, BENT])
-        * (0.5 * (first * first + second * second) / patches[v, SIZE] ** 2 - SAG * SAG)
+        * (0.5 * (first * first + second * second) / max(patches[v, SIZE], patches[w, SIZE]) ** 2 - SAG * SAG)
     )
     return q * MOST / (q + MOST) if q > 0.0 else 0.0
 
@@ -148,7 +148,7 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
     if q == 0.0:
         return 0.0, 0.0, 0.0
     f = 1.0 - q / MOST
-    k = f * f * CHORD * max(patches[v, BENT], patches[w, BENT]) / patches[v, SIZE] ** 2
+    k = f * f * CHORD * max(patches[v, BENT], patches[w, BENT]) / max(patches[v, SIZE], patches[w, SIZE]) ** 2
     h, px, py, pz = _height(patches, v, x, y, z)
     g, qx, qy, qz = _height(patches, w, x, y, z)
     return k * (h * px + g * qx), k * (h * py + g * qy), k * (h * pz + g * qz)

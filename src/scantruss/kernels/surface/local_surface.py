@@ -4,6 +4,7 @@ Nodes are kept on it while they move. Each node caches one quadric patch, a row 
 
     0:3 centre   3:6 unit normal (oriented)   6:9 tangent u (v = normal x u)   9:15 coefficients of 1 u v uu uv vv
     15 sample nearest to the centre   16 fitted (1) or not (0)   17 mean distance of the points from the patch
+    18 spread of the points, 1 in a disc, 0 on a line   19:31 the fold, see `folds`
 """
 
 from __future__ import annotations
