@@ -4,7 +4,8 @@ What falls is one energy, in units of which a member at double length costs 1 an
 
     E = weight * sum (L / l_e - 1)^2 over members + sum (1 - G) over triangles + folded members + price * V * (mean L / l_e - 1)^2
 
-where l_e is the mean of what is desired at the two nodes of a member.
+where l_e is the mean of what is desired at the two nodes of a member. Where the surface is folded, what nodes and the middles of members
+are off it is added (`kernels.surface.folds`): nodes come to the crest, and members run along it.
 """
 
 from __future__ import annotations
