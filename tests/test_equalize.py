@@ -50,7 +50,7 @@ def test_the_slope_of_the_energy_agrees_with_differences():
 def test_the_energy_agrees_with_plain_loops(rough):
     mesh = rough.mesh()
     scratch = new_scratch(mesh)
-    energy, mean, count = total_energy(mesh.net, scratch, rough.settings.length, 1.7)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, rough.settings.length, 1.7)
     assert energy == pytest.approx(naive.energy(rough.grid, rough.settings.length, 1.7))
     assert mean == pytest.approx(rough.grid.lengths.mean()) and count == len(rough.grid.nodes)
 
@@ -61,7 +61,7 @@ def test_a_fold_counts(rough):
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
     net.nodes[v] += 3.0 * (net.nodes[net.ring[v, 0]] - net.nodes[v])
     grid = rough.grid.replace(nodes=net.nodes[: len(rough.grid.nodes)].copy())
-    energy = total_energy(net, new_scratch(mesh), length, WEIGHT)[0]
+    energy = total_energy(net, mesh.patches, new_scratch(mesh), length, WEIGHT)[0]
     assert energy == pytest.approx(naive.energy(grid, length, WEIGHT))
     settle(mesh, WEIGHT, 1e-6, 60)
     healed = mesh.to_grid(rough.grid)
@@ -72,10 +72,10 @@ def test_settling_never_raises_the_energy(rough):
     mesh = rough.mesh()
     scratch, length = new_scratch(mesh), rough.settings.length
     at_rest = mesh.net.nodes[mesh.net.kind >= REST].copy()
-    before = total_energy(mesh.net, scratch, length, WEIGHT)[0]
+    before = total_energy(mesh.net, mesh.patches, scratch, length, WEIGHT)[0]
     for _ in range(4):
         settle(mesh, WEIGHT, 0.0, 3)
-        after = total_energy(mesh.net, scratch, length, WEIGHT)[0]
+        after = total_energy(mesh.net, mesh.patches, scratch, length, WEIGHT)[0]
         assert after <= before + 1e-9
         before = after
     assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= REST])
@@ -111,7 +111,7 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
 
 def stated_energy(mesh, scratch):
     """The energy that the search lowers, but for the share of each node."""
-    energy, mean, count = total_energy(mesh.net, scratch, mesh.length, WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)
     return energy + PRICE * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
 
 
@@ -133,14 +133,14 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     net, rng = mesh.net, np.random.default_rng(seed)
     net.nodes[: net.used] += 0.6 * mesh.length * rng.uniform(-1, 1, (net.used, 3))
     scratch = new_scratch(mesh)
-    before = total_energy(net, scratch, mesh.length, WEIGHT)[0]
+    before = total_energy(net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
                 local_search.try_move(
                     net, mesh.patches, mesh.curves, scratch, local_search.FLIP, v, u, mesh.length, WEIGHT, 0.0
                 )
-                after = total_energy(net, scratch, mesh.length, WEIGHT)[0]
+                after = total_energy(net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after
     assert scratch.paid[0] > 10
@@ -298,7 +298,7 @@ def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
     def energy_after(sweeps, stride):
         mesh = rough.mesh()
         settle(mesh, WEIGHT, 0.0, sweeps, stride)
-        return total_energy(mesh.net, new_scratch(mesh), mesh.length, WEIGHT)[0]
+        return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, WEIGHT)[0]
 
     plain, long = energy_after(36, kernels.STRIDE), energy_after(18, LAST_STRIDE)
     assert long < plain * 1.001

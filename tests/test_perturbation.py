@@ -33,7 +33,7 @@ def trace(net):
 
 
 def energy_of(mesh, scratch):
-    return total_energy(mesh.net, scratch, mesh.length, WEIGHT)[0]
+    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
 
 
 def perturb(mesh, scratch, area, v, worth, temperature=0.0):
@@ -77,11 +77,11 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
     net = mesh.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
         assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
-        before = kernels.area_energy(net, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
+        before = kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
         kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
         kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, WEIGHT)
         kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, WEIGHT, 0.0)
-        after = kernels.area_energy(net, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
+        after = kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 

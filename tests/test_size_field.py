@@ -201,8 +201,8 @@ def test_the_energy_goes_by_the_lengths_desired_at_both_ends():
     net.desired[:] = np.random.default_rng(0).uniform(0.7, 1.5, len(net.desired))
     grid = rough.grid.replace(desired=length * net.desired[: len(rough.grid.nodes)])
     stretch = grid.stretches(length)
-    plain = total_energy(net, new_scratch(mesh), length, 0.0)[0]
-    energy, mean, _ = total_energy(net, new_scratch(mesh), length, 1.7)
+    plain = total_energy(net, mesh.patches, new_scratch(mesh), length, 0.0)[0]
+    energy, mean, _ = total_energy(net, mesh.patches, new_scratch(mesh), length, 1.7)
     assert energy - plain == pytest.approx(1.7 * ((stretch - 1.0) ** 2).sum())
     assert mean == pytest.approx(length * stretch.mean())
     for v in range(0, len(grid.nodes), 7):

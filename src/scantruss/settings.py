@@ -222,6 +222,10 @@ class ConstraintSettings(_Checked):
         low=0.0,
         high=180.0,
     )
+    fold_weight: float = _setting(
+        0.0, "draws nodes to the crests of folds that are no ridges, also rounded ones, at the cost of even members; 1 is usual,"
+        " 0: not at all (default method only)", low=0.0, high=10.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

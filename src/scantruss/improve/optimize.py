@@ -92,7 +92,13 @@ def improve_first(
     """
     surface = with_own_scratch(samples.surface)
     mesh = WorkingMesh.from_grid(
-        grid, surface, boundary.curves, boundary.stops, settings.length, constraints.lines, FOLDS[settings.effort]
+        grid,
+        surface,
+        boundary.curves,
+        boundary.stops,
+        settings.length,
+        constraints.lines,
+        settings.fold_weight * FOLDS[settings.effort],
     )
     if settings.method == "paper":
         flip_by_angle(mesh.net)

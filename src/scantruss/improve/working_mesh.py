@@ -191,7 +191,9 @@ class WorkingMesh:
             narrow, wider, widest = (
                 each._replace(stamp=own.stamp, queue=own.queue, counter=own.counter) for each in (fine, middle, broad)
             )
-            project_nodes(self.net, narrow, wider, widest, self.patches, stay, self.projection_distance, begin, end)
+            project_nodes(
+                self.net, narrow, wider, widest, self.patches, stay, self.projection_distance, self.folds, begin, end
+            )
 
         in_parts(self.net.used, NODES_PER_THREAD // PROJECTION_PARTS, project_part, PROJECTION_PARTS)
 

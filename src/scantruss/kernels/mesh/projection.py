@@ -65,6 +65,7 @@ def project_nodes(
     patches: np.ndarray,
     fixed: np.ndarray,
     deviation: np.ndarray,
+    folds: float,
     begin: int,
     end: int,
 ) -> None:
@@ -77,6 +78,7 @@ def project_nodes(
     patches : (C, PATCH), scratch; column 15 is the sample near each node
     fixed : (C,) bool, nodes that stay where they are
     deviation : (C,), filled with the distance of each node from the narrow patch fitted at its place or close by [scan unit]
+    folds : weight of folds; nodes go to their crests where there is any
     begin, end : the nodes from `begin` to `end` - 1
     """
     narrow = np.empty(patches.shape[1])
@@ -99,7 +101,7 @@ def project_nodes(
             if norm(subtract(foot, place)) < SETTLED * local:
                 stayed = True
                 break
-        if net.kind[v] == INTERIOR and not fixed[v]:
+        if folds > 0.0 and net.kind[v] == INTERIOR and not fixed[v]:
             patches[v, 0], patches[v, 1], patches[v, 2] = row(net.nodes, v)
             fit_fold(broad, patches[v], CREST_REACH, 1.0)
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))

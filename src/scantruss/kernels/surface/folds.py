@@ -37,6 +37,9 @@ def fit_fold(surface: Surface, patch: np.ndarray, members: float, strength: floa
     sample = int(patch[15])
     facing = row(surface.normals, sample)
     local = surface.length * surface.field[sample]
+    patch[BENT], patch[SIZE] = 0.0, local
+    if strength == 0.0:
+        return
     reach = members * local
     count = flood(surface, sample, place, reach)
     xx = xy = xz = yy = yz = zz = bx = by = bz = c = total = mx = my = mz = 0.0
@@ -55,7 +58,6 @@ def fit_fold(surface: Surface, patch: np.ndarray, members: float, strength: floa
         c += h * dot(normal, d)
         mx, my, mz = mx + w * nx, my + w * ny, mz + w * nz
         total += w
-    patch[BENT], patch[SIZE] = 0.0, local
     if total <= 0.0:
         return
     spread = 1.0 - (mx * mx + my * my + mz * mz) / (total * total)
