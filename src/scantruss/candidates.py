@@ -264,6 +264,8 @@ def no_worse(
 
 def _is_no_worse(grid: Grid, other: Grid) -> bool:
     """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
+    if any(each.certificate is None or each.certificate.scan_distance is None for each in (grid, other)):
+        return True
     one, two = (
         (each.quality.length_cv, -each.quality.shape_mean, each.certificate.scan_distance.p95) for each in (grid, other)
     )

@@ -163,7 +163,7 @@ class WorkingMesh:
         corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
         lines : the lines that the grid was made with
-        folds : weight of nodes and members off the folds of the scan, 1 as usual
+        folds : weight of nodes and members off the folds of the scan
         """
         net, source = open_net(grid)
         curves = Curves(*(np.ascontiguousarray(array) for array in curves))
