@@ -148,7 +148,7 @@ class WorkingMesh:
         corners: np.ndarray,
         length: float,
         lines: Lines = NO_LINES,
-        folds: float = 1.0,
+        folds: float = 0.0,
     ) -> WorkingMesh:
         """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
 
