@@ -264,13 +264,15 @@ def no_worse(
 
 def _is_no_worse(grid: Grid, other: Grid) -> bool:
     """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
-    if any(each.certificate is None or each.certificate.scan_distance is None for each in (grid, other)):
+    one, two = grid.certificate, other.certificate
+    if one is None or two is None or one.scan_distance is None or two.scan_distance is None:
         return True
-    one, two = (
-        (each.quality.length_cv, -each.quality.shape_mean, each.certificate.scan_distance.p95) for each in (grid, other)
+    return (
+        grid.quality.length_cv <= other.quality.length_cv
+        and grid.quality.shape_mean >= other.quality.shape_mean
+        and one.scan_distance.p95 <= two.scan_distance.p95
+        and one.missing <= two.missing + MISSED_MORE
     )
-    more = grid.certificate.missing - other.certificate.missing
-    return more <= MISSED_MORE and all(a <= b for a, b in zip(one, two, strict=True))
 
 
 def optimize_fronts(
