@@ -10,6 +10,9 @@ from scantruss.kernels.surface import folds
 from scantruss.kernels.surface.local_surface import PATCH, fit_patch
 
 
+pytestmark = pytest.mark.kernels
+
+
 def patch_at(points, place, strength=1.0):
     """Return a patch of length-1 members fitted at a place, in two rows, and the surface."""
     surface = st.sample_surface(st.PointCloud(points, np.zeros(3)), st.Settings(length=1.0)).surface
