@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,16 @@ import scantruss as st
 from scantruss.kernels.surface import folds
 from scantruss.kernels.surface.local_surface import PATCH, fit_patch
 
-
 pytestmark = pytest.mark.kernels
 
 
-def patch_at(points, place, strength=1.0):
-    """Return a patch of length-1 members fitted at a place, in two rows, and the surface."""
-    surface = st.sample_surface(st.PointCloud(points, np.zeros(3)), st.Settings(length=1.0)).surface
+def surface_of(points):
+    """Return the surface of points for members of length 1."""
+    return st.sample_surface(st.PointCloud(points, np.zeros(3)), st.Settings(length=1.0)).surface
+
+
+def patch_at(surface, place, strength=1.0):
+    """Return a patch fitted at a place, in two rows, and the surface."""
     patches = np.zeros((2, PATCH))
     sample = int(np.argmin(np.linalg.norm(surface.mean - place, axis=1)))
     fit_patch(surface, patches[0], sample, tuple(place))
@@ -24,11 +29,12 @@ def patch_at(points, place, strength=1.0):
     return patches, surface
 
 
+@cache
 def roof(rise):
-    """Return a gable of length 6 along y whose flanks rise by `rise` per unit."""
+    """Return the surface of a gable of length 6 along y whose flanks rise by `rise` per unit."""
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
-    return np.column_stack([x, y, -rise * np.abs(x)])
+    return surface_of(np.column_stack([x, y, -rise * np.abs(x)]))
 
 
 def test_the_slope_is_that_of_the_energy_of_a_place():
@@ -64,6 +70,6 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise):
 def test_a_gentle_bend_is_no_fold():
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
-    patches, surface = patch_at(np.column_stack([x, y, -0.1 * (x * x + y * y)]), np.zeros(3))
+    patches, surface = patch_at(surface_of(np.column_stack([x, y, -0.1 * (x * x + y * y)])), np.zeros(3))
     assert patches[0, folds.BENT] == 0.0 and folds.fold_energy(patches, 0, 0.3, 0.0, 0.4) == 0.0
     assert folds.onto_crest(surface, patches[0], (0.3, 0.0, 0.1)) == (0.3, 0.0, 0.1)
