@@ -83,7 +83,7 @@ def choose_camera(
     facing = facing_of(nodes, triangles)
     ground = likely_upward(nodes, facing) if upward is None else upward
     if view in ("auto", "behind"):
-        openness = max(float(facing @ ground), 0.0)
+        openness = abs(float(facing @ ground))  # the triangles of a scan may all look down
         front = _front(nodes, ground, facing, openness)
         lying = _is_lying(nodes, ground)
         rise = math.radians(12 + 36 * min(max(openness / 0.8, 0.45 if lying else 0.0), 1.0))
