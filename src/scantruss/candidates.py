@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
 from .constraints.ridges import find_ridges
-from .errors import FrontError
+from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
@@ -46,6 +46,8 @@ LENGTHS = (
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
+FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
+MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 COARSEST = 0.5  # largest of them, in desired lengths
 
 
@@ -108,6 +110,39 @@ def _same_scan(settings: Settings) -> Iterator[Attempt]:
         yield Attempt(settings)
     for share in LENGTHS:
         yield Attempt(settings, (FieldStart(scale=share, laid=False),))
+
+
+class Hope:
+    """Which attempts are still worth making: after two in a row that come nowhere near a grid that passes, others of the same
+    settings would come no nearer; after three such settings none would.
+    """
+
+    def __init__(self) -> None:
+        self._settings: Settings | None = None
+        self._far = self._given_up = 0
+
+    def is_left(self) -> bool:
+        """Whether any attempt is worth making."""
+        return self._given_up < MOST_GIVEN_UP
+
+    def allows(self, attempt: Attempt) -> bool:
+        """Whether an attempt is worth making."""
+        return attempt.settings is not self._settings or self._far < MOST_FAR
+
+    def note(self, attempt: Attempt, fault: Exception) -> None:
+        """Note what has come of an attempt."""
+        if attempt.settings is not self._settings:
+            self._settings, self._far = attempt.settings, 0
+        self._far = self._far + 1 if _is_far_from_passing(fault) else 0
+        self._given_up += self._far == MOST_FAR
+
+
+def _is_far_from_passing(fault: Exception) -> bool:
+    """Whether a grid misses many boundary loops, or many of its triangles cut each other."""
+    if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
+        return False
+    found = fault.grid.certificate
+    return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
 
 
 @dataclass(eq=False)

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from .boundary.find import find_boundary
-from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
+from .candidates import Attempt, Hope, advance_fronts, attempts, best_that_passes, improve_fronts
 from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
@@ -90,7 +90,10 @@ def grid_from_cloud(
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
     faults: list[FrontError] = []
+    hope = Hope()
     for attempt in attempts(cloud, settings):
+        if not hope.allows(attempt):
+            continue
         try:
             return make_grid(cloud, attempt, progress=watch).replace(seconds=watch.seconds())
         except ScanTrussError as error:
@@ -98,6 +101,9 @@ def grid_from_cloud(
                 if not isinstance(error, FrontError):
                     raise
                 faults.append(error)
+            hope.note(attempt, error)
+        if not hope.is_left():
+            break
     first = next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
     if keep_failed and isinstance(first, CertificateError) and len(first.grid.triangles):
         return first.grid.replace(settings=settings, seconds=watch.seconds())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -100,10 +101,16 @@ class Boundary:
         )
 
 
+_Found = tuple[Settings, SurfaceSamples | None, Boundary]
+_KEPT: weakref.WeakKeyDictionary[SurfaceSamples, _Found] = weakref.WeakKeyDictionary()
+
+
 def find_boundary(
     samples: SurfaceSamples, settings: Settings, *, progress: Progress | None = None
 ) -> tuple[SurfaceSamples, Boundary]:
     """Return the ordered boundary loops of a scan (Sec. 3.3), and its samples with small holes closed (Sec. 3.6).
+
+    What was found last is kept as long as the samples live.
 
     Parameters
     ----------
@@ -128,17 +135,30 @@ def find_boundary(
     """
     if samples.area == 0.0:
         raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
-    check_two_sided(samples.surface, samples.thickness)
+    kept = _KEPT.get(samples)
+    if kept is None or kept[0] != settings:
+        check_two_sided(samples.surface, samples.thickness)
+        if progress:
+            progress("boundary", 0.4)
+        filled, boundary = _close_holes(samples, settings)
+        kept = _KEPT[samples] = (
+            settings,
+            filled if filled is not samples else None,
+            boundary,
+        )  # a key must not hold itself
     if progress:
-        progress("boundary", 0.4)
+        progress("boundary", 1.0)
+    return kept[1] or samples, kept[2]
+
+
+def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSamples, Boundary]:
+    """Return samples with small holes closed, and the boundary that is left."""
     loops = _external_first(_find_loops(samples, settings))
     holes = [loop for loop in loops if loop.length < settings.closed_boundary_length and _is_hole(loop, samples)]
     if holes:
         made_up = fill_holes(samples, [loop.points for loop in holes])
         samples = samples_with(samples, made_up, settings)
         loops = _external_first([loop for loop in _find_loops(samples, settings) if not _over_filling(loop, samples)])
-    if progress:
-        progress("boundary", 1.0)
     return samples, Boundary(loops)
 
 
