@@ -215,6 +215,17 @@ def fit_fold(
 
 
 @kernel
+def points_around(
+    surface: Surface, sample: int, place: Vector, radius: float, buffer: np.ndarray
+) -> tuple[float, float, float, int]:
+    """Mean normal around a place; the points of both sides, relative to it, into the buffer, and their number."""
+    n, _ = mean_normal(surface, sample, place, radius)
+    count = flood(surface, sample, place, radius + surface.step)
+    taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
+    return n[0], n[1], n[2], taken
+
+
+@kernel
 def turned_frame(c: Vector, n: Vector, angle: float) -> tuple[Vector, Vector, Vector]:
     """The directions across, along and normal to a line whose across has been turned by an angle about the normal."""
     side = cross(n, c)

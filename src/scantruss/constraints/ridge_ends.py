@@ -1,0 +1,202 @@
+"""Where ridges end: those that face each other are joined, and those that make for one corner or another ridge are led there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
+STRAIGHT = 0.94  # least cosine of the angle between such an end and the way to the other
+ROUND = 0.8  # the same cosine where the ends of one ridge make it a ring
+TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
+BLURRED = 1  # places at an end that are left out, because the third side disturbs them
+AIM = 5  # places from which the direction of an end is taken
+CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
+BACK = 0.5  # the same way back, where an end has gone too far [member lengths]
+MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
+ONE_CORNER = 0.5  # corners nearer together than this are one [member lengths]
+FREE = 2.5  # least length of a ridge of which an end is free [member lengths]
+BETWEEN = 0.6  # least length of any other [member lengths]
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """An end of a ridge."""
+
+    line: int
+    at: int  #: 0 the first place of the line, -1 the last
+    place: np.ndarray  #: (3,)
+    ahead: np.ndarray  #: (3,) unit vector in which the ridge would go on
+
+
+def join_ends(ridges: list[np.ndarray], length: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Lead the ends of ridges together.
+
+    Parameters
+    ----------
+    ridges : (K, 3) places along each; the last of a ring is its first
+    length : desired member length
+
+    Returns
+    -------
+    open ridges, without those too short to be ridges by themselves, and rings, whose first place is not repeated
+    """
+    bridged = _bridged([line for line in ridges if not _is_ring(line)], length)
+    rings = [line[:-1] for line in ridges if _is_ring(line)] + [line for line in bridged if _closes(line, length)]
+    lines = [line for line in bridged if not _closes(line, length)]
+    lines = [line[BLURRED:-BLURRED] if len(line) > 2 * BLURRED + 2 else line for line in lines]
+    ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
+    led = _corners(ends, length)
+    for end in ends:
+        if (end.line, end.at) not in led:
+            others = [line for k, line in enumerate(lines) if k != end.line] + rings
+            foot = _foot(end, others, list(led.values()), length)
+            if foot is not None:
+                led[end.line, end.at] = foot
+    found = []
+    for i, line in enumerate(lines):
+        first, last = led.get((i, 0)), led.get((i, -1))
+        line = _led(_led(line, last)[::-1], first)[::-1]
+        least = BETWEEN if first is not None and last is not None else FREE
+        if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() >= least * length:
+            found.append(line)
+    return found, rings
+
+
+def _is_ring(line: np.ndarray) -> bool:
+    """Whether a line (K, 3) ends where it begins."""
+    return len(line) > 8 and bool((line[0] == line[-1]).all())
+
+
+def _closes(line: np.ndarray, length: float) -> bool:
+    """Whether the ends of a line face each other over a gap: a ring that was not seen whole."""
+    one, two = end_of(line, 0, -1), end_of(line, 0, 0)
+    gap = two.place - one.place
+    size = float(np.linalg.norm(gap))
+    whole = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return whole > 4.0 * size and size < BRIDGE * length and min(gap @ one.ahead, -(gap @ two.ahead)) > ROUND * size
+
+
+def end_of(line: np.ndarray, number: int, at: int) -> End:
+    """Return an end (0 or -1) of a line (K, 3)."""
+    inner = line[min(AIM, len(line)) - 1] if at == 0 else line[-min(AIM, len(line))]
+    ahead = line[at] - inner
+    return End(number, at, line[at], ahead / max(float(np.linalg.norm(ahead)), 1e-300))
+
+
+def _bridged(ridges: list[np.ndarray], length: float) -> list[np.ndarray]:
+    """Join ridges whose ends face each other, over the smallest gap first; each turn leaves one ridge fewer."""
+    lines = list(ridges)
+    while (pair := _facing(lines, length)) is not None:
+        one, two = pair
+        first = lines[one.line] if one.at == -1 else lines[one.line][::-1]
+        second = lines[two.line] if two.at == 0 else lines[two.line][::-1]
+        rest = [line for k, line in enumerate(lines) if k not in (one.line, two.line)]
+        lines = [*rest, np.concatenate([first, second])]
+    return lines
+
+
+def _facing(lines: list[np.ndarray], length: float) -> tuple[End, End] | None:
+    """Two ends that face each other over the smallest gap."""
+    best, pair = BRIDGE * length, None
+    ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
+    for k, one in enumerate(ends):
+        for two in ends[k + 1 :]:
+            gap = two.place - one.place
+            size = float(np.linalg.norm(gap))
+            straight = min(gap @ one.ahead, -(gap @ two.ahead)) > STRAIGHT * size or (
+                size < TOUCH * length and two.ahead @ one.ahead < -STRAIGHT
+            )
+            if one.line != two.line and size < best and straight:
+                best, pair = size, (one, two)
+    return pair
+
+
+def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray]:
+    """The corner (3,) that each end makes for, by (line, end); ends that make for none are left out.
+
+    Pairs of ends that meet soonest come first; a later pair joins a corner that is there already.
+    """
+    pairs = []
+    for k, one in enumerate(ends):
+        for two in ends[k + 1 :]:
+            if one.line != two.line and np.linalg.norm(one.place - two.place) < 2.0 * CORNER * length:
+                cost = _cost(one, two, length)
+                if cost is not None:
+                    pairs.append((cost, k, ends.index(two, k + 1)))
+    group: dict[int, list[int]] = {}
+    for _, i, j in sorted(pairs):
+        one, two = group.get(i), group.get(j)
+        together = sorted({*(one or [i]), *(two or [j])})
+        if one is not two or one is None:
+            if _meet(together, ends, length):
+                for member in together:
+                    group[member] = together
+    return {
+        (ends[i].line, ends[i].at): meeting([ends[k] for k in together]) for i, together in group.items()
+    }
+
+
+def _cost(one: End, two: End, length: float) -> float | None:
+    """How far two ends have to go to meet, None where they do not meet."""
+    if abs(one.ahead @ two.ahead) >= STRAIGHT:
+        return None
+    place = meeting([one, two])
+    ways = [float((place - end.place) @ end.ahead) for end in (one, two)]
+    miss = max(float(np.linalg.norm(np.cross(place - end.place, end.ahead))) for end in (one, two))
+    if min(ways) < -BACK * length or max(ways) > CORNER * length or miss > MISS * length:
+        return None
+    return max(abs(way) for way in ways) + miss
+
+
+def _meet(numbers: list[int], ends: list[End], length: float) -> bool:
+    """Whether several ends meet in one corner."""
+    some = [ends[k] for k in numbers]
+    if len({end.line for end in some}) < len(some):
+        return False
+    place = meeting(some)
+    for end in some:
+        way = float((place - end.place) @ end.ahead)
+        miss = float(np.linalg.norm(np.cross(place - end.place, end.ahead)))
+        if not -BACK * length <= way <= CORNER * length or miss > MISS * length:
+            return False
+    return True
+
+
+def meeting(ends: list[End]) -> np.ndarray:
+    """Return the place (3,) nearest to the continuations of some ends."""
+    matrix, right = np.zeros((3, 3)), np.zeros(3)
+    for end in ends:
+        across = np.eye(3) - np.outer(end.ahead, end.ahead)
+        matrix += across
+        right += across @ end.place
+    found: np.ndarray = np.linalg.lstsq(matrix, right, rcond=1e-6)[0]
+    return found
+
+
+def _foot(end: End, others: list[np.ndarray], corners: list[np.ndarray], length: float) -> np.ndarray | None:
+    """The corner, else the place of another ridge, that an end makes for; None where there is none."""
+    best, foot = np.inf, None
+    for places, bonus in ((np.array(corners).reshape(-1, 3), 0.5), (np.concatenate([np.zeros((0, 3)), *others]), 1.0)):
+        away = places - end.place
+        way = away @ end.ahead
+        miss = np.linalg.norm(away - way[:, None] * end.ahead, axis=1)
+        fits = (way >= -BACK * length) & (way <= CORNER * length) & (miss <= MISS * length)
+        if fits.any():
+            cost = bonus * np.where(fits, np.abs(way) + 2.0 * miss, np.inf)
+            if cost.min() < best:
+                best, foot = float(cost.min()), places[int(cost.argmin())]
+    return foot
+
+
+def _led(line: np.ndarray, to: np.ndarray | None) -> np.ndarray:
+    """A line whose last place is the one it is led to; places beyond that are left out."""
+    if to is None:
+        return line
+    away = np.linalg.norm(line - to, axis=1)
+    last = max(int(away.argmin()), 1)
+    ahead = line[last] - line[last - 1]
+    if (to - line[last]) @ ahead <= 0.0:
+        last -= 1
+    return np.concatenate([line[: last + 1], to[None]])
