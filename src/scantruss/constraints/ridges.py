@@ -37,6 +37,7 @@ MOST_SAMPLES = 4000  # most samples from which ridges are looked for, the sharpe
 PATIENCE = 40  # places that look folded and are no ridge, after which the search stops: the scan is rough
 MISSED = 2  # places in a row at which a ridge may not be seen and still goes on
 TURNED = 0.94  # least cosine of the turn of a ridge from place to place
+RING = 6  # places along the shortest ring
 FARTHEST = 20_000  # most places along a ridge
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
@@ -105,30 +106,26 @@ class Tracer:
 
     def _follow(self, sample: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
         """Go along a ridge to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
-        sides = []
-        for sign in (1.0, -1.0):
-            steps, ring = self._march(sample, fold, sign, others)
-            sides.append(steps)
-            if ring:
-                break
-        back = sides[1][::-1] if len(sides) > 1 else []
-        steps = [*back, fold, *sides[0]]
-        if len(sides) == 1:
-            steps.append(fold)
-        folds = np.array(steps)
+        ahead, ring = self._march(sample, fold, 1.0, fold[:3], others)
+        back: list[np.ndarray] = []
+        if not ring:
+            back, ring = self._march(sample, fold, -1.0, ahead[-1][:3] if len(ahead) > RING else fold[:3], others)
+        steps = [*back[::-1], fold, *ahead]
+        folds = np.array([*steps, steps[0]] if ring else steps)
         folds[:, :3] = _smoothed(folds[:, :3])
         return folds
 
     def _march(
-        self, sample: int, fold: np.ndarray, sign: float, others: list[np.ndarray]
+        self, sample: int, fold: np.ndarray, sign: float, goal: np.ndarray, others: list[np.ndarray]
     ) -> tuple[list[np.ndarray], bool]:
-        """Folds stride by stride to one side of a first one; whether they came back to it."""
-        start, ahead, at = fold[:3], sign * fold[3:6], fold
+        """Folds stride by stride to one side of a first one; whether they came to the goal, which closes a ring."""
+        ahead, at = sign * fold[3:6], fold
         steps: list[np.ndarray] = []
         known = np.concatenate([np.zeros((0, 3)), *others])
         missed = 0
         while len(steps) < FARTHEST and missed <= MISSED:
-            place = at[:3] + (1 + missed) * STRIDE * self.length * ahead
+            stride = (1 + missed) * STRIDE * self.length
+            place = at[:3] + stride * ahead
             x, y, z = place.tolist()
             sample = walk(self.surface, sample, (x, y, z))
             if np.linalg.norm(self.surface.mean[sample] - place) > OFF_SCAN * self.length:
@@ -139,9 +136,8 @@ class Tracer:
                 continue
             after[3:6] *= np.sign(after[3:6] @ ahead)
             steps.append(after)
-            closes = np.linalg.norm(after[:3] - start) < 0.6 * STRIDE * (1 + missed) * self.length
             at, ahead, missed = after, after[3:6], 0
-            if closes and len(steps) > 6:
+            if len(steps) > RING and np.linalg.norm(at[:3] - goal) < 0.6 * stride:
                 return steps, True
             if len(known) and ((known - at[:3]) ** 2).sum(axis=1).min() < (0.3 * self.length) ** 2:
                 break

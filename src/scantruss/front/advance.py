@@ -29,6 +29,7 @@ from ..kernels.geometry.boxes import new_boxes
 from ..kernels.geometry.triangles import quality
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..kernels.surface.ridges import mean_normal
 from ..runtime.progress import Progress
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
@@ -38,6 +39,7 @@ STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no roo
 GAP = 60  # most segments of a gap that is filled; larger gaps stay open
 CLEAR = 0.6  # least distance of a candidate node from the initial front [member lengths]
 NEARER = 0.33  # the same distance for the position of a fixed node [member lengths]
+BESIDE = 0.6  # how far the sides of a ridge are looked at [member lengths]
 BOX = 2.4  # size of the search boxes of the nodes: as far as one step of the front looks [member lengths]
 BUDGET = 500  # segments advanced between two reports of progress
 
@@ -223,14 +225,24 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
     taken = {(min(pair), max(pair)) for pair in beside}
     chains = []
     divided = chain_places(lines, surface, settings.length, taken)
-    for places, (first, last) in zip(divided, lines.ends.tolist(), strict=True):
+    for places, (first, last), sharp in zip(divided, lines.ends.tolist(), lines.sharp.tolist(), strict=True):
         middle = add_nodes(front, surface, places)
         chain = [at_stop[first], *middle, at_stop[last]] if first >= 0 else [*middle, middle[0]]
         add_half_edges(front, chain)
         chains.append(chain)
+        if sharp:
+            face_both_sides(front, surface, chain, settings.length)
     for node in sorted({node for chain in chains for node in chain}):
         link_around(front, node)
     check_links(front)
+
+
+def face_both_sides(front: lists.Front, surface: Surface, nodes: list[int], length: float) -> None:
+    """Let nodes on a ridge face as the surface does on all of its sides together: a patch there follows one of them only."""
+    for node in nodes:
+        x, y, z = front.nodes[node].tolist()
+        reach = BESIDE * length * float(surface.field[front.sample[node]])
+        front.normals[node] = mean_normal(surface, int(front.sample[node]), (x, y, z), reach)[0]
 
 
 def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
