@@ -11,7 +11,9 @@ from ..boundary.find import Boundary, with_line_ends
 from .fixed_lines import add_polylines
 from .fixed_nodes import check_positions
 from .network import NO_LINES, Lines, Network
+from .ridge_ends import Ridge
 from .ridges import add_ridges, find_ridges
+from .ridges_at_boundary import with_ridge_ends
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -50,15 +52,23 @@ def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Sett
         leaves the scan.
     """
     positions = check_positions(settings.fixed, samples, settings.length)
-    lines = find_lines(samples, boundary, settings)
+    ridges = ridges_that_are_kept(samples, settings)
+    boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
+    lines = find_lines(samples, boundary, ridges, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
     return Boundary(ended), Constraints(positions, lines)
 
 
-def find_lines(samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Lines:
-    """Return the fixed lines and the ridges of a scan, each a curve that becomes a chain of members."""
+def ridges_that_are_kept(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+    """Return the ridges that the grid is to follow; see `ridges.find_ridges`."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
-    ridges = find_ridges(samples, settings) if wanted else []
+    return find_ridges(samples, settings) if wanted else []
+
+
+def find_lines(
+    samples: SurfaceSamples, boundary: Boundary, ridges: list[Ridge], settings: Settings
+) -> Lines:
+    """Return the fixed lines and the ridges of a scan, each a curve that becomes a chain of members."""
     if not settings.fixed_lines and not ridges:
         return NO_LINES
     network = Network([(loop.points, loop.corner_at) for loop in boundary.loops], settings.length)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,28 @@ BETWEEN = 0.6  # least length of any other [member lengths]
 
 
 @dataclass(frozen=True, eq=False)
+class Ridge:
+    """A line along which the scan is folded."""
+
+    places: np.ndarray  #: (K, 3) along it; the first of a ring is not repeated
+    sharp: bool  #: folded by the full angle; False: by less, it counts only beside others
+    ring: bool = False
+
+    def moved(self, places: np.ndarray) -> Ridge:
+        """The same ridge in other places (K, 3)."""
+        return replace(self, places=places)
+
+    def distance(self, place: np.ndarray) -> float:
+        """Distance of a place from the places along the ridge."""
+        return float(np.linalg.norm(self.places - place, axis=1).min())
+
+    def is_near(self, places: np.ndarray, reach: float) -> bool:
+        """Whether an end lies within some distance of one of the places (M, 3)."""
+        ends = self.places[[0, -1]]
+        return bool((np.linalg.norm(places[:, None] - ends, axis=2).min(axis=0) < reach).any())
+
+
+@dataclass(frozen=True, eq=False)
 class End:
     """An end of a ridge."""
 
@@ -30,38 +52,36 @@ class End:
     ahead: np.ndarray  #: (3,) unit vector in which the ridge would go on
 
 
-def join_ends(ridges: list[np.ndarray], length: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Lead the ends of ridges together.
+def join_ends(traced: list[Ridge], length: float) -> list[Ridge]:
+    """Return ridges with their ends led together, as they were traced before; those too short to be ridges by themselves are left out.
 
     Parameters
     ----------
-    ridges : (K, 3) places along each; the last of a ring is its first
+    traced : ridges; the last place of a ring is its first
     length : desired member length
-
-    Returns
-    -------
-    open ridges, without those too short to be ridges by themselves, and rings, whose first place is not repeated
     """
-    bridged = _bridged([line for line in ridges if not _is_ring(line)], length)
-    rings = [line[:-1] for line in ridges if _is_ring(line)] + [line for line in bridged if _closes(line, length)]
-    lines = [line for line in bridged if not _closes(line, length)]
-    lines = [line[BLURRED:-BLURRED] if len(line) > 2 * BLURRED + 2 else line for line in lines]
+    ridges = _bridged([ridge for ridge in traced if not _is_ring(ridge.places)], length)
+    rings = [ridge.moved(ridge.places[:-1]) for ridge in traced if _is_ring(ridge.places)]
+    rings = [replace(ridge, ring=True) for ridge in rings + [each for each in ridges if _closes(each.places, length)]]
+    ridges = [ridge for ridge in ridges if not _closes(ridge.places, length)]
+    lines = [line[BLURRED:-BLURRED] if len(line) > 2 * BLURRED + 2 else line for line in (r.places for r in ridges)]
     ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
     led = _corners(ends, length)
     for end in ends:
         if (end.line, end.at) not in led:
-            others = [line for k, line in enumerate(lines) if k != end.line] + rings
+            others = [line for k, line in enumerate(lines) if k != end.line] + [ring.places for ring in rings]
             foot = _foot(end, others, list(led.values()), length)
             if foot is not None:
                 led[end.line, end.at] = foot
-    found = []
-    for i, line in enumerate(lines):
+    found = rings
+    for i, ridge in enumerate(ridges):
         first, last = led.get((i, 0)), led.get((i, -1))
+        line = lines[i] if first is not None or last is not None else ridge.places
         line = _led(_led(line, last)[::-1], first)[::-1]
         least = BETWEEN if first is not None and last is not None else FREE
         if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() >= least * length:
-            found.append(line)
-    return found, rings
+            found.append(ridge.moved(line))
+    return found
 
 
 def _is_ring(line: np.ndarray) -> bool:
@@ -85,16 +105,17 @@ def end_of(line: np.ndarray, number: int, at: int) -> End:
     return End(number, at, line[at], ahead / max(float(np.linalg.norm(ahead)), 1e-300))
 
 
-def _bridged(ridges: list[np.ndarray], length: float) -> list[np.ndarray]:
+def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:
     """Join ridges whose ends face each other, over the smallest gap first; each turn leaves one ridge fewer."""
-    lines = list(ridges)
-    while (pair := _facing(lines, length)) is not None:
+    found = list(ridges)
+    while (pair := _facing([ridge.places for ridge in found], length)) is not None:
         one, two = pair
-        first = lines[one.line] if one.at == -1 else lines[one.line][::-1]
-        second = lines[two.line] if two.at == 0 else lines[two.line][::-1]
-        rest = [line for k, line in enumerate(lines) if k not in (one.line, two.line)]
-        lines = [*rest, np.concatenate([first, second])]
-    return lines
+        first, second = found[one.line], found[two.line]
+        before = first.places if one.at == -1 else first.places[::-1]
+        after = second.places if two.at == 0 else second.places[::-1]
+        rest = [ridge for k, ridge in enumerate(found) if k not in (one.line, two.line)]
+        found = [*rest, Ridge(np.concatenate([before, after]), first.sharp or second.sharp)]
+    return found
 
 
 def _facing(lines: list[np.ndarray], length: float) -> tuple[End, End] | None:

@@ -23,6 +23,8 @@ from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, sub
 from ..surface.local_surface import Surface, linked
 from .front import NODES, Front, edge_exists
 
+FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, in lengths
+FACES = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET = 0.45  # what is farther from a triangle than this is another sheet, in lengths
 
 
@@ -192,9 +194,13 @@ def clear_of_front(
             e = front.head[t]
             if t != s and q != p and e != p:
                 pe = row(front.nodes, e)
-                if q != a and e != a and lines_cross(pa, pp, pq, pe, SHEET * length):
+                # a line in a fold lies deep below a triangle that bridges it, and faces as that does
+                faces = min(dot(normal, row(front.normals, q)), dot(normal, row(front.normals, e)))
+                bridged = front.on_boundary[q] and front.on_boundary[e] and faces > FACES
+                apart = (FOLD if bridged else SHEET) * length
+                if q != a and e != a and lines_cross(pa, pp, pq, pe, apart):
                     return False
-                if q != b and e != b and lines_cross(pb, pp, pq, pe, SHEET * length):
+                if q != b and e != b and lines_cross(pb, pp, pq, pe, apart):
                     return False
             t = front.out_next[t]
     return True

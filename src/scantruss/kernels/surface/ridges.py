@@ -2,9 +2,10 @@
 
 Heights over the plane of the mean normal are a quadric and a fold along a line in that plane. With u across the line and t along it
 
-    h = k0 + k1 t + k2 t^2 + k3 u + k4 u^2 + k5 u t + k6 |u| + k7 u |u|
+    h = k0 + k1 t + k2 t^2 + k3 u + k4 u^2 + k5 u t + k6 s + k7 u s,   s = sqrt(u^2 + w^2)
 
-so both sides are quadrics that meet at u = 0, and the slope jumps there by 2 k6. A smooth surface has u^3 in place of the last two.
+so both sides are quadrics that meet at u = 0. A sharp fold has w = 0 and its slope jumps there by 2 k6; a rounded one turns by that over
+a width of some 2 w. A smooth surface has u^3 in place of the last two.
 """
 
 from __future__ import annotations
@@ -20,11 +21,16 @@ from .local_surface import Surface, flood, gather_points, walk
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
 TERMS = 8
-FOUND = (
-    9  # numbers that `fit_fold` writes: place, direction, angle of the jump, gain over a smooth surface, rms distance
-)
+# what `fit_fold` writes: place (0:3) and direction (3:6), angle by which the fold turns within a member [radian], gain over a smooth
+# surface (F statistic), rms distance of the points [scan unit]
+BEND, GAIN, OFF, FOUND = 6, 7, 8, 9
+ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
+FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
 FOLD_FITS = 3
+NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
+MIDDLE = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
+FEWEST_OF_FLANK = 6  # fewest points of a side
 POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
 
 
@@ -78,11 +84,13 @@ def fold_error(
     shift: float,
     radius: float,
     folded: bool,
+    rounding: float,
     matrix: np.ndarray,
 ) -> float:
     """Weighted sum of squared distances of the points from the best folded (or smooth) surface; its terms into the last column.
 
-    frame : across, along, normal; shift : place of the line across [radius]. Lengths count in radii. Infinite where none fits.
+    frame : across, along, normal; shift : place of the line across [radius]; rounding : w [radius]. Lengths count in radii. Infinite
+    where none fits.
     """
     c, e, n = frame
     term = np.empty(TERMS + 1)
@@ -91,7 +99,7 @@ def fold_error(
     for i in range(taken):
         d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
         u, t, h = dot(d, c) / radius - shift, dot(d, e) / radius, dot(d, n) / radius
-        size = abs(u)
+        size = math.sqrt(u * u + rounding * rounding)
         term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, t, t * t, u, u * u, u * t
         term[6], term[7] = (size, u * size) if folded else (u * u * u, 0.0)
         term[TERMS] = h
@@ -115,10 +123,67 @@ def fold_error(
 
 
 @kernel
-def jump_of(matrix: np.ndarray) -> float:
-    """Angle between the two sides of a folded surface where they meet [radian]."""
-    slope, jump = matrix[3, TERMS], matrix[6, TERMS]
+def jump_of(matrix: np.ndarray, rounding: float, reach: float) -> float:
+    """Angle by which a fold turns from `reach` before its line to as far behind it, the bend of the sides aside [radian]."""
+    slope, jump = matrix[3, TERMS], matrix[6, TERMS] * reach / math.sqrt(reach * reach + rounding * rounding)
     return abs(math.atan(slope + jump) - math.atan(slope - jump))
+
+
+@kernel
+def flank(
+    buffer: np.ndarray,
+    taken: int,
+    frame: tuple[Vector, Vector, Vector],
+    crest: tuple[float, float],
+    radius: float,
+    side: float,
+) -> tuple[float, float, bool]:
+    """Direction of one side (1 or -1) of a fold in the plane across it and how much it bends [radian]; whether it can be told.
+
+    crest : place of the line across and its height [radius]. Taken are the points between NEAR and 1 radius from it.
+    """
+    c, e, n = frame
+    term = np.empty(4)
+    across, up = np.zeros((4, 5)), np.zeros((4, 5))
+    points = 0
+    for i in range(taken):
+        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        u, h = side * (dot(d, c) / radius - crest[0]), dot(d, n) / radius - crest[1]
+        s = math.sqrt(u * u + h * h)
+        if u > 0.0 and NEAR < s < 1.0:
+            points += 1
+            s -= MIDDLE
+            term[0], term[1], term[2], term[3] = 1.0, s, s * s, dot(d, e) / radius
+            for r in range(4):
+                for k in range(4):
+                    across[r, k] += buffer[i, WEIGHT] * term[r] * term[k]
+                across[r, 4] += buffer[i, WEIGHT] * term[r] * u
+                up[r, 4] += buffer[i, WEIGHT] * term[r] * h
+    for r in range(4):
+        across[r, r] += 1e-9 * across[0, 0]
+        for k in range(4):
+            up[r, k] = across[r, k]
+    if points < FEWEST_OF_FLANK or not solve(across, 4) or not solve(up, 4):
+        return 0.0, 0.0, False
+    half = 1.0 - MIDDLE
+    outer = math.atan2(up[1, 4] + 2.0 * half * up[2, 4], across[1, 4] + 2.0 * half * across[2, 4])
+    inner = math.atan2(up[1, 4] - 2.0 * half * up[2, 4], across[1, 4] - 2.0 * half * across[2, 4])
+    return math.atan2(up[1, 4], across[1, 4]), outer - inner, True
+
+
+@kernel
+def bend_of(
+    buffer: np.ndarray, taken: int, frame: tuple[Vector, Vector, Vector], crest: tuple[float, float], radius: float
+) -> float:
+    """Angle between both sides of a fold, less what they would turn if they bent on as they do themselves [radian]."""
+    left, left_bend, fits_left = flank(buffer, taken, frame, crest, radius, -1.0)
+    right, right_bend, fits_right = flank(buffer, taken, frame, crest, radius, 1.0)
+    if not (fits_left and fits_right):
+        return 0.0
+    turn, own = left + right, 0.5 * (left_bend + right_bend)
+    if turn < 0.0:
+        turn, own = -turn, -own
+    return max(turn - max(own, 0.0) * MIDDLE / (1.0 - MIDDLE), 0.0)
 
 
 @kernel
@@ -132,12 +197,13 @@ def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer
         return False
     matrix = np.empty((TERMS, TERMS + 1))
     frame = turned_frame(c, n, 0.0)
-    error, jump = np.inf, 0.0
+    error, bend = np.inf, 0.0
+    rounding, reach = FIRST_ROUNDING * surface.length / radius, 0.5 * surface.length / radius
     for j in range(3):
-        found = fold_error(buffer, taken, frame, 0.25 * (j - 1), radius, True, matrix)
+        found = fold_error(buffer, taken, frame, 0.25 * (j - 1), radius, True, rounding, matrix)
         if found < error:
-            error, jump = found, jump_of(matrix)
-    return jump >= least
+            error, bend = found, jump_of(matrix, rounding, reach)
+    return bend >= least
 
 
 @kernel
@@ -164,14 +230,32 @@ def keep_folded(
 
 
 @kernel
+def best_rounding(
+    buffer: np.ndarray,
+    taken: int,
+    frame: tuple[Vector, Vector, Vector],
+    shift: float,
+    radius: float,
+    length: float,
+    matrix: np.ndarray,
+) -> tuple[float, float]:
+    """Least error of the folds of all roundings along a line, and that rounding [radius]."""
+    least, best = np.inf, 0.0
+    for w in ROUNDINGS:
+        error = fold_error(buffer, taken, frame, shift, radius, True, w * length / radius, matrix)
+        if error < least:
+            least, best = error, w * length / radius
+    return least, best
+
+
+@kernel
 def fit_fold(
     surface: Surface, sample: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, found: np.ndarray
 ) -> bool:
     """Fit a folded surface around a place; False where there are too few points.
 
     towards : direction of the ridge near by, (0, 0, 0) where it is not known
-    found : (FOUND,), filled: place on the ridge, its direction, angle of the jump [radian], by how much the fold fits better than a
-        smooth surface (as an F statistic), rms distance of the points [scan unit]
+    found : (FOUND,), filled
     """
     sample = walk(surface, sample, place)
     n, c = mean_normal(surface, sample, place, radius)
@@ -185,32 +269,36 @@ def fit_fold(
     angle = shift = 0.0
     reach, swing = 0.4, 0.35
     least = np.inf
-    for _ in range(FOLD_FITS):
+    rounding = FIRST_ROUNDING * surface.length / radius
+    for turn in range(FOLD_FITS):
+        if turn == FOLD_FITS - 1 and least < np.inf:
+            least, rounding = best_rounding(buffer, taken, turned_frame(c, n, angle), shift, radius, surface.length, matrix)
         at_angle, at_shift = angle, shift
         for i in range(TURNS):
             for j in range(SHIFTS):
                 a = at_angle + swing * (2.0 * i / (TURNS - 1) - 1.0)
                 b = at_shift + reach * (2.0 * j / (SHIFTS - 1) - 1.0)
                 frame = turned_frame(c, n, a)
-                error = fold_error(buffer, taken, frame, b, radius, True, matrix)
+                error = fold_error(buffer, taken, frame, b, radius, True, rounding, matrix)
                 if error < least:
                     least, angle, shift = error, a, b
         reach, swing = 0.4 * reach, 0.4 * swing
     if least == np.inf:
         return False
     frame = turned_frame(c, n, angle)
-    smooth = fold_error(buffer, taken, frame, shift, radius, False, matrix)
-    least = fold_error(buffer, taken, frame, shift, radius, True, matrix)
+    smooth = fold_error(buffer, taken, frame, shift, radius, False, 0.0, matrix)
+    least = fold_error(buffer, taken, frame, shift, radius, True, rounding, matrix)
     total = 0.0
     for i in range(taken):
         total += buffer[i, WEIGHT]
     across, ahead, _ = frame
-    at = along(along(place, shift * radius, across), matrix[0, TERMS] * radius, n)
+    crest = matrix[0, TERMS] + matrix[6, TERMS] * rounding
+    at = along(along(place, shift * radius, across), crest * radius, n)
     found[0], found[1], found[2] = at
     found[3], found[4], found[5] = unit(along(ahead, matrix[1, TERMS], n))
-    found[6] = jump_of(matrix)
-    found[7] = min((smooth - least) * taken / max(least, 1e-12), 1e9)
-    found[8] = radius * math.sqrt(least / max(total, 1e-300))
+    found[GAIN] = min((smooth - least) * taken / max(least, 1e-12), 1e9)
+    found[OFF] = radius * math.sqrt(least / max(total, 1e-300))
+    found[BEND] = bend_of(buffer, taken, frame, (shift, crest), radius)
     return True
 
 

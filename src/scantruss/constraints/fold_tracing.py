@@ -1,0 +1,241 @@
+"""Folds of the scan, fitted place by place and followed along."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.geometry.quadric import COLUMNS
+from ..kernels.mesh.point_location import nearest_sample
+from ..kernels.surface import ridges as kernels
+from ..kernels.surface.local_surface import walk
+from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
+from ..surface.samples import ALL
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
+
+# radii around a place within which folds are fitted, in turn until one fits: the second for rounded folds, then for places near corners
+RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
+FEWEST_SPACINGS = 2.6  # least radius, in distances between points
+FITS = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
+STRIDE = 0.25  # step from place to place along a fold [member lengths]
+TURNS = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
+LIKELY = 0.35  # share of the ridge angle above which a fold is looked at more closely
+WEAK = 0.6  # share of the ridge angle from which a fold is followed
+FADED = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
+BETTER = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
+ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
+LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
+MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
+PATIENCE = 40  # places that look folded and are no ridge, after which the search stops: the scan is rough
+MISSED = 2  # places in a row at which a fold may not be seen and still goes on
+TURNED = 0.94  # least cosine of the turn of a fold from place to place
+RING = 6  # places along the shortest ring
+FARTHEST = 20_000  # most places along a fold
+MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
+OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
+LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
+FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
+BETWEEN = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
+
+
+class Tracer:
+    """Fits folds to a scan and goes along them."""
+
+    def __init__(self, samples: SurfaceSamples, settings: Settings) -> None:
+        self.surface = samples.surface._replace(patch_points=ALL)
+        self.length = settings.length
+        self.angle = float(np.radians(settings.ridge_angle))
+        self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in RADII]
+        self.spacing = samples.spacing
+        self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
+        self.buffer = np.empty((6000, COLUMNS))
+
+    def fold_at(
+        self, sample: int, place: np.ndarray, towards: np.ndarray, radii: list[float] | None = None
+    ) -> np.ndarray | None:
+        """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits."""
+        found, best = np.zeros(FOUND), None
+        x, y, z = place.tolist()
+        a, b, c = towards.tolist()
+        for radius in radii or self.radii:
+            fits = kernels.fit_fold(self.surface, sample, (x, y, z), (a, b, c), radius, self.buffer, found)
+            if fits and found[GAIN] >= BETTER and found[OFF] <= ROUGHEST * self.length:
+                if found[OFF] <= self.fits and found[BEND] >= WEAK * self.angle:
+                    return found
+                if best is None or found[OFF] < best[OFF]:
+                    best = found.copy()
+        return best
+
+    def trace(self) -> list[np.ndarray]:
+        """The folds (K, FOUND) a stride apart along each line of folds that is long and sharp enough to be a ridge."""
+        seeds = self._seeds()
+        fresh = np.ones(len(seeds), bool)
+        places = self.surface.mean[seeds]
+        ridges: list[np.ndarray] = []
+        misses = 0
+        for k, sample in enumerate(seeds.tolist()):
+            if not fresh[k]:
+                continue
+            fold = self.fold_at(sample, places[k], np.zeros(3))
+            misses += 1
+            if misses > PATIENCE:
+                break
+            if (
+                fold is not None
+                and fold[BEND] > WEAK * self.angle
+                and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
+            ):
+                folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
+                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle)]
+                ridges += even
+                misses = 0 if even else misses
+                for place in folds[:, :3]:
+                    fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
+        return ridges
+
+    def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
+        """Whether the scan is folded all along the straight way from one place to another."""
+        ahead = (last - first) / np.linalg.norm(last - first)
+        for share in BETWEEN:
+            place = first + share * (last - first)
+            fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, self.radii[-1:])
+            if fold is None or fold[BEND] < WEAK * self.angle or abs(fold[3:6] @ ahead) < TURNED:
+                return False
+            if np.linalg.norm(fold[:3] - place) > 0.6 * STRIDE * self.length:
+                return False
+        return True
+
+    def onto_scan(self, places: np.ndarray) -> np.ndarray:
+        """Places (K, 3) along a ridge, moved to the scan where the fold is rounded and they lie off it."""
+        above = np.array([self._above(place) for place in places])
+        moved: np.ndarray = places - smoothed(above)
+        return moved
+
+    def _seeds(self) -> np.ndarray:
+        """Samples (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
+        bends = np.empty(len(self.surface.mean))
+        kernels.bends_of_samples(self.surface, bends)
+        likely = np.flatnonzero(bends < np.cos(TURNS * self.angle))
+        likely = likely[np.argsort(bends[likely], kind="stable")[:MOST_SAMPLES]]
+        if not len(likely):
+            return likely
+        note = np.zeros(len(likely), np.int64)
+        least, apart = LIKELY * self.angle, LOOK_SPACING * self.length
+        return likely[: kernels.keep_folded(self.surface, likely, self.radii[0], least, apart, self.buffer, note)]
+
+    def _follow(self, sample: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+        """Go along a fold to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
+        ahead, ring = self._march(sample, fold, 1.0, fold[:3], others)
+        back: list[np.ndarray] = []
+        if not ring:
+            back, ring = self._march(sample, fold, -1.0, ahead[-1][:3] if len(ahead) > RING else fold[:3], others)
+        steps = [*back[::-1], fold, *ahead]
+        folds = np.array([*steps, steps[0]] if ring else steps)
+        folds[:, :3] = smoothed(folds[:, :3])
+        return folds
+
+    def _march(
+        self, sample: int, fold: np.ndarray, sign: float, goal: np.ndarray, others: list[np.ndarray]
+    ) -> tuple[list[np.ndarray], bool]:
+        """Folds stride by stride to one side of a first one; whether they came to the goal, which closes a ring."""
+        ahead, at = sign * fold[3:6], fold
+        steps: list[np.ndarray] = []
+        known = np.concatenate([np.zeros((0, 3)), *others])
+        missed = 0
+        while len(steps) < FARTHEST and missed <= MISSED:
+            stride = (1 + missed) * STRIDE * self.length
+            place = at[:3] + stride * ahead
+            x, y, z = place.tolist()
+            sample = walk(self.surface, sample, (x, y, z))
+            if np.linalg.norm(self.surface.mean[sample] - place) > OFF_SCAN * self.length:
+                break
+            after = self.fold_at(sample, place, ahead)
+            if after is None or not self._goes_on(after, place, ahead):
+                missed += 1
+                continue
+            after[3:6] *= np.sign(after[3:6] @ ahead)
+            steps.append(after)
+            at, ahead, missed = after, after[3:6], 0
+            if len(steps) > RING and np.linalg.norm(at[:3] - goal) < 0.6 * stride:
+                return steps, True
+            if len(known) and ((known - at[:3]) ** 2).sum(axis=1).min() < (MEETS * self.length) ** 2:
+                break
+        return steps, False
+
+    def _goes_on(self, fold: np.ndarray, place: np.ndarray, ahead: np.ndarray) -> bool:
+        """Whether the fold found where a line of folds should go on belongs to it."""
+        return bool(
+            fold[BEND] >= FADED * self.angle
+            and np.linalg.norm(fold[:3] - place) < 0.6 * STRIDE * self.length
+            and abs(fold[3:6] @ ahead) > TURNED
+        )
+
+    def _above(self, place: np.ndarray) -> np.ndarray:
+        """By how much a place on a ridge lies off nine tenths of the points below or above it, (3,)."""
+        x, y, z = place.tolist()
+        sample = nearest_sample(self.surface, x, y, z)
+        *normal, taken = kernels.points_around(self.surface, sample, (x, y, z), self.radii[-1], self.buffer)
+        ahead, away = np.array(normal), self.buffer[:taken, :3]
+        heights = away @ ahead
+        radius = max(LOOK_AROUND * self.length, 2.5 * self.spacing)
+        heights = np.sort(heights[(away**2).sum(axis=1) - heights**2 < radius**2])
+        tenth = len(heights) // 10
+        low, high = (heights[tenth], heights[-1 - tenth]) if len(heights) >= FEWEST_AROUND else (0.0, 0.0)
+        off = -low if low > 0.0 else (-high if high < 0.0 else 0.0)
+        moved: np.ndarray = ahead * (off if abs(off) > self.fits + 0.1 * radius else 0.0)
+        return moved
+
+
+AROUND = 3  # places on both sides from which the turn of a line is taken
+CORNER = 25.0  # by how much a line turns more in a corner than before and after it [degree]
+LONG = 1.0  # least length of a line of folds [member lengths]
+FULL = 0.75  # least length of it with the full angle [member lengths]
+SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+EVEN = 4.0  # median change of the bend from place to place, at most [degree]
+SURE = 30.0  # median gain, at least (F statistic)
+
+
+def parts_of(folds: np.ndarray) -> list[np.ndarray]:
+    """The parts (K, FOUND) of a line of folds between its corners, where its direction turns more than before and after."""
+    count = len(folds)
+    if count < 4 * AROUND:
+        return [folds]
+    ahead = folds[AROUND:, :3] - folds[:-AROUND, :3]
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
+    turn = np.zeros(count)
+    turn[AROUND : count - AROUND] = np.arccos(np.clip((ahead[AROUND:] * ahead[:-AROUND]).sum(axis=1), -1.0, 1.0))
+    usual = np.maximum(np.roll(turn, 2 * AROUND), np.roll(turn, -2 * AROUND))
+    parts, first = [], 0
+    for k in range(AROUND, count - AROUND):
+        if turn[k] - usual[k] > np.radians(CORNER) and turn[k] == turn[k - AROUND : k + AROUND + 1].max():
+            parts.append(folds[first : k + 1])
+            first = k
+    return [*parts, folds[first:]]
+
+
+def is_even(folds: np.ndarray, angle: float) -> bool:
+    """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
+    angles = folds[:, BEND]
+    if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < FULL:
+        return False
+    ahead = np.diff(folds[:, :3], axis=0)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
+    bends = np.cross(ahead[1:], ahead[:-1])
+    uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
+    turns_back = float(np.median(angles)) >= np.radians(SHARPEST)
+    return bool(np.median(folds[:, GAIN]) >= SURE and uneven <= np.radians(EVEN) and not turns_back)
+
+
+def smoothed(places: np.ndarray) -> np.ndarray:
+    """Places (K, 3) along a fold with less of their noise; the ends stay."""
+    smooth = places.copy()
+    for reach in (1, 2):
+        if len(places) > 2 * reach:
+            weights = (reach + 1.0 - np.abs(np.arange(-reach, reach + 1))) / (reach + 1.0) ** 2
+            last = len(places) - 2 * reach
+            smooth[reach : len(places) - reach] = sum(w * places[o : o + last] for o, w in enumerate(weights))
+    return smooth

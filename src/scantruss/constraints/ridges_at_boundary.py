@@ -1,0 +1,81 @@
+"""Where ridges come to the boundary: the end of the scan along the ridge tells the place better than the smoothed boundary does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..boundary.find import Boundary, Loop
+
+if TYPE_CHECKING:
+    from .ridge_ends import Ridge
+    from ..surface.samples import SurfaceSamples
+
+AT_BOUNDARY = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
+TUBE = 0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
+AIM = 3  # places from which the direction at the end of a ridge is taken
+BACK = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
+FORWARD = 2.0  # how far the scan may go on along it [member lengths]
+GAPS = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
+FEWEST = 8  # fewest points from which that is told
+BENT = 1.0  # length over which the boundary is bent to the end of a ridge [member lengths]
+FARTHEST = 0.4  # the boundary is not bent by more than this [member lengths]
+
+
+def with_ridge_ends(
+    boundary: Boundary, ridges: list[Ridge], samples: SurfaceSamples, length: float
+) -> Boundary:
+    """Return the boundary, bent to the places where ridges leave the scan."""
+    loops = list(boundary.loops)
+    for ridge in ridges:
+        for line in () if ridge.ring or not loops else (ridge.places, ridge.places[::-1]):
+            away = [np.linalg.norm(loop.points - line[-1], axis=1).min() for loop in loops]
+            k = int(np.argmin(away))
+            end = scan_end(line, samples, length) if away[k] < AT_BOUNDARY * length else None
+            if end is not None:
+                loops[k] = _bent(loops[k], end, length)
+    return Boundary(tuple(loops))
+
+
+def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:
+    """Return the place (3,) where the scan ends along the continuation of a line (K, 3) beyond its last point; None if that cannot be told."""
+    from_there = line[-1]
+    ahead = from_there - line[max(len(line) - AIM, 0)]
+    size = float(np.linalg.norm(ahead))
+    if size == 0.0:
+        return None
+    ahead /= size
+    surface = samples.surface
+    near = np.flatnonzero(np.linalg.norm(surface.mean - line[-1], axis=1) < (FORWARD + 1.0) * length)
+    parts = [surface.points[surface.start[s] : surface.start[s + 1]] for s in near.tolist()]
+    away = np.concatenate([np.zeros((0, 3)), *parts]) - from_there
+    way = away @ ahead
+    across = np.linalg.norm(away - way[:, None] * ahead, axis=1)
+    radius = max(TUBE * length, 2.0 * samples.spacing)
+    way = np.sort(way[(across < radius) & (way > -BACK * length) & (way < FORWARD * length)])
+    if len(way) < FEWEST:
+        return None
+    usual = float(np.median(np.diff(way)))
+    gaps = np.flatnonzero(np.diff(way) > max(GAPS * usual, samples.spacing))
+    last = way[gaps[0]] if len(gaps) else way[-1]
+    found: np.ndarray = from_there + (last + 0.5 * usual) * ahead
+    return found
+
+
+def _bent(loop: Loop, end: np.ndarray, length: float) -> Loop:
+    """A loop led through a place beside it, which bends the points within some distance along it; as it was if the place is too far off."""
+    points = loop.points
+    away = np.linalg.norm(points - end, axis=1)
+    corners = loop.corner_at
+    at = int(away.argmin())
+    if len(corners) and away[corners].min() < FARTHEST * length:
+        at = int(corners[away[corners].argmin()])
+    if away[at] > FARTHEST * length:
+        return loop
+    steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    arc = np.abs(np.concatenate([[0.0], np.cumsum(steps)[:-1]]) - np.sum(steps[:at]))
+    arc = np.minimum(arc, steps.sum() - arc)
+    share = np.clip(1.0 - arc / (BENT * length), 0.0, 1.0)
+    return replace(loop, points=points + share[:, None] * (end - points[at]))
