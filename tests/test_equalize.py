@@ -9,7 +9,7 @@ from marks import compiled_only
 from rough import curve_of, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve.equalize import (
-    LAST_STRIDE,
+    LAST_RELAXATION,
     PRICE,
     WEIGHT,
     equalize,
@@ -24,6 +24,7 @@ from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search
 from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
 from scantruss.kernels.mesh.trial import total_energy
+from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 
 MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
 
@@ -273,7 +274,7 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
         assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
 
 
-@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
+@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.PATCH_REACH - 0.01, False)])
 def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
     rough = rough_disc()
     mesh, length = rough.mesh(), rough.settings.length
@@ -281,14 +282,15 @@ def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, m
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[7])
     settle(mesh, WEIGHT, 1e-5, 60)
     rest = net.nodes[v].copy()
-    normal, along = mesh.patches[v, 3:6].copy(), mesh.patches[v, 6:9].copy()
+    normal = mesh.patches[v, NORMAL : NORMAL + 3].copy()
+    along = mesh.patches[v, TANGENT : TANGENT + 3].copy()
     net.nodes[v] = rest + 0.6 * length * along  # it wants to go back, against `along`
-    mesh.patches[v, 0:3] = net.nodes[v] + away * length * along
-    mesh.patches[v, 9:15] = 0.0
+    mesh.patches[v, CENTRE : CENTRE + 3] = net.nodes[v] + away * length * along
+    mesh.patches[v, HEIGHTS : HEIGHTS + 6] = 0.0
     place = net.nodes[v].copy()
-    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, WEIGHT, 1e-6, kernels.STRIDE)
+    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, WEIGHT, 1e-6, kernels.RELAXATION)
     assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
-    assert np.linalg.norm(net.nodes[v] - mesh.patches[v, 0:3]) <= kernels.LEASH * length
+    assert np.linalg.norm(net.nodes[v] - mesh.patches[v, CENTRE : CENTRE + 3]) <= kernels.PATCH_REACH * length
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
 
 
@@ -300,6 +302,6 @@ def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
         settle(mesh, WEIGHT, 0.0, sweeps, stride)
         return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, WEIGHT)[0]
 
-    plain, long = energy_after(36, kernels.STRIDE), energy_after(18, LAST_STRIDE)
+    plain, long = energy_after(36, kernels.RELAXATION), energy_after(18, LAST_RELAXATION)
     assert long < plain * 1.001
     assert long < energy_after(18, 1.0)

@@ -147,7 +147,7 @@ def test_an_area_that_reaches_out_of_bounds_is_told(settled):
     around = area.around[: area.gathered[0]].copy()
     for out in around[:: max(len(around) // 5, 1)].tolist():
         area.out[out] = 1
-        assert kernels.list_area(net, mesh.patches, area, first) == kernels.BEYOND
+        assert kernels.list_area(net, mesh.patches, area, first) == kernels.OUT_OF_BOUNDS
         area.out[out] = 0
     assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
 

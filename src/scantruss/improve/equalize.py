@@ -17,7 +17,7 @@ import numpy as np
 
 from ..grid.grid import Grid
 from ..grid.quality import shape_qualities
-from ..kernels.mesh.equalize import STRIDE, settle_some
+from ..kernels.mesh.equalize import RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
 from ..kernels.mesh.partition import BETWEEN
@@ -31,7 +31,7 @@ WEIGHT = 1.0  # weight of the member lengths against the shapes of the triangles
 # that weight in the last sweeps, when the topology is final, for each `prefer`
 EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
 LAST_SWEEPS = (12, 6)  # most sweeps of each of the last rounds; patches are fitted anew before each round
-LAST_STRIDE = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
+LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
 PRICE = 24.0  # energy per node of a mean length that is off the desired one, for the square of the relative error
 USUAL_ENERGY = 0.1  # largest energy per node that any node is assumed to have
 SEARCHES = 6  # most rounds of the local search
@@ -82,7 +82,7 @@ def settle(
     weight: float,
     enough: float,
     sweeps: int,
-    stride: float = STRIDE,
+    stride: float = RELAXATION,
     independent_sets: list[np.ndarray] | None = None,
 ) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made.
@@ -187,5 +187,5 @@ def finish(mesh: WorkingMesh, prefer: str = "balance") -> None:
     independent_sets = independent_sets_of(mesh.net)
     for sweeps in LAST_SWEEPS:
         mesh.renew(NEAR_IN_THE_END)
-        settle(mesh, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE, independent_sets)
+        settle(mesh, EVEN[prefer], 1e-5, sweeps, LAST_RELAXATION, independent_sets)
     mesh.return_to_scan(NEAR_IN_THE_END)

@@ -10,6 +10,7 @@ from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import ON_CURVE, REST, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch, total_energy
+from ..kernels.surface.local_surface import NEAREST_SAMPLE
 from ..surface.samples import local_field
 from .equalize import FARTHEST_ON_THE_WAY, WEIGHT, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
@@ -134,7 +135,7 @@ def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.n
     if b >= 0:
         a, v = v, split(net, v, b)
         mesh.patches[v] = mesh.patches[a]
-        mesh.patches[v, 15] = nearest_sample(mesh.surface, *place.tolist())
+        mesh.patches[v, NEAREST_SAMPLE] = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(mesh, v, place)
     around = {v}

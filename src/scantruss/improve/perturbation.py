@@ -7,7 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from ..kernels.mesh.grid import Net
-from ..kernels.mesh.perturbation import ALLOWANCE_SEARCHED, ALLOWANCE_SETTLED, KEPT, MOST_NODES, Area, perturb_all
+from ..kernels.mesh.perturbation import (
+    ALLOWANCE_SEARCHED,
+    ALLOWANCE_SETTLED,
+    MOST_NODES,
+    SAVED_FREE_NODES,
+    Area,
+    perturb_all,
+)
 from ..kernels.mesh.trial import Scratch
 from .equalize import FARTHEST_ON_THE_WAY, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
 from .partition import Partition
@@ -39,7 +46,7 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
         desired=np.zeros(MOST_NODES),
         ring=np.zeros((MOST_NODES, width), np.int64),
         patches=np.zeros((MOST_NODES, mesh.patches.shape[1])),
-        free=np.zeros(KEPT, np.int64),
+        free=np.zeros(SAVED_FREE_NODES, np.int64),
         **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
         seed=np.array([7919 * number]),
     )

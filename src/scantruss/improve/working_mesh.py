@@ -15,7 +15,7 @@ from ..kernels.mesh import grid as kernels
 from ..kernels.mesh import point_location
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, REST, Net
 from ..kernels.mesh.projection import project_nodes
-from ..kernels.surface.local_surface import PATCH, Surface
+from ..kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, Surface
 from ..runtime.parallel import in_parts
 from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
@@ -214,7 +214,7 @@ class WorkingMesh:
 
     def name_distances(self, measured: int) -> None:
         """Forget the distance from the scan of nodes over closed holes, whose sample is none of the first `measured`."""
-        self.projection_distance[self.patches[:, 15] >= measured] = np.nan
+        self.projection_distance[self.patches[:, NEAREST_SAMPLE] >= measured] = np.nan
 
     def _scratch(self, part: int) -> Surface:
         """The scan for one of several threads."""

@@ -117,7 +117,7 @@ def measured_bends(surface: Surface, most: float) -> np.ndarray:
     samples = np.flatnonzero(chosen)
     low, high, best = np.zeros(len(samples)), np.full(len(samples), np.inf), np.zeros(len(samples))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt = _bends(surface, samples, most**share).T
+        bend, doubt = _curvatures(surface, samples, most**share)
         low, high = np.maximum(low, bend - NOISE_DEVIATIONS * doubt), np.minimum(high, bend + NOISE_DEVIATIONS * doubt)
         best = np.where(low <= high, np.maximum(bend - NOISE_DEVIATIONS * doubt, 0.0), best)
     bends = np.zeros(len(chosen))
@@ -127,20 +127,20 @@ def measured_bends(surface: Surface, most: float) -> np.ndarray:
     return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one sample alone is noise
 
 
-def _bends(surface: Surface, samples: np.ndarray, wider: float) -> np.ndarray:
-    """Curvature and its doubt at some samples, (P, 2) [1 / scan unit], by patches so many times wider."""
+def _curvatures(surface: Surface, samples: np.ndarray, wider: float) -> tuple[np.ndarray, np.ndarray]:
+    """Curvature at some samples and its standard deviation, (P,) each [1 / scan unit], by patches so many times wider."""
     from .scratch import with_own_scratch
 
     scaled = surface._replace(
         patch_radius=surface.patch_radius * wider, patch_points=max(surface.patch_points / wider**2, 1.0)
     )
-    found = np.empty((len(samples), 2))
+    found, deviations = np.empty(len(samples)), np.empty(len(samples))
 
     def measure_part(part: int, begin: int, end: int) -> None:
-        kernels.measure_bends(with_own_scratch(scaled), samples, found, begin, end)
+        kernels.measure_curvatures(with_own_scratch(scaled), samples, found, deviations, begin, end)
 
     in_parts(len(samples), SAMPLES_PER_THREAD, measure_part)
-    return found
+    return found, deviations
 
 
 def _spread(neighbors: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Nodes that are there before the front starts: those it starts from, and others offered to it, which it comes to as to its own."""
+"""Nodes that exist before the front starts: those it starts from, and candidate nodes that it may use like its own."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..geometry.boxes import search
 from ..geometry.triangles import distance_to_segment
 from ..geometry.vectors import dot, norm, row, subtract
 from ..mesh.point_location import nearest_sample
-from ..surface.local_surface import PATCH, Surface, fit_patch, patch_normal, walk
+from ..surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch, patch_normal, walk
 from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
 class CandidateNodes(NamedTuple):
-    """Nodes of the rows that the scan is laid out in, for the front to come to."""
+    """Nodes of the position field that the front may use."""
 
     places: np.ndarray  #: (K, 3)
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
     samples: np.ndarray  #: (K,) int64 a sample near each
-    length: float
+    length: float  #: member length of the position field [scan unit]
 
 
 @kernel
 def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
-    """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
+    """Add nodes (K, 3) of the boundary or of lines, most of them near the one before; returns the number of the first."""
     patch = np.zeros(PATCH)
     first, sample = front.count[NODES], -1
     for i in range(len(nodes)):
@@ -36,14 +36,14 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
         if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > 2.0 * surface.step:
             sample = nearest_sample(surface, place[0], place[1], place[2])
         fit_patch(surface, patch, sample, place)
-        propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)
+        propose_node(front, place, patch_normal(patch, place), int(patch[NEAREST_SAMPLE]), True)
         add_node(front)
     return first
 
 
 @kernel
 def add_candidate_nodes(front: Front, surface: Surface, candidates: CandidateNodes, clear: float) -> None:
-    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
+    """Add the candidate nodes that are farther than `clear` from all front segments on their side of the surface."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     begun = front.count[NODES]
     for i in range(len(candidates.places)):

@@ -12,7 +12,7 @@ from ..geometry.vectors import norm, row, subtract
 
 @kernel
 def put_places(boxes: SearchBoxes, places: np.ndarray) -> None:
-    """Put all places (P, 3) into empty boxes with room for them."""
+    """Put all places (P, 3) into search boxes that are empty and have room for them."""
     for p in range(len(places)):
         put(boxes, p, places[p, 0], places[p, 1], places[p, 2])
 
@@ -21,7 +21,7 @@ def put_places(boxes: SearchBoxes, places: np.ndarray) -> None:
 def lower_distances(
     places: np.ndarray, boxes: SearchBoxes, nodes: np.ndarray, triangles: np.ndarray, reach: float, distance: np.ndarray
 ) -> None:
-    """Lower the distance (P,) of each place to that of the nearest triangle, where that is at most `reach`.
+    """Lower the distance (P,) of each place to that from the nearest triangle, if that is at most `reach`.
 
     boxes : the places (P, 3) by box.
     """
@@ -47,9 +47,9 @@ def lower_distances(
 def nearest_distances(
     others: np.ndarray, places: np.ndarray, boxes: SearchBoxes, near: float, distance: np.ndarray
 ) -> None:
-    """Distance (Q,) of each of the others (Q, 3) to the nearest place; the search starts with `near` and goes on to twice as far.
+    """Fill in the distance (Q,) of each of the others (Q, 3) from the nearest place; the search radius is doubled from `near` on.
 
-    boxes : the places (P, 3) by box, one at least.
+    boxes : the places (P, 3) by box, at least one.
     """
     for q in range(len(others)):
         x, y, z = row(others, q)
