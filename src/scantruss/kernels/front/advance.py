@@ -1,4 +1,4 @@
-"""Choosing the triangle of a segment, and advancing the front (Sec. 3.4, 3.5, Fig. 4)."""
+"""Choosing the triangle of a segment and driving the front (Sec. 3.4, 3.5, Fig. 4)."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from .front import (
     rules_at,
 )
 
-GOOD_ENOUGH = 0.8  # share of the best possible quality above which an existing node is taken and no new one is sought
+GOOD_ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
 
 
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
-    """Ideal point of a segment: the angles at both its ends are divided into equal parts near 60 degrees."""
+    """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
@@ -55,7 +55,7 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
 
 @kernel
 def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
-    """Propose a node at the foot of a place on the surface; False if the scan has no points there."""
+    """Propose a node where a place falls onto the surface; False where the scan has no points there."""
     sample = front.sample[front.tail[s]]
     if fit_patch(surface, patch, sample, place) < 3:
         return False
@@ -71,7 +71,7 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
 def choose_by_quality(
     surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray
 ) -> bool:
-    """Attach the best triangle that fits, with the end of a neighbouring segment, another node nearby or a new one; False if none fits."""
+    """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
     length, strict = rules.length, rules.strict
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
@@ -99,7 +99,7 @@ def choose_by_quality(
             if front.out[q] >= 0:
                 score[i] = 0.9 * value
             elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
-                score[i] = 0.95 * value  # a candidate node that the front has not reached yet
+                score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
     enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = False
     while True:
@@ -128,7 +128,7 @@ def choose_by_quality(
 
 @kernel
 def has_room(front: Front) -> bool:
-    """Whether the arrays have room for what advancing one segment may add."""
+    """Whether the arrays hold what advancing one segment may add."""
     return (
         front.count[NODES] + 2 <= len(front.nodes)
         and front.count[SEGMENTS] + 4 <= len(front.tail)
@@ -139,7 +139,7 @@ def has_room(front: Front) -> bool:
 
 @kernel
 def take_segment(front: Front) -> int:
-    """Next active segment of the queue, -1 if it is empty."""
+    """Next active segment of the queue, -1 where it is empty."""
     while front.count[FIRST] < front.count[LAST]:
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1
@@ -150,7 +150,7 @@ def take_segment(front: Front) -> int:
 
 @kernel
 def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Rules:
-    """The settings with the length that is desired where the triangle of a segment will lie."""
+    """The rules with the length that is desired where the triangle of a segment will lie."""
     if not rules.graded:
         return rules
     a, b = front.tail[s], front.head[s]
@@ -163,7 +163,7 @@ def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Ru
 
 @kernel
 def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
-    """Advance segments by quality until none is left (DONE), `budget` of them are advanced (MORE) or an array is full (FULL)."""
+    """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):
@@ -180,7 +180,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 
 @kernel
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
-    """The same by the six cases of Table 1; apart from `advance`, so that only the method `paper` compiles it."""
+    """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):

@@ -1,4 +1,4 @@
-"""Nodes that exist before the front starts: those it starts from, and candidate nodes that it may use like its own."""
+"""Nodes that are there before the front starts: those it starts from, and others offered to it, which it comes to as to its own."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
 class CandidateNodes(NamedTuple):
-    """Nodes of the position field that the front may use."""
+    """Nodes of the rows that the scan is laid out in, for the front to come to."""
 
     places: np.ndarray  #: (K, 3)
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
     samples: np.ndarray  #: (K,) int64 a sample near each
-    length: float  #: member length of the position field [scan unit]
+    length: float
 
 
 @kernel
 def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
-    """Add nodes (K, 3) of the boundary or of lines, most of them near the one before; returns the number of the first."""
+    """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
     patch = np.zeros(PATCH)
     first, sample = front.count[NODES], -1
     for i in range(len(nodes)):
@@ -43,7 +43,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
 
 @kernel
 def add_candidate_nodes(front: Front, surface: Surface, candidates: CandidateNodes, clear: float) -> None:
-    """Add the candidate nodes that are farther than `clear` from all front segments on their side of the surface."""
+    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     begun = front.count[NODES]
     for i in range(len(candidates.places)):

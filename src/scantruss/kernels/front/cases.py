@@ -27,28 +27,28 @@ from .front import (
     remove_segment,
 )
 
-# The paper leaves open how strict the tests of a triangle are.
-STRICTNESS_OF_CASES = 0.7  # strictness of the tests of a triangle that a case asks for, from 0 to 1
-LEAST_SHAPE_OF_MERGED = 0.4  # least shape quality of the triangle that two merged nodes make
-LEAST_SHAPE_OF_FAN = 0.35  # least shape quality that merging may leave a finished triangle
-LEAST_ALIGNMENT = 0.5  # least cosine between the normals of a triangle and of the surface at its nodes
-FARTHEST_MERGED = 0.9  # largest distance of free nodes that are merged [member lengths]
-LEAST_QUALITY = 0.3  # least quality delta of a triangle with an existing node
-SEARCH_REACH = 2.4  # distance from a segment up to which nodes are looked at [member lengths]
-CANDIDATE_REACH = 0.45  # least distance of a new node from a node that the front has not reached yet [member lengths]
+# What the paper leaves open: how strict the tests are by which a triangle is found fit.
+TOLERANT = 0.7  # strictness of the tests for a triangle that a case asks for, from 0 to 1
+SOUND = 0.4  # shape quality below which the triangle of two merged nodes is too flat
+KEPT_SOUND = 0.35  # shape quality below which merging would leave a finished triangle too flat
+ALIGNED = 0.5  # cosine of the angle between a triangle and the surface at its nodes, below which it stands up from it
+MERGED = 0.9  # free nodes farther apart than this are not merged [lengths]
+LEAST = 0.3  # quality delta below which no triangle with an existing node is made
+SEEN = 2.4  # how far the nodes of the front are looked at around a segment [lengths]
+APART = 0.45  # least distance of a new node from a node that the front has not come to yet [lengths]
 
-TRIANGLE, QUADRANGLE, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # the cases of Table 1
+TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
 
 
 @kernel
 def case_of(front: Front, s: int, alpha: float, beta: float, limit: float) -> int:
-    """Which of the six cases of Table 1 a segment is [alpha, beta and limit in radians]."""
+    """Which of the six cases of Table 1 a segment is in; alpha, beta and their limit in radians."""
     before, after = front.previous[s], front.next[s]
     at_end = front.tail[before] == front.head[s] or front.head[after] == front.tail[s]  # of a line
     if front.next[after] == before and not at_end:
         return TRIANGLE
     if front.next[front.next[after]] == before and not at_end:
-        return QUADRANGLE
+        return QUAD
     if alpha < limit and beta < limit:
         return BOTH
     if alpha < limit:
@@ -64,8 +64,8 @@ def reach(length: float, segment: float, w1: float) -> float:
 
 @kernel
 def try_node(front: Front, s: int, p: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Attach the triangle of a segment and node p if it fits; returns whether it does."""
-    good, passage = fits(front, s, p, found, near, rules.length, STRICTNESS_OF_CASES)
+    """Attach node p to a segment if that fits."""
+    good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
     if good:
         attach(front, s, p, passage)
     return good
@@ -104,14 +104,14 @@ def close_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, near
 
 @kernel
 def _fan_holds(front: Front, node: int, place: Vector) -> bool:
-    """Whether the finished triangles at a node stay sound if it moves to a place."""
+    """Whether the finished triangles at a node stay sound when it moves."""
     at = front.corner[node]
     while at >= 0:
         t, k = at // 3, at % 3
         q, r = front.triangles[t, (k + 1) % 3], front.triangles[t, (k + 2) % 3]
         pq, pr = row(front.nodes, q), row(front.nodes, r)
         face = unit(cross(subtract(pq, place), subtract(pr, place)))
-        if dot(face, row(front.normals, q)) < LEAST_ALIGNMENT or shape_quality(place, pq, pr) < LEAST_SHAPE_OF_FAN:
+        if dot(face, row(front.normals, q)) < ALIGNED or shape_quality(place, pq, pr) < KEPT_SOUND:
             return False
         at = front.corner_next[at]
     return True
@@ -119,7 +119,7 @@ def _fan_holds(front: Front, node: int, place: Vector) -> bool:
 
 @kernel
 def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
-    """Whether nodes c and d have a common neighbour besides a and b: merging them would pinch the grid."""
+    """Whether two nodes have a common neighbour besides a and b: merging them would pinch the grid."""
     at = front.corner[c]
     while at >= 0:
         t = at // 3
@@ -141,7 +141,7 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
-    Nodes of a boundary are not moved: the other end is merged into them. If finished triangles would turn over, nothing is merged.
+    Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
     """
     a, b = front.tail[s], front.head[s]
     before, after = front.previous[s], front.next[s]
@@ -151,7 +151,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
     if c == d or edge_exists(front, c, d) or _share_neighbor(front, c, d, a, b):
         return False
     pc, pd = row(front.nodes, c), row(front.nodes, d)
-    if norm(subtract(pd, pc)) > FARTHEST_MERGED * rules.length:
+    if norm(subtract(pd, pc)) > MERGED * rules.length:
         return False
     middle = along(pc, 0.5, subtract(pd, pc))
     keep, lose = (d, c) if front.on_boundary[d] else (c, d)
@@ -170,7 +170,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
                     least, place = dot(away, away), row(surface.points, p)
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     face = unit(cross(subtract(pb, pa), subtract(place, pa)))
-    if dot(face, row(front.normals, a)) < LEAST_ALIGNMENT or shape_quality(pa, pb, place) < LEAST_SHAPE_OF_MERGED:
+    if dot(face, row(front.normals, a)) < ALIGNED or shape_quality(pa, pb, place) < SOUND:
         return False
     if not (_fan_holds(front, c, place) and _fan_holds(front, d, place)):
         return False
@@ -195,7 +195,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
 
 @kernel
 def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
-    """Move node `keep` to a place and give it the triangles and segments of node `lose`; its normal becomes the mean of both."""
+    """Let one node take over the triangles and segments of another, and move it; its normal becomes their mean."""
     take(front.boxes, keep, front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2])
     take(front.boxes, lose, front.nodes[lose, 0], front.nodes[lose, 1], front.nodes[lose, 2])
     front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2] = place
@@ -248,10 +248,10 @@ def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, nea
 
 @kernel
 def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
-    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False if there is none.
+    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False where there is none.
 
-    The points searched lie within b of the plane that bisects the segment, at r - h to r + h from the segment, on its unmeshed
-    side (Eq. 7). A region without points is doubled once; then the segment waits for a later round.
+    Searched are the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
+    unmeshed side (Eq. 7). A region without points is doubled once; then the segment waits for a later round.
     """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
@@ -311,8 +311,7 @@ def far_from_front(
         if (
             i < near
             and q != p
-            and norm(subtract(pp, row(front.nodes, q)))
-            < (least if front.out[q] >= 0 else max(least, CANDIDATE_REACH * length))
+            and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, APART * length))
         ):
             return False
     return True
@@ -320,7 +319,7 @@ def far_from_front(
 
 @kernel
 def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, near: int, pp: Vector) -> bool:
-    """Step 3 of Sec. 3.4: attach the best triangle with an end of the segments that are too near to the optimal point."""
+    """Step 3 of Sec. 3.4: the best triangle with an end of the segments that are too near to the optimal point."""
     pa, pb = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
     segment = norm(subtract(pb, pa))
     score = np.full(near, -1.0)
@@ -337,7 +336,7 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
             t = front.out_next[t]
     for _ in range(near):
         i = int(np.argmax(score))
-        if score[i] <= LEAST_QUALITY:
+        if score[i] <= LEAST:
             return False
         if try_node(front, s, found[i], rules, found, near):
             return True
@@ -355,7 +354,7 @@ def new_node(
     p = front.count[NODES]
     pp = row(front.nodes, p)
     if far_from_front(front, s, p, pp, found, near, rules.nearness * rules.length, rules.length):
-        good, passage = fits(front, s, p, found, near, rules.length, STRICTNESS_OF_CASES)
+        good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
         if good:
             add_node(front)
             attach(front, s, p, passage)
@@ -367,12 +366,12 @@ def new_node(
 
 @kernel
 def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
-    """Advance a segment by the six cases of Table 1; False if no triangle of its case fits."""
-    near = near_nodes(surface, front, s, SEARCH_REACH * rules.length, rules.length, found)
+    """Advance a segment by the six cases of Table 1; False where the case's triangle does not fit."""
+    near = near_nodes(surface, front, s, SEEN * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
     if case == TRIANGLE:
         return close_triangle(front, s, rules, found, near)
-    if case == QUADRANGLE:
+    if case == QUAD:
         return close_quadrangle(front, s, rules, found, near)
     if case == BOTH:
         if rules.quadrangle:

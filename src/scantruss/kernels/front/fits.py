@@ -1,6 +1,6 @@
-"""Whether a triangle fits a front: the nodes nearby, the angles of a segment, and the tests of Sec. 3.4 and Table 1.
+"""What may be attached to a front: who is near, the angles of a segment, whether a triangle or a new node fits (Sec. 3.4, Table 1).
 
-A triangle fits if it leaves the grid manifold and crosses nothing on its own sheet of the surface (Eqs. 7-9 and more).
+Valid is a triangle that leaves the grid manifold and crosses nothing, on its own sheet of the surface (Eqs. 7-9 and more).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, sub
 from ..surface.local_surface import Surface, linked
 from .front import NODES, Front, edge_exists
 
-NEXT_SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
+SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
 @kernel
 def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) -> bool:
-    """Whether two nodes lie on the same sheet of the surface: side by side beyond doubt, or linked over the samples between them."""
+    """Whether two nodes lie on the same sheet of the surface: plainly side by side, or linked over the samples between them."""
     d = subtract(row(front.nodes, q), row(front.nodes, a))
     far = norm(d)
     na, nq = row(front.normals, a), row(front.normals, q)
@@ -47,9 +47,9 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
 
 @kernel
 def near_nodes(surface: Surface, front: Front, s: int, reach: float, length: float, found: np.ndarray) -> int:
-    """Find the nodes within reach of the middle of a segment, on its sheet; returns how many.
+    """Nodes within reach of the middle of a segment, on its sheet; returns their number.
 
-    They include finished nodes, which a front must not run over.
+    Finished nodes are among them: a front that has gone astray must not run over them.
     """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
@@ -67,7 +67,7 @@ def near_nodes(surface: Surface, front: Front, s: int, reach: float, length: flo
 
 @kernel
 def left_angle(front: Front, s: int) -> float:
-    """Angle alpha of Table 1, at the tail: from the segment to the previous one, across the unmeshed area."""
+    """Angle alpha of Table 1: at the tail, from the segment to its previous neighbour across the unmeshed area."""
     a = row(front.nodes, front.tail[s])
     c = row(front.nodes, front.tail[front.previous[s]])
     if front.tail[front.previous[s]] == front.head[s]:
@@ -77,7 +77,7 @@ def left_angle(front: Front, s: int) -> float:
 
 @kernel
 def right_angle(front: Front, s: int) -> float:
-    """Angle beta of Table 1, at the head: between the segment and the next one, across the unmeshed area."""
+    """Angle beta of Table 1: at the head, between the segment and its next neighbour across the unmeshed area."""
     b = row(front.nodes, front.head[s])
     d = row(front.nodes, front.head[front.next[s]])
     if front.head[front.next[s]] == front.tail[s]:
@@ -87,7 +87,7 @@ def right_angle(front: Front, s: int) -> float:
 
 @kernel
 def _sector(front: Front, leaving: int, q: int) -> float:
-    """Angle at the tail of a segment, from it to node q; NO_SECTOR if q is outside the unmeshed area there."""
+    """Angle at the tail of a segment, from it to node q; NO_SECTOR where q is outside the unmeshed area there."""
     p = front.tail[leaving]
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
@@ -100,7 +100,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
 
 @kernel
 def passage_of(front: Front, s: int, p: int) -> int:
-    """Segment that starts at node p where the triangle of s and p meets the front there; -1 if it meets it nowhere."""
+    """Segment that leaves node p where the triangle of s and p meets the front there; -1: it meets it nowhere rightly."""
     a, b = front.tail[s], front.head[s]
     at = front.out[p]
     while at >= 0:
@@ -113,10 +113,10 @@ def passage_of(front: Front, s: int, p: int) -> int:
 
 @kernel
 def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: float, strict: float) -> tuple[bool, int]:
-    """Whether the triangle of segment s and node p may be attached, and where it meets the front at p (see `attach`).
+    """Whether the triangle of segment s and node p may be attached; and where it meets the front at p (see `attach`).
 
     It must lie on the unmeshed side (Eq. 7), face as the surface does, stay within the sectors of the front at its three nodes,
-    repeat no edge, cross no segment of the front (Eqs. 8, 9) and contain no node of it. `strict` is 1 to keep room besides, 0 for no more.
+    repeat no edge, cross no segment of the front (Eqs. 8, 9) and hold no node of it. `strict` 1 asks for room, 0 only for rightness.
     """
     a, b = front.tail[s], front.head[s]
     before, after = front.previous[s], front.next[s]
@@ -138,7 +138,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
         if front.next[after] != before:
             return False, -1
         return True, -1
-    # new edges must not exist yet, and must lie within the sectors
+    # the edges that are new must not exist and must lie inside the sectors
     if not closes_left:
         if edge_exists(front, a, p) or _sector(front, s, p) >= NO_SECTOR:
             return False, -1
@@ -165,7 +165,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
 def clear_of_front(
     front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, room: float, length: float
 ) -> bool:
-    """Whether the triangle of segment s and place pp (node p, or -1) crosses no front segment, contains no node of it, and keeps room."""
+    """Whether the triangle of segment s and place pp (node p, or -1) crosses no front segment, holds no front node, and keeps room."""
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     normal = unit(cross(subtract(pb, pa), subtract(pp, pa)))
@@ -176,7 +176,7 @@ def clear_of_front(
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
         if i < near and q != p and q != a and q != b:
-            if abs(dot(subtract(pq, pa), normal)) < NEXT_SHEET * length and inside_triangle(
+            if abs(dot(subtract(pq, pa), normal)) < SHEET * length and inside_triangle(
                 onto_tangent_plane(pq, pa, u, v), a2, b2, p2
             ):
                 return False
@@ -193,9 +193,9 @@ def clear_of_front(
             e = front.head[t]
             if t != s and q != p and e != p:
                 pe = row(front.nodes, e)
-                if q != a and e != a and lines_cross(pa, pp, pq, pe, NEXT_SHEET * length):
+                if q != a and e != a and lines_cross(pa, pp, pq, pe, SHEET * length):
                     return False
-                if q != b and e != b and lines_cross(pb, pp, pq, pe, NEXT_SHEET * length):
+                if q != b and e != b and lines_cross(pb, pp, pq, pe, SHEET * length):
                     return False
             t = front.out_next[t]
     return True

@@ -1,14 +1,14 @@
 """The advancing front: its lists, and how a triangle is attached to it (Sec. 3.5).
 
 A front segment runs from its tail to its head with the unmeshed area on its left. Segments form closed loops (previous, next).
-Attaching a triangle keeps the loops closed and every edge at no more than two triangles, so the grid is manifold at all times.
+Attaching a triangle keeps the loops closed and every edge at two triangles, so the grid is manifold at every moment.
 
-For the segments that are not GONE these invariants hold from the initial front on:
+Of the segments that are not GONE these hold from the initial front on, and whoever changes the lists keeps them:
 
-- `next` is a one-to-one map among them, `previous` is its inverse, and each segment starts where its previous one ends;
-- the list of a node (`out`, `out_next`) holds each segment that starts there exactly once, and no other; so does the list of its corners.
+- `next` is one to one among them, `previous` is its inverse, and each begins where the one before it ends;
+- the list of a node (`out`, `out_next`) holds each of them that starts there once, and nothing else; so does that of its corners.
 
-Therefore every walk ends: one along `next` returns to its start, one down the list of a node reaches its end.
+Therefore every walk ends: along `next` it comes back to where it began, and down the list of a node to its end.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from ..geometry.vectors import Vector
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # places of the counters in `Front.count`
-MOST_NEAR_NODES = 400  # most nodes that are looked at in one step of the front
+MOST_NEAR_NODES = 400  # most front nodes looked at in one step
 
 
 class Rules(NamedTuple):
-    """The settings of a front."""
+    """What a front goes by."""
 
-    length: float  #: desired member length at the current segment [scan unit]
-    desired: float  #: desired member length where the length field is 1 [scan unit]
+    length: float  #: desired at the segment in hand [scan unit]
+    desired: float  #: desired member length, which the length field multiplies [scan unit]
     graded: bool  #: whether the length field differs from place to place
     length_weight: float  #: w_1 of Eq. 10
     shape_weight: float  #: alpha_1 of Eq. 5
     size_weight: float  #: alpha_2 of Eq. 5
     search_range: float  #: b and h of Sec. 3.4, step 1 [scan unit]
-    nearness: float  #: least distance of a new node from the front [member lengths] (Sec. 3.4, step 2)
+    nearness: float  #: least distance of a new node from the front, in lengths (Sec. 3.4, step 2)
     merge_angle: float  #: limit of alpha and beta in Table 1 [radian]
-    quadrangle: bool  #: whether case 3 makes Foucault's quadrangle
-    strict: float  #: how strict the tests of a triangle are, from 1 in the first round to 0 in the last
+    quadrangle: bool  #: case 3 makes Foucault's quadrangle
+    strict: float  #: how good a triangle must be, from 1 in the first round to 0 in the last
 
 
 @kernel
 def rules_at(rules: Rules, length: float) -> Rules:
-    """The same settings for another desired length."""
+    """The same rules where another length is desired."""
     return Rules(
         length,
         rules.desired,
@@ -68,24 +68,24 @@ class Front(NamedTuple):
     normals: np.ndarray  #: (C, 3) outer normals of the surface at the nodes
     sample: np.ndarray  #: (C,) sample nearest to each node
     on_boundary: np.ndarray  #: (C,) bool
-    out: np.ndarray  #: (C,) the first front segment that starts at the node, -1 for none
+    out: np.ndarray  #: (C,) a front segment that starts at the node, -1: none
     tail: np.ndarray  #: (F,)
     head: np.ndarray  #: (F,)
     previous: np.ndarray  #: (F,)
     next: np.ndarray  #: (F,)
     state: np.ndarray  #: (F,)
-    out_next: np.ndarray  #: (F,) the next segment with the same tail, -1 for none
+    out_next: np.ndarray  #: (F,) another segment with the same tail, -1: none
     triangles: np.ndarray  #: (T, 3)
-    corner: np.ndarray  #: (C,) the first corner (3 t + k) at the node, -1 for none
-    corner_next: np.ndarray  #: (3 T,) the next corner at the same node, -1 for none
-    queue: np.ndarray  #: (Q,) segments to be advanced, a ring buffer
-    count: np.ndarray  # type: ignore[assignment]  #: (8,) counters NODES to LAST; hides tuple.count
+    corner: np.ndarray  #: (C,) last corner (3 t + k) at the node, -1: none
+    corner_next: np.ndarray  #: (3 T,) another corner at the same node, -1: none
+    queue: np.ndarray  #: (Q,) segments to be advanced
+    count: np.ndarray  # type: ignore[assignment]  #: (8,) counters; hides tuple.count
     boxes: SearchBoxes  #: the nodes by box
 
 
 @kernel
 def propose_node(front: Front, place: Vector, normal: Vector, sample: int, on_boundary: bool) -> int:
-    """Write a node behind the last one without adding it; returns its number."""
+    """Write down the node that may come next, without adding it; returns its number."""
     n = front.count[NODES]
     for c in range(3):
         front.nodes[n, c] = place[c]
@@ -107,7 +107,7 @@ def add_node(front: Front) -> None:
 
 @kernel
 def add_segment(front: Front, tail: int, head: int, state: int) -> int:
-    """Add a front segment, not yet linked to its neighbours, and enqueue it if it is active; returns it."""
+    """Add a front segment, not yet linked to its neighbours; active ones join the queue."""
     s = front.count[SEGMENTS]
     front.count[SEGMENTS] += 1
     front.tail[s], front.head[s], front.state[s] = tail, head, state
@@ -145,7 +145,7 @@ def add_chain(front: Front, nodes: np.ndarray, state: int) -> None:
 
 @kernel
 def remove_segment(front: Front, s: int) -> None:
-    """Remove a segment that is not GONE from the front; its neighbours are still to be linked."""
+    """Take a segment that is not GONE out of the front; its neighbours are still to be linked."""
     front.state[s] = GONE
     node = front.tail[s]
     at = front.out[node]
@@ -171,7 +171,7 @@ def add_triangle(front: Front, a: int, b: int, c: int) -> None:
 
 @kernel
 def edge_exists(front: Front, a: int, b: int) -> bool:
-    """Whether two nodes are joined by an edge of the grid or of the front."""
+    """Whether an edge of the grid or of the front joins two nodes."""
     at = front.corner[a]
     while at >= 0:
         t = at // 3
@@ -193,10 +193,10 @@ def edge_exists(front: Front, a: int, b: int) -> bool:
 
 @kernel
 def attach(front: Front, s: int, p: int, passage: int) -> None:
-    """Attach the triangle of segment s and node p, and lead the front round it.
+    """Attach the triangle of segment s and node p: the front goes round it from now on.
 
-    passage : segment that starts at p where the triangle meets the front there; -1 if p is new or the far end of a neighbouring
-        segment
+    passage : segment that leaves p at the place where the triangle meets the front; -1 for a node that is new, or is the far end
+    of a neighbouring segment
     """
     a, b = front.tail[s], front.head[s]
     before, after = front.previous[s], front.next[s]

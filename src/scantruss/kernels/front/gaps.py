@@ -1,4 +1,4 @@
-"""Closing the gaps that a front leaves: the best triangulation of a polygon by dynamic programming."""
+"""Closing the gaps that a front leaves: the best triangles of a polygon by dynamic programming."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MOST_SEGMENTS_OF_GAP = 120  # most segments of a loop that is triangulated; the 
 
 @kernel
 def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
-    """Walk along the front from a segment until a node is met again; fills in the segments of that loop, and returns how many.
+    """Segments of the shortest closed walk along the front from a segment back to a node it has met; returns their number.
 
-    A loop that meets a node twice is split there, so that the node keeps a single fan. Segments form closed loops, so a walk meets a node
-    again after no more steps than there are segments; `loop` has room for one more.
+    A loop that meets a node twice is taken apart there, so that the node keeps one fan. Segments form closed loops, so a walk meets
+    a node again after no more steps than there are segments; `loop` has room for one more.
     """
     count = 0
     at = s
@@ -35,7 +35,7 @@ def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
 
 @kernel
 def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
-    """Cost of a triangle: its shape, its size, and how far its normal is from those of the surface at its nodes."""
+    """How bad a triangle is for the grid: shape, size, and whether it faces as the surface does at its nodes."""
     pa, pb, pc = row(front.nodes, a), row(front.nodes, b), row(front.nodes, c)
     face = unit(cross(subtract(pb, pa), subtract(pc, pa)))
     worst = min(dot(face, row(front.normals, a)), dot(face, row(front.normals, b)), dot(face, row(front.normals, c)))
@@ -45,9 +45,9 @@ def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
 
 @kernel
 def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
-    """Fill a closed loop of front segments with the triangles of least total cost; returns how many, 0 if none fit.
+    """Fill a closed loop of front segments with triangles of least total cost; returns their number, 0 where none fit.
 
-    No new edge may exist already, so that the grid stays manifold.
+    New edges must not exist yet, so the grid stays manifold.
     """
     node = np.empty(count, np.int64)
     for i in range(count):
@@ -90,7 +90,7 @@ def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
 
 @kernel
 def cut_out(front: Front, loop: np.ndarray) -> None:
-    """Remove a closed walk of segments (K,) from the front, and link the segments before and after it."""
+    """Take a closed walk of segments (K,) off the front; the segments before and after it follow each other from now on."""
     last = loop[len(loop) - 1]
     before, after = front.previous[loop[0]], front.next[last]
     for i in range(len(loop)):

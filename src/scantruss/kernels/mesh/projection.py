@@ -29,7 +29,7 @@ ROUND_ENOUGH = (
     0.75  # least roundness of the points of a patch, 1 in a disc, 0 on a line; below it they lie on few scan lines
 )
 CREST_REACH = 0.4  # distance up to which samples count for the crest of a fold [member lengths]
-POINTS_OF_NARROW_PATCH = (
+FEWEST_FOR_WIDE_PATCH = (
     24  # fewest points of a narrow patch; the noise of fewer, as at a boundary, moves its edge too much
 )
 
@@ -56,7 +56,7 @@ def _fit_widest(
         if turn == 0 and middle.patch_radius > EQUAL_PATCH_RATIO * broad.patch_radius:
             continue
         more = fit_patch(middle if turn == 0 else broad, patch, sample, place)
-        too_narrow = kept[ROUNDNESS] < ROUND_ENOUGH or taken < POINTS_OF_NARROW_PATCH
+        too_narrow = kept[ROUNDNESS] < ROUND_ENOUGH or taken < FEWEST_FOR_WIDE_PATCH
         away = _away(patch, more)
         if more < 4 or (away > EQUALLY_NEAR * least and not too_narrow):
             fill_row(patch, kept)
