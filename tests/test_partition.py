@@ -103,7 +103,7 @@ def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
     for many in (50, 10_000):
         mesh = make(seed).mesh()
         monkeypatch.setattr(equalize, "MANY_NODES", many)
-        sweeps.append(equalize.settle(mesh, equalize.WEIGHT, 1e-7, 400))
+        sweeps.append(equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-7, 400))
         energies.append(equalize.energy_of_node(mesh))
     assert max(sweeps) < 400
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
@@ -111,7 +111,7 @@ def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
 
 def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
     mesh = in_independent_sets(make, monkeypatch, 2).mesh()
-    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net, scratch = mesh.net, equalize.new_scratch(mesh)
     seen, run = [], Partition.run
 
@@ -142,7 +142,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
         monkeypatch.setattr(perturbation, "NODES_OF_LARGE_GRID", 100)
         rough = make(1)
         mesh = rough.mesh()
-        equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+        equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
         before = equalize.energy_of_node(mesh)
         perturbation.search_widely(mesh, "normal")
         assert equalize.energy_of_node(mesh) < before
@@ -154,7 +154,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
 
 def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
     mesh = make(2).mesh()
-    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net = mesh.net
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 

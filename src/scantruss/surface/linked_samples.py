@@ -16,9 +16,7 @@ from .streamline import is_dense, streamlined
 
 NEIGHBORS = 12  # most links of a sample
 BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
-POINTS_TO_SORT = (
-    250_000  # number of points above which they are sorted in space, because they no longer fit into the cache
-)
+POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
 SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
 LONE_SPACING = 0.3  # point spacing above which most points are samples themselves [sample radii]
 SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]

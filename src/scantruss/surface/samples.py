@@ -41,14 +41,12 @@ from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
-BESIDE_SAMPLES = (
-    1.5  # distance from points of the boundary within which all points of the scan are used [spacing of those used]
-)
+BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-SOME = 8.0  # most points per sample to which a patch is fitted while nodes move
+POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
 ALL = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
@@ -381,7 +379,7 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         length=float(length),
         radius=float(radius),
         patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=SOME,
+        patch_points=POINTS_ON_THE_WAY,
         step=float(max(radius, 1.3 * spacing)),
         stamp=np.zeros(len(mean), np.int64),
         queue=np.zeros(len(mean), np.int64),

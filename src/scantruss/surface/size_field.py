@@ -16,9 +16,7 @@ from ..runtime.parallel import in_parts
 from ..settings import Settings, shortest_and_longest
 
 RATIO = 1.2  # largest ratio of the desired lengths of two successive members
-SLOPE = (
-    0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)
-)  # growth of the length per distance; less, as distances over links are longer
+SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 because links make distances longer
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
 BENT = 0.95  # share of the scan that is less curved than the places with the shortest members
 NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature up to which it may be noise

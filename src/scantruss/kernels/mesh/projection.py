@@ -20,18 +20,12 @@ from ..surface.local_surface import (
 )
 from .grid import INTERIOR, Net
 
-EQUALLY_NEAR = (
-    1.08  # largest ratio of the distances of the points from a wider patch and from a narrow one that fit alike
-)
+EQUALLY_NEAR = 1.08  # largest distance of the points from a wider patch that fits as well [that from the narrow one]
 SMALL_MOVE = 0.03  # distance below which a projected node keeps its patch [member lengths]
 EQUAL_PATCH_RATIO = 0.85  # ratio of the radii of two patches above which one of them is enough
-ROUND_ENOUGH = (
-    0.75  # least roundness of the points of a patch, 1 in a disc, 0 on a line; below it they lie on few scan lines
-)
+ROUND_ENOUGH = 0.75  # least roundness of the points of a patch; below it they lie on few scan lines
 CREST_REACH = 0.4  # distance up to which samples count for the crest of a fold [member lengths]
-FEWEST_FOR_WIDE_PATCH = (
-    24  # fewest points of a narrow patch; the noise of fewer, as at a boundary, moves its edge too much
-)
+FEWEST_FOR_WIDE_PATCH = 24  # fewest points of a patch; the noise of fewer, as at a boundary, moves its edge too much
 
 
 @kernel

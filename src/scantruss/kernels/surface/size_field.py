@@ -13,12 +13,8 @@ from ..geometry.vectors import Vector, dot, norm, row, subtract
 from .local_surface import HEIGHTS, MEAN_DISTANCE, PATCH, Surface, fit_patch, flood, walk
 
 BLEND_REACH = 2.2  # distance up to which the lengths of samples count at a place [steps between samples]
-CURVATURE_DEVIATION = (
-    14.4  # standard deviation of a curvature, in that of a point over R^2 sqrt(points), inside the scan
-)
-DEVIATION_ASIDE = (
-    14.0  # how that grows with the square of the distance of the points' mean from the place [patch radii]
-)
+CURVATURE_DEVIATION = 14.4  # standard deviation of a curvature inside the scan [that of a point / R^2 sqrt(points)]
+DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the mean of the points [patch radii]
 RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
 BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
 
