@@ -9,9 +9,9 @@ from marks import compiled_only
 from rough import curve_of, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve.equalize import (
-    LAST_STRIDE,
+    LAST_RELAXATION,
+    LENGTH_WEIGHT,
     PRICE,
-    WEIGHT,
     equalize,
     finish,
     grid_energy,
@@ -24,6 +24,7 @@ from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search
 from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
 from scantruss.kernels.mesh.trial import total_energy
+from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 
 MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
 
@@ -61,9 +62,9 @@ def test_a_fold_counts(rough):
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
     net.nodes[v] += 3.0 * (net.nodes[net.ring[v, 0]] - net.nodes[v])
     grid = rough.grid.replace(nodes=net.nodes[: len(rough.grid.nodes)].copy())
-    energy = total_energy(net, mesh.patches, new_scratch(mesh), length, WEIGHT)[0]
-    assert energy == pytest.approx(naive.energy(grid, length, WEIGHT))
-    settle(mesh, WEIGHT, 1e-6, 60)
+    energy = total_energy(net, mesh.patches, new_scratch(mesh), length, LENGTH_WEIGHT)[0]
+    assert energy == pytest.approx(naive.energy(grid, length, LENGTH_WEIGHT))
+    settle(mesh, LENGTH_WEIGHT, 1e-6, 60)
     healed = mesh.to_grid(rough.grid)
     assert naive.energy(healed, length, 0.0) < 0.2 * len(healed.triangles)
 
@@ -72,10 +73,10 @@ def test_settling_never_raises_the_energy(rough):
     mesh = rough.mesh()
     scratch, length = new_scratch(mesh), rough.settings.length
     at_rest = mesh.net.nodes[mesh.net.kind >= REST].copy()
-    before = total_energy(mesh.net, mesh.patches, scratch, length, WEIGHT)[0]
+    before = total_energy(mesh.net, mesh.patches, scratch, length, LENGTH_WEIGHT)[0]
     for _ in range(4):
-        settle(mesh, WEIGHT, 0.0, 3)
-        after = total_energy(mesh.net, mesh.patches, scratch, length, WEIGHT)[0]
+        settle(mesh, LENGTH_WEIGHT, 0.0, 3)
+        after = total_energy(mesh.net, mesh.patches, scratch, length, LENGTH_WEIGHT)[0]
         assert after <= before + 1e-9
         before = after
     assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= REST])
@@ -84,7 +85,7 @@ def test_settling_never_raises_the_energy(rough):
 def test_a_move_that_does_not_pay_leaves_no_trace(rough):
     mesh = rough.mesh()
     net, scratch, length = mesh.net, new_scratch(mesh), rough.settings.length
-    settle(mesh, WEIGHT, 1e-4, 20)
+    settle(mesh, LENGTH_WEIGHT, 1e-4, 20)
     live = net.degree > 0
     kept = [array[live].copy() for array in (net.nodes, net.degree, net.arc, net.kind)]
     rings = [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
@@ -97,7 +98,7 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
                     if local_search.disorder(net, move, v, u) > 0 or move > 0:
                         assert (
                             not local_search.try_move(
-                                net, mesh.patches, mesh.curves, scratch, move, v, u, length, WEIGHT, worth
+                                net, mesh.patches, mesh.curves, scratch, move, v, u, length, LENGTH_WEIGHT, worth
                             )
                             or move == 0
                         )
@@ -111,13 +112,13 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
 
 def stated_energy(mesh, scratch):
     """The energy that the search lowers, but for the share of each node."""
-    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
     return energy + PRICE * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
 
 
 def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
     mesh = rough.mesh()
-    settle(mesh, WEIGHT, 1e-4, 30)
+    settle(mesh, LENGTH_WEIGHT, 1e-4, 30)
     scratch = new_scratch(mesh)
     before, kept = stated_energy(mesh, scratch), search_once(mesh, scratch)
     assert kept > 0
@@ -133,14 +134,14 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
     net, rng = mesh.net, np.random.default_rng(seed)
     net.nodes[: net.used] += 0.6 * mesh.length * rng.uniform(-1, 1, (net.used, 3))
     scratch = new_scratch(mesh)
-    before = total_energy(net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
+    before = total_energy(net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
     for v in range(net.used):
         for u in net.ring[v, : net.degree[v]].tolist():
             if net.degree[v] and may_flip(net, v, u):
                 local_search.try_move(
-                    net, mesh.patches, mesh.curves, scratch, local_search.FLIP, v, u, mesh.length, WEIGHT, 0.0
+                    net, mesh.patches, mesh.curves, scratch, local_search.FLIP, v, u, mesh.length, LENGTH_WEIGHT, 0.0
                 )
-                after = total_energy(net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
+                after = total_energy(net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
                 assert after == before or after < before - 9e-5
                 before = after
     assert scratch.paid[0] > 10
@@ -268,27 +269,28 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
             [np.linalg.norm(np.subtract(*rough.grid.nodes[list(edge)])) for edge in naive.wings(rough.grid)]
         )
         price = PRICE * len(rough.grid.nodes) * (stretch / length - 1) ** 2
-        unfolded = naive.energy(rough.grid, length, WEIGHT) - naive.energy(rough.grid, length, 0.0)
+        unfolded = naive.energy(rough.grid, length, LENGTH_WEIGHT) - naive.energy(rough.grid, length, 0.0)
         shapes = sum(1 - naive.shape(*rough.grid.nodes[t]) for t in rough.grid.triangles)
         assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
 
 
-@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
+@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.PATCH_REACH - 0.01, False)])
 def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
     rough = rough_disc()
     mesh, length = rough.mesh(), rough.settings.length
     net = mesh.net
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[7])
-    settle(mesh, WEIGHT, 1e-5, 60)
+    settle(mesh, LENGTH_WEIGHT, 1e-5, 60)
     rest = net.nodes[v].copy()
-    normal, along = mesh.patches[v, 3:6].copy(), mesh.patches[v, 6:9].copy()
+    normal = mesh.patches[v, NORMAL : NORMAL + 3].copy()
+    along = mesh.patches[v, TANGENT : TANGENT + 3].copy()
     net.nodes[v] = rest + 0.6 * length * along  # it wants to go back, against `along`
-    mesh.patches[v, 0:3] = net.nodes[v] + away * length * along
-    mesh.patches[v, 9:15] = 0.0
+    mesh.patches[v, CENTRE : CENTRE + 3] = net.nodes[v] + away * length * along
+    mesh.patches[v, HEIGHTS : HEIGHTS + 6] = 0.0
     place = net.nodes[v].copy()
-    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, WEIGHT, 1e-6, kernels.STRIDE)
+    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, LENGTH_WEIGHT, 1e-6, kernels.RELAXATION)
     assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
-    assert np.linalg.norm(net.nodes[v] - mesh.patches[v, 0:3]) <= kernels.LEASH * length
+    assert np.linalg.norm(net.nodes[v] - mesh.patches[v, CENTRE : CENTRE + 3]) <= kernels.PATCH_REACH * length
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
 
 
@@ -297,9 +299,9 @@ def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
 
     def energy_after(sweeps, stride):
         mesh = rough.mesh()
-        settle(mesh, WEIGHT, 0.0, sweeps, stride)
-        return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, WEIGHT)[0]
+        settle(mesh, LENGTH_WEIGHT, 0.0, sweeps, stride)
+        return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)[0]
 
-    plain, long = energy_after(36, kernels.STRIDE), energy_after(18, LAST_STRIDE)
+    plain, long = energy_after(36, kernels.RELAXATION), energy_after(18, LAST_RELAXATION)
     assert long < plain * 1.001
     assert long < energy_after(18, 1.0)

@@ -9,7 +9,7 @@ from rough import rough_disc, rough_sphere, same_topology
 from scipy.spatial import Delaunay
 from small_grids import dome, fan, make_grid
 
-from scantruss.improve.flips import FOLD, flip_by_angle, flip_edges
+from scantruss.improve.flips import LEAST_COSINE, flip_by_angle, flip_edges
 from scantruss.improve.working_mesh import open_net
 from scantruss.kernels.mesh import flips as kernels
 from scantruss.kernels.mesh.grid import flip, may_flip
@@ -55,7 +55,7 @@ def flipped_one_by_one(net):
             while i < net.degree[v]:
                 u = int(net.ring[v, i])
                 i += 1
-                if v < u and may_flip(net, v, u) and kernels.gain_of_flip(net, v, u, FOLD) > 1e-9:
+                if v < u and may_flip(net, v, u) and kernels.gain_of_flip(net, v, u, LEAST_COSINE) > 1e-9:
                     flip(net, v, u)
                     count += 1
     return count

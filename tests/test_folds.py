@@ -9,7 +9,7 @@ import pytest
 
 import scantruss as st
 from scantruss.kernels.surface import folds
-from scantruss.kernels.surface.local_surface import PATCH, fit_patch
+from scantruss.kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, fit_patch
 
 pytestmark = pytest.mark.kernels
 
@@ -61,7 +61,7 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise):
     energies = [folds.fold_energy(patches, 0, x, 0.0, -rise * abs(x)) for x in np.linspace(-0.4, 0.4, 81)]
     assert abs(np.linspace(-0.4, 0.4, 81)[np.argmin(energies)]) < 0.15  # from 0.2
     beside = (0.1, 0.0, -0.1 * rise)
-    fit_patch(surface, patches[0], int(patches[0, 15]), beside)
+    fit_patch(surface, patches[0], int(patches[0, NEAREST_SAMPLE]), beside)
     folds.fit_fold(surface, patches[0], 0.4, 1.0)
     crest = folds.onto_crest(surface, patches[0], beside)
     assert np.hypot(crest[0], crest[2]) < np.hypot(beside[0], beside[2])

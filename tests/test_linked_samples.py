@@ -13,7 +13,7 @@ from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
 from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
 from scantruss.surface.linked_samples import link_samples
-from scantruss.surface.samples import SPARSE, sample_surface, samples_with, with_whole_boundary
+from scantruss.surface.samples import SPARSE_SPACING, sample_surface, samples_with, with_whole_boundary
 
 
 def apart(samples):
@@ -37,7 +37,7 @@ SMOOTH = {
     "small ball": lambda: ball(1.8, 20_000),
 }
 OTHER = {
-    "sparse plate": lambda: sheet(8, 8, 1.6 * SPARSE),
+    "sparse plate": lambda: sheet(8, 8, 1.6 * SPARSE_SPACING),
     "ridge": lambda: roof(40, 12, 250),
     "short ridge": lambda: np.concatenate([roof(45, 4, 250), sheet(8, 8, 0.05) + [30, 0, 0]]),
     "thick plate": lambda: sheet(8, 8, 0.05, noise=0.15),

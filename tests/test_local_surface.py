@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 from small_clouds import ball, samples_of, sheet, turn_of
 
 from scantruss.kernels.surface.local_surface import (
+    HEIGHTS,
+    NORMAL,
     PATCH,
+    TANGENT,
     fit_patch,
     flood,
     linked,
     onto_patch,
-    onto_surface,
     patch_normal,
     walk,
 )
@@ -31,12 +33,11 @@ def nearest_sample(surface, place):
     return int(((surface.mean - place) ** 2).sum(axis=1).argmin())
 
 
-def foot_of(surface, place, patches=None):
-    """Foot of a place by a fresh patch."""
-    patches = np.zeros((1, PATCH)) if patches is None else patches
-    if patches[0, 16] == 0:
-        patches[0, 15] = nearest_sample(surface, place)
-    return np.array(onto_surface(surface, patches, 0, *(float(c) for c in place)))
+def foot_of(surface, place, sample=None):
+    """Foot of a place by a fresh patch, on the sheet of a sample or of the nearest one."""
+    patch, place = np.zeros(PATCH), tuple(float(c) for c in place)
+    fit_patch(surface, patch, nearest_sample(surface, place) if sample is None else sample, place)
+    return np.array(onto_patch(patch, place))
 
 
 def inner_places(rng, width, count):
@@ -72,9 +73,10 @@ def test_planes_are_reproduced_exactly_at_their_rim_too():
 def test_the_foot_is_the_nearest_place_of_the_patch(place):
     """Aside of the middle, where the patch is steep: the nearest of a fine raster of its places."""
     patch = np.zeros(PATCH)
-    patch[3:6], patch[6:9], patch[9:15] = (0, 0, 1), (1, 0, 0), (0.05, 0.1, -0.2, 0.3, 0.1, -0.25)
+    c = (0.05, 0.1, -0.2, 0.3, 0.1, -0.25)
+    patch[NORMAL : NORMAL + 3], patch[TANGENT : TANGENT + 3], patch[HEIGHTS : HEIGHTS + 6] = (0, 0, 1), (1, 0, 0), c
     x, y = np.meshgrid(np.linspace(-1.5, 1.5, 1501), np.linspace(-1.5, 1.5, 1501))
-    z = patch[9] + patch[10] * x + patch[11] * y + patch[12] * x * x + patch[13] * x * y + patch[14] * y * y
+    z = c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y
     away = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2)
     foot = np.array(onto_patch(patch, place))
     assert np.linalg.norm(foot - place) == pytest.approx(away.min(), rel=0.01)
@@ -128,14 +130,13 @@ def test_the_normal_of_a_patch_is_that_of_the_ball():
 
 
 @pytest.mark.kernels
-def test_a_patch_is_fitted_anew_where_the_place_has_gone():
-    """The foot depends on where the place is, not on where the patch was fitted first."""
+def test_a_patch_is_fitted_where_the_place_is_not_where_its_sample_is():
+    """The foot depends on the place alone: the sample from which it is looked for only tells the sheet."""
     surface = samples_of(ball(3.0, 1500)).surface
-    patches = np.zeros((1, PATCH))
-    angles = np.linspace(0, 2.5, 26)
-    for angle in angles:
+    start = nearest_sample(surface, (0.0, 0.0, 3.1))
+    for angle in np.linspace(0, 2.5, 26):
         place = 3.1 * np.array([np.sin(angle), 0, np.cos(angle)])
-        foot = foot_of(surface, place, patches)
+        foot = foot_of(surface, place, start)
         assert np.linalg.norm(foot) == pytest.approx(3.0, abs=0.01)
         assert foot == pytest.approx(place * 3.0 / 3.1, abs=0.03)
 
@@ -161,9 +162,7 @@ def test_walking_and_feet_stay_on_their_sheet():
     for start in np.flatnonzero(surface.mean[:, 2] < middle)[::17]:
         end = walk(surface, int(start), (0.5, -0.5, 0.6))
         assert surface.mean[end, 2] < middle
-        patches = np.zeros((1, PATCH))
-        patches[0, 15] = start
-        assert onto_surface(surface, patches, 0, 0.5, -0.5, 0.5) == pytest.approx((0.5, -0.5, 0.0), abs=1e-8)
+        assert foot_of(surface, (0.5, -0.5, 0.5), int(start)) == pytest.approx([0.5, -0.5, 0.0], abs=1e-8)
 
 
 @pytest.mark.kernels

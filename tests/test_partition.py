@@ -64,8 +64,8 @@ def test_a_grid_without_work_has_no_halves(make):
 
 def in_independent_sets(make, monkeypatch, seed=1):
     """A relief small enough for a test that is settled and searched in halves all the same."""
-    monkeypatch.setattr(equalize, "MANY_NODES", 50)
-    monkeypatch.setattr(equalize, "ASKING", 10)
+    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", 50)
+    monkeypatch.setattr(equalize, "NODES_SEARCHED_IN_HALVES", 10)
     return make(seed)
 
 
@@ -78,7 +78,7 @@ def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_o
     assert min(len(first), len(second)) > 0.3 * (net.degree > 0).sum()
     beside = {u for v in first.tolist() for u in net.ring[v, : net.degree[v]].tolist()}
     assert not beside & set(second.tolist())
-    monkeypatch.setattr(equalize, "MANY_NODES", 10_000)
+    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", 10_000)
     assert [some.tolist() for some in equalize.independent_sets_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
 
 
@@ -102,8 +102,8 @@ def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
     energies, sweeps = [], []
     for many in (50, 10_000):
         mesh = make(seed).mesh()
-        monkeypatch.setattr(equalize, "MANY_NODES", many)
-        sweeps.append(equalize.settle(mesh, equalize.WEIGHT, 1e-7, 400))
+        monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", many)
+        sweeps.append(equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-7, 400))
         energies.append(equalize.energy_of_node(mesh))
     assert max(sweeps) < 400
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
@@ -111,7 +111,7 @@ def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
 
 def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
     mesh = in_independent_sets(make, monkeypatch, 2).mesh()
-    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net, scratch = mesh.net, equalize.new_scratch(mesh)
     seen, run = [], Partition.run
 
@@ -142,7 +142,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
         monkeypatch.setattr(perturbation, "NODES_OF_LARGE_GRID", 100)
         rough = make(1)
         mesh = rough.mesh()
-        equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+        equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
         before = equalize.energy_of_node(mesh)
         perturbation.search_widely(mesh, "normal")
         assert equalize.energy_of_node(mesh) < before
@@ -154,7 +154,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
 
 def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
     mesh = make(2).mesh()
-    equalize.settle(mesh, equalize.WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net = mesh.net
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rough import rough_disc, rough_sphere, same_topology
 
-from scantruss.improve.equalize import PRICE, WEIGHT, energy_of_node, new_scratch, settle
+from scantruss.improve.equalize import LENGTH_WEIGHT, PRICE, energy_of_node, new_scratch, settle
 from scantruss.improve.perturbation import new_area, search_widely
 from scantruss.kernels.mesh import perturbation as kernels
 from scantruss.kernels.mesh.trial import total_energy
@@ -21,7 +21,7 @@ def settled(request):
     """A rough grid, settled, with room for kicks."""
     rough = MAKERS[request.param]()
     mesh = rough.mesh()
-    settle(mesh, WEIGHT, 1e-4, 30)
+    settle(mesh, LENGTH_WEIGHT, 1e-4, 30)
     return rough, mesh, new_scratch(mesh), new_area(mesh)
 
 
@@ -33,7 +33,7 @@ def trace(net):
 
 
 def energy_of(mesh, scratch):
-    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
+    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
 
 
 def perturb(mesh, scratch, area, v, worth, temperature=0.0):
@@ -45,7 +45,7 @@ def perturb(mesh, scratch, area, v, worth, temperature=0.0):
         scratch,
         area,
         mesh.length,
-        WEIGHT,
+        LENGTH_WEIGHT,
         worth,
         0.0,
         temperature,
@@ -63,8 +63,8 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
         assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
         perturbed += kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
-        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, WEIGHT)
-        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, WEIGHT, 0.05)
+        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, LENGTH_WEIGHT)
+        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, LENGTH_WEIGHT, 0.05)
         kernels.put_area_back(net, mesh.patches, area)
         assert int(net.spare[0]) == free and trace(net) == before
         assert mesh.patches[net.degree > 0].tobytes() == patches
@@ -77,11 +77,17 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
     net = mesh.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
         assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
-        before = kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
+        before = (
+            kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, LENGTH_WEIGHT),
+            energy_of(mesh, scratch),
+        )
         kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
-        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, WEIGHT)
-        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, WEIGHT, 0.0)
-        after = kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, WEIGHT), energy_of(mesh, scratch)
+        kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, LENGTH_WEIGHT)
+        kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, LENGTH_WEIGHT, 0.0)
+        after = (
+            kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, LENGTH_WEIGHT),
+            energy_of(mesh, scratch),
+        )
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 
@@ -115,7 +121,7 @@ def test_the_wide_search_lowers_the_energy_the_same_way_every_time(settled, effo
     before = energy_of_node(mesh)
     search_widely(mesh, effort)
     other = MAKERS["disc" if (mesh.net.is_open == 1).any() else "sphere"]().mesh()
-    settle(other, WEIGHT, 1e-4, 30)
+    settle(other, LENGTH_WEIGHT, 1e-4, 30)
     search_widely(other, effort)
     assert energy_of_node(mesh) < before
     assert trace(mesh.net) == trace(other.net)
@@ -126,7 +132,9 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
     rough, mesh, _, _ = settled
     grid = mesh.to_grid(rough.grid)
     mean = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean()
-    slow = naive_grid.energy(grid, mesh.length, WEIGHT) / len(grid.nodes) + PRICE * (mean / mesh.length - 1.0) ** 2
+    slow = (
+        naive_grid.energy(grid, mesh.length, LENGTH_WEIGHT) / len(grid.nodes) + PRICE * (mean / mesh.length - 1.0) ** 2
+    )
     assert energy_of_node(mesh) == pytest.approx(slow, rel=1e-9)
 
 
@@ -147,7 +155,7 @@ def test_an_area_that_reaches_out_of_bounds_is_told(settled):
     around = area.around[: area.gathered[0]].copy()
     for out in around[:: max(len(around) // 5, 1)].tolist():
         area.out[out] = 1
-        assert kernels.list_area(net, mesh.patches, area, first) == kernels.BEYOND
+        assert kernels.list_area(net, mesh.patches, area, first) == kernels.OUT_OF_BOUNDS
         area.out[out] = 0
     assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
 

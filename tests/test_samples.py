@@ -360,7 +360,7 @@ def test_repeated_points_change_no_site():
 
 def test_points_are_sorted_where_their_sites_are_many(monkeypatch):
     """The same points, each near those before it; points of few sites stay as they are."""
-    monkeypatch.setattr(module, "MANY_SAMPLES", 1_000)
+    monkeypatch.setattr(module, "SAMPLES_TO_SORT", 1_000)
     points = sheet(20.0, 20.0, 0.3)
     bounds = bounds_of(points)
 

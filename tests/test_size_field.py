@@ -126,7 +126,7 @@ def test_a_blend_agrees_with_weights_written_down(seed, count):
     kernels.blend_lengths(places, given_places, values, boxes, 0.3, lengths)
     for place, length in zip(places, lengths, strict=True):
         away = np.linalg.norm(given_places - place, axis=1)
-        limit = np.sort(away)[kernels.NEAREST] if count > kernels.NEAREST else np.inf
+        limit = np.sort(away)[kernels.BLENDED_LENGTHS] if count > kernels.BLENDED_LENGTHS else np.inf
         weight = np.where(away < limit, (1.0 / away - 1.0 / limit) ** 2, 0.0)
         assert length == pytest.approx((weight * values).sum() / weight.sum(), rel=1e-9)
 

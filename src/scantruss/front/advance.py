@@ -28,7 +28,16 @@ from ..kernels.geometry import boxes as boxing
 from ..kernels.geometry.boxes import new_boxes
 from ..kernels.geometry.triangles import quality
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..kernels.surface.local_surface import (
+    NEAREST_SAMPLE,
+    NORMAL,
+    PATCH,
+    Surface,
+    fit_patch,
+    onto_patch,
+    patch_normal,
+    walk,
+)
 from ..kernels.surface.ridges import mean_normal
 from ..runtime.progress import Progress
 from ..settings import Settings
@@ -279,7 +288,7 @@ def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -
     patch = np.zeros(PATCH)
     centre = surface.mean[sample]
     fit_patch(surface, patch, sample, tuple(centre))
-    normal = patch[3:6].copy()
+    normal = patch[NORMAL : NORMAL + 3].copy()
     towards = surface.mean[surface.neighbors[sample, 0]] - centre
     u = towards - normal * (towards @ normal)
     u /= np.linalg.norm(u)
@@ -290,7 +299,7 @@ def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -
         own = np.zeros(PATCH)
         fit_patch(surface, own, sample, tuple(place))
         foot = onto_patch(own, tuple(place))
-        near = walk(surface, int(own[15]), foot)
+        near = walk(surface, int(own[NEAREST_SAMPLE]), foot)
         ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
         lists.add_node(front)
     return ids

@@ -143,9 +143,8 @@ def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
     away = ((level.node - level.mean) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")
     order = order[away[order] < (WITHIN * length) ** 2]
-    chosen, scratch = np.empty(len(away), np.int64), np.full((3, len(away)), -1, np.int64)
-    scratch[0] = 0
-    chosen = chosen[: kernels.list_nodes(level, order, length, CANDIDATE_DISTANCE * length, chosen, scratch)]
+    chosen = np.empty(len(away), np.int64)
+    chosen = chosen[: kernels.list_nodes(level, order, length, CANDIDATE_DISTANCE * length, chosen)]
     first = np.empty(len(away), np.int64)
     first[owner[::-1]] = np.arange(len(owner) - 1, -1, -1)
     return CandidateNodes(level.node[chosen], level.normals[chosen], first[chosen], length)
@@ -159,7 +158,7 @@ def make_levels(surface: Surface, length: float) -> Hierarchy:
     radius = LEVEL_SPACING * length
     while True:
         owner, chosen = np.full(len(mean), -1, np.int64), np.empty(len(mean), np.int64)
-        count = kernels.choose_level(mean, neighbors, radius, owner, chosen, np.full((2, len(mean)), -1, np.int64))
+        count = kernels.choose_level(mean, neighbors, radius, owner, chosen)
         if levels and (count < FEWEST_SAMPLES_OF_A_LEVEL or count > 0.8 * len(mean)):
             return Hierarchy(levels, owners, [_independent_sets(level) for level in levels])
         level = Level(

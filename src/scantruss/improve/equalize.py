@@ -1,11 +1,11 @@
 """Equalizing: members of one length and triangles of one shape, by moving nodes and by local search of the topology.
 
-What falls is one energy, in units of which a member at double length costs 1 and a degenerate triangle costs 1:
+Both lower one energy, in which a member of twice its desired length costs 1 and a degenerate triangle costs 1:
 
     E = weight * sum (L / l_e - 1)^2 over members + sum (1 - G) over triangles + folded members + price * V * (mean L / l_e - 1)^2
 
-where l_e is the mean of what is desired at the two nodes of a member. Where the surface is folded, what nodes and the middles of members
-are off it is added (`kernels.surface.folds`): nodes come to the crest, and members run along it.
+where l_e is the mean of the lengths desired at the two nodes of a member. On a folded surface, the distances of nodes and of the middles
+of members from it are added (`kernels.surface.folds`): nodes move to the crest, and members run along it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from ..grid.grid import Grid
 from ..grid.quality import shape_qualities
-from ..kernels.mesh.equalize import STRIDE, settle_some
+from ..kernels.mesh.equalize import RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
 from ..kernels.mesh.partition import BETWEEN
@@ -27,29 +27,31 @@ from .flips import flip_by_angle
 from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
-WEIGHT = 1.0  # weight of the member lengths against the shapes of the triangles
-# that weight in the last sweeps, when the topology is final, for each `prefer`
-EVEN = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
-LAST_SWEEPS = (12, 6)  # most sweeps of each of the last rounds; patches are fitted anew before each round
-LAST_STRIDE = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
-PRICE = 24.0  # energy per node of a mean length that is off the desired one, for the square of the relative error
-USUAL_ENERGY = 0.1  # largest energy per node that any node is assumed to have
+LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
+LAST_LENGTH_WEIGHT = {
+    "balance": 3.0,
+    "lengths": 8.0,
+    "shapes": 0.5,
+}  # the same in the last sweeps, for each value of `prefer`
+LAST_SWEEPS = (12, 6)  # most sweeps in each of the last rounds; patches are fitted again before each round
+LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
+PRICE = 24.0  # energy per node of a mean length off the desired one, per square of its relative error
+LARGEST_SHARE = 0.1  # largest energy that an average node is assumed to have
 SEARCHES = 6  # most rounds of the local search
-MANY_NODES = 2500  # nodes above which two partitions settle at once; for fewer, waiting costs more than it gains
-AT_ONCE = 2  # sweeps of the partitions between two sweeps of the nodes between them
-ASKING = 200  # nodes to be searched above which two partitions are searched at once
-# how far a node may leave the middle of its patch before that is fitted anew [member lengths]
-FARTHEST_ON_THE_WAY = 0.5
+NODES_SETTLED_IN_HALVES = 2500  # nodes from which on two halves settle at once; with fewer, waiting costs more
+SWEEPS_IN_HALVES = 2  # sweeps of the halves between two sweeps of the nodes between them
+NODES_SEARCHED_IN_HALVES = 200  # irregular nodes from which on two halves are searched at once
+FARTHEST_ON_THE_WAY = 0.5  # distance of a node from the centre of its patch that gets it a new one [member lengths]
 
 
 def new_scratch(mesh: WorkingMesh) -> Scratch:
-    """Return room for the trials of the search, with the numbers of neighbours that suit the nodes."""
+    """Return scratch arrays for the trials of the search, and fill in the ideal valence of each node."""
     suit_nodes(mesh.net)
     return blank_scratch(mesh)
 
 
 def blank_scratch(mesh: WorkingMesh) -> Scratch:
-    """Return room for the trials of the search."""
+    """Return scratch arrays for the trials of the search."""
     capacity, width = mesh.net.ring.shape
     return Scratch(
         held=np.zeros(capacity, np.int64),
@@ -68,10 +70,10 @@ def blank_scratch(mesh: WorkingMesh) -> Scratch:
 
 
 def independent_sets_of(net: Net) -> list[np.ndarray]:
-    """Return the nodes of a net to settle: those of both halves, which may move at once, and those between; all of a small one."""
+    """Return the nodes to settle: those of two halves, which may move at once, and those between; all in one for a small net."""
     live = net.degree > 0
     every = np.flatnonzero(live)
-    if len(every) < MANY_NODES:
+    if len(every) < NODES_SETTLED_IN_HALVES:
         return [every]
     label = Partition(net, live).label[every]
     return [every[label == part] for part in (0, 1, BETWEEN)]
@@ -82,16 +84,16 @@ def settle(
     weight: float,
     enough: float,
     sweeps: int,
-    stride: float = STRIDE,
+    stride: float = RELAXATION,
     independent_sets: list[np.ndarray] | None = None,
 ) -> int:
-    """Move the nodes downhill until a sweep gains less than `enough` a node; returns the sweeps made.
+    """Move the nodes downhill until a sweep gains less than `enough` per node; returns the sweeps made.
 
-    Halves of the net, or the `independent_sets` that it has had since its members last changed, move side by side, a few sweeps at once.
+    independent_sets : nodes as from `independent_sets_of`, if the topology has not changed since
     """
     independent_sets = independent_sets_of(mesh.net) if independent_sets is None else independent_sets
     awake, count = np.ones(len(mesh.net.degree), np.int64), sum(map(len, independent_sets))
-    at_once = sweeps if len(independent_sets) == 1 else AT_ONCE
+    at_once = sweeps if len(independent_sets) == 1 else SWEEPS_IN_HALVES
 
     def move(some: np.ndarray) -> tuple[float, int]:
         of_grid = mesh.net, mesh.patches, mesh.curves, awake, some, mesh.length
@@ -105,26 +107,26 @@ def settle(
 
 
 def settle_again(mesh: WorkingMesh) -> None:
-    """Settle after a round of moves: the nodes have left the middles of their patches."""
+    """Settle after a round of moves, in which nodes have left the centres of their patches."""
     mesh.renew(FARTHEST_ON_THE_WAY)
-    settle(mesh, WEIGHT, 1e-4, 8)
+    settle(mesh, LENGTH_WEIGHT, 1e-4, 8)
 
 
 def search_once(mesh: WorkingMesh, scratch: Scratch) -> int:
-    """Try flips, collapses and splits where nodes ask for them; returns how many were kept.
+    """Try flips, collapses and splits at the nodes that ask for them; returns how many were kept.
 
-    Where many ask, those of two halves of the grid are tried side by side, then those between.
+    If many ask, two halves of the grid are searched at once, then what lies between them.
     """
     net, kept = mesh.net, 0
     asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.tried[:] == 0)
-    if asking.sum() >= ASKING:
+    if asking.sum() >= NODES_SEARCHED_IN_HALVES:
         kept = _search_partition(mesh, Partition(net, asking), scratch)
     terms = terms_of(mesh, scratch)
     return kept + _search(mesh, net, scratch, terms)
 
 
 def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch) -> int:
-    """Search in both halves at once, each with half of the nodes that bring the mean length to the desired one."""
+    """Search both halves at once; each may add half of the nodes that bring the mean length to the desired one."""
     terms = terms_of(mesh, scratch)
     terms = terms._replace(nodes=terms.nodes // 2)
     own = [blank_scratch(mesh), blank_scratch(mesh)]
@@ -138,41 +140,41 @@ def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch)
 
 def _search(mesh: WorkingMesh, net: Net, scratch: Scratch, terms: Terms) -> int:
     of_grid = mesh.patches, mesh.curves, scratch, mesh.length
-    return search(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes)
+    return search(net, *of_grid, LENGTH_WEIGHT, terms.strain, PRICE, terms.share, terms.nodes)
 
 
 class Terms(NamedTuple):
-    """What decides over one node more or less, beside the energy around it."""
+    """What one node more or less costs, besides the energy around it."""
 
     strain: float  #: mean length over desired length - 1
-    share: float  #: energy that any node has
-    nodes: int  #: how many there are
+    share: float  #: energy of an average node
+    nodes: int  #: number of nodes
 
 
 def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
-    """Return the terms of a whole grid as it is now."""
-    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)
-    return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), USUAL_ENERGY), max(count, 1))
+    """Return the terms for a whole grid as it is now."""
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
+    return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
 
 
 def grid_energy(grid: Grid, length: float) -> float:
-    """The energy that falls, of a whole grid; folded members left out."""
+    """Return the energy of a whole grid, without folded members."""
     stretch = grid.stretches(length) - 1.0
     shapes = shape_qualities(grid.nodes, grid.triangles)
     price = PRICE * len(grid.nodes) * float(stretch.mean()) ** 2
-    return WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
+    return LENGTH_WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
 
 
 def energy_of_node(mesh: WorkingMesh) -> float:
-    """The energy that falls, of an opened grid, for one node: grids of other numbers of nodes can be compared."""
-    energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, WEIGHT)
+    """Return the energy of an opened grid per node, which compares grids with different numbers of nodes."""
+    energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)
     return energy / max(count, 1) + PRICE * (mean / mesh.length - 1.0) ** 2
 
 
 def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None) -> None:
-    """Flip, settle, and search while it pays: the default way to improve a grid."""
+    """Flip, settle and search until no move is kept: the default way to improve a grid."""
     flip_by_angle(mesh.net)
-    settle(mesh, WEIGHT, 1e-3, 60)
+    settle(mesh, LENGTH_WEIGHT, 1e-3, 60)
     scratch = new_scratch(mesh)
     for done in range(SEARCHES):
         if progress:
@@ -183,9 +185,9 @@ def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None)
 
 
 def finish(mesh: WorkingMesh, prefer: str = "balance") -> None:
-    """Settle for good: each node on the surface that is fitted to the scan around it, by what is preferred."""
+    """Settle for the last time, with weights by what is preferred, and return the nodes to the scan."""
     independent_sets = independent_sets_of(mesh.net)
     for sweeps in LAST_SWEEPS:
         mesh.renew(NEAR_IN_THE_END)
-        settle(mesh, EVEN[prefer], 1e-5, sweeps, LAST_STRIDE, independent_sets)
+        settle(mesh, LAST_LENGTH_WEIGHT[prefer], 1e-5, sweeps, LAST_RELAXATION, independent_sets)
     mesh.return_to_scan(NEAR_IN_THE_END)

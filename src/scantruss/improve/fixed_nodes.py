@@ -10,19 +10,20 @@ from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import ON_CURVE, REST, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch, total_energy
+from ..kernels.surface.local_surface import NEAREST_SAMPLE
 from ..surface.samples import local_field
-from .equalize import FARTHEST_ON_THE_WAY, WEIGHT, new_scratch, search_once, settle
+from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 
-AT_BOUNDARY = 0.33  # a position this close to the boundary becomes a boundary node [member lengths]
-SAME_PLACE = 1e-6  # a node this close to a position is already there [member lengths]
-CHOICES = 3  # nearest nodes, and nearest edges, that are tried for a fixed node
+AT_BOUNDARY = 0.33  # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
+SAME_PLACE = 1e-6  # distance up to which a node is already at a position [member lengths]
+CHOICES = 3  # number of the nearest nodes, and of the nearest edges, that are tried for a fixed node
 
 
 def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
-    """Nodes that may be moved to a place, nearest first: not corners, not fixed; of the boundary or line that it is at.
+    """Nodes that may be moved to a place, nearest first: no corners or fixed nodes; only those of a boundary or line that it is on.
 
-    A place nearer to a corner than that is the corner: between two nodes so near to each other no triangle is sound.
+    For a place close to a corner it is the corner alone: two nodes so close to each other would spoil the triangles between them.
     """
     net = mesh.net
     free = (net.degree > 0) & (net.kind < REST)
@@ -37,14 +38,14 @@ def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
     if curve >= 0 and distance <= AT_BOUNDARY * local and np.any(free & near):
         free &= near
     else:
-        free &= ~on_line  # a line is bent by no more than that
+        free &= ~on_line  # a line may not be bent farther than that
     nodes = np.flatnonzero(free)
     order = np.argsort(((net.nodes[nodes] - place) ** 2).sum(axis=1), kind="stable")
     return nodes[order]
 
 
 def _node_at(mesh: WorkingMesh, place: np.ndarray) -> int:
-    """Node that stands at a place already, -1 where there is none."""
+    """Node that is already at a place, -1 if there is none."""
     net = mesh.net
     squares = np.where(net.degree > 0, ((net.nodes - place) ** 2).sum(axis=1), np.inf)
     v = int(squares.argmin())
@@ -52,7 +53,7 @@ def _node_at(mesh: WorkingMesh, place: np.ndarray) -> int:
 
 
 def _put_node(mesh: WorkingMesh, v: int, place: np.ndarray) -> None:
-    """Move a node to an fixed position, where it rests from now on."""
+    """Move a node to a fixed position, where it stays at rest."""
     net = mesh.net
     if net.kind[v] == ON_CURVE:
         net.curve[v], net.arc[v], _ = nearest_on_curves(mesh.curves, *place.tolist())
@@ -62,7 +63,7 @@ def _put_node(mesh: WorkingMesh, v: int, place: np.ndarray) -> None:
 
 
 def fix_nearest_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
-    """Move the node nearest to each position there, as the paper does (Sec. 4.2); all else is left to the smoothing."""
+    """Move the nearest node to each position, as the paper does (Sec. 4.2); the rest is left to the smoothing."""
     for place in positions:
         v = _node_at(mesh, place)
         nodes = _candidates(mesh, place)
@@ -78,17 +79,17 @@ def _no_node(place: np.ndarray) -> InputError:
 
 
 def hold_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
-    """Let nodes that stand at fixed positions already rest there: the front has come to them."""
+    """Keep nodes at rest that are already at fixed positions because the front has used them."""
     for place in positions:
         if (v := _node_at(mesh, place)) >= 0:
             _put_node(mesh, v, place)
 
 
 def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
-    """Make a node at each position, by whatever disturbs the grid least.
+    """Make a node at each position in the way that disturbs the grid least.
 
-    Moving one of the nearest nodes and splitting one of the nearest edges are tried in turn; after each the grid around is
-    settled and searched, and the way with the least energy is kept.
+    Moving one of the nearest nodes and splitting one of the nearest edges are tried in turn; after each, the grid around is settled and
+    searched, and the result of least energy is kept.
     """
     if not len(positions):
         return
@@ -102,7 +103,7 @@ def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
         for way in _ways(mesh, place):
             _restore(mesh, start)
             _take(mesh, scratch, way, place)
-            energy = total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
+            energy = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
             if energy < least:
                 best, least = _copy(mesh), energy
         if best is None:
@@ -134,7 +135,7 @@ def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.n
     if b >= 0:
         a, v = v, split(net, v, b)
         mesh.patches[v] = mesh.patches[a]
-        mesh.patches[v, 15] = nearest_sample(mesh.surface, *place.tolist())
+        mesh.patches[v, NEAREST_SAMPLE] = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(mesh, v, place)
     around = {v}
@@ -143,7 +144,7 @@ def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.n
     scratch.tried[sorted(around)] = 0
     for _ in range(3):
         mesh.renew(FARTHEST_ON_THE_WAY)
-        settle(mesh, WEIGHT, 1e-3, 6)
+        settle(mesh, LENGTH_WEIGHT, 1e-3, 6)
         if search_once(mesh, scratch) == 0:
             break
 

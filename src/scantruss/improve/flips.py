@@ -1,4 +1,4 @@
-"""Delaunay optimization: flips by the largest smallest angle (Sec. 4.1)."""
+"""Delaunay optimization: flips that raise the smallest angle (Sec. 4.1)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from ..kernels.mesh import flips as kernels
 from ..kernels.mesh.grid import Net
 from .working_mesh import close_net, open_net
 
-FOLD = 0.0  # least cosine between the normals of two triangles after a flip, unless they were folded more before
-MOST_ROUNDS = 100  # most rounds over all edges; a few are enough
+LEAST_COSINE = 0.0  # least cosine between the normals of two triangles after a flip, unless it was lower before
+MOST_FLIP_ROUNDS = 100  # most rounds over all edges; a few are enough
 
 
 def flip_edges(grid: Grid) -> tuple[Grid, int]:
-    """Flip every edge whose flip makes the smallest angle of its two triangles larger, until none does.
+    """Flip each edge where that raises the smallest angle of its two triangles, until no flip does.
 
-    Boundary edges stay, no edge comes to be twice, the grid is not folded, and no interior node is left with fewer than
-    four members: the topology cannot change.
+    Boundary edges are kept, no edge is duplicated, the grid is not folded, and no interior node is left with fewer than four
+    members, so the topology cannot change.
 
     Returns
     -------
@@ -35,4 +35,4 @@ def flip_edges(grid: Grid) -> tuple[Grid, int]:
 
 def flip_by_angle(net: Net) -> int:
     """Flip the edges of an opened grid in place; returns the flips made."""
-    return int(kernels.flip_by_angle(net, FOLD, MOST_ROUNDS, np.full(len(net.arc), -1, np.int64)))
+    return int(kernels.flip_by_angle(net, LEAST_COSINE, MOST_FLIP_ROUNDS, np.full(len(net.arc), -1, np.int64)))

@@ -1,4 +1,4 @@
-"""Grid optimization and adjustment (Sec. 4): what happens to a grid after the front."""
+"""Grid optimization and adjustment (Sec. 4): all that is done to a grid after the front."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}  # weight of folds: the longer search pays for them in even members
+FOLDS = {
+    "quick": 1.0,
+    "normal": 1.0,
+    "best": 1.6,
+}  # factor of the weight of folds: a longer search can afford more of it
 
 Report = Callable[[float], None]
 
@@ -141,6 +145,6 @@ def improve_last(
 
 
 def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples) -> None:
-    """Let the nodes down on the scan by patches as narrow as it allows."""
+    """Project the nodes onto the scan by patches as narrow as it allows."""
     mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)))
     mesh.name_distances(samples.measured)

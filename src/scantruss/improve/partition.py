@@ -1,4 +1,4 @@
-"""A grid in two halves, which two threads improve at once: the same halves for any number of processors."""
+"""A grid in two halves that two threads improve at once; the halves are the same for any number of processors."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..runtime.parallel import in_parts
 
 
 class Partition:
-    """The two halves of a net, each a net with free nodes of its own; the nodes between them stay as they are.
+    """The two halves of a net, each a net with free nodes of its own; the nodes between them do not change.
 
     Parameters
     ----------
     net : Net
-    among : (C,) bool, the nodes that there is work at: each half has about as many of these as the other
+    among : (C,) bool, the nodes to be worked at, about as many in either half
     """
 
     def __init__(self, net: Net, among: np.ndarray) -> None:

@@ -1,32 +1,44 @@
-"""Perturbations of a whole grid: from where a search that only goes down does not get on."""
+"""Perturbations of a whole grid: the way out of the local minima of the search."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..kernels.mesh.grid import Net
-from ..kernels.mesh.perturbation import ALLOWANCE_SEARCHED, ALLOWANCE_SETTLED, KEPT, MOST_NODES, Area, perturb_all
+from ..kernels.mesh.perturbation import (
+    ALLOWANCE_SEARCHED,
+    ALLOWANCE_SETTLED,
+    MOST_NODES,
+    SAVED_FREE_NODES,
+    Area,
+    perturb_all,
+)
 from ..kernels.mesh.trial import Scratch
-from .equalize import FARTHEST_ON_THE_WAY, PRICE, WEIGHT, Terms, new_scratch, settle_again, terms_of
+from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, PRICE, Terms, new_scratch, settle_again, terms_of
 from .partition import Partition
 from .working_mesh import WorkingMesh
 
-PERTURBATIONS = {
-    "quick": (0, 0.0),
-    "normal": (6, 0.0),
-    "best": (40, 0.2),
-}  # rounds of perturbations, and what they may cost at first
-# nodes above which `normal` perturbs once and in partitions: there the boundary decides little
-NODES_OF_LARGE_GRID = 700
-HALVINGS, FEW_NODES = 2, 12  # times that it does so, as long as so many nodes wait
-HOT = 0.8  # share of the rounds in which a perturbation may raise the energy
-DARING = 5.0  # how much more energy is allowed while searching, in allowances of the round
+
+class Annealing(NamedTuple):
+    """How a grid is perturbed."""
+
+    rounds: int
+    temperature: float  #: energy that a perturbation may cost in the first round, on average
+
+
+PERTURBATIONS = {"quick": Annealing(0, 0.0), "normal": Annealing(6, 0.0), "best": Annealing(40, 0.2)}  # for each effort
+NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in halves: there the boundary matters little
+HALVINGS = 2  # most times that a large grid is perturbed in halves
+IRREGULAR_NODES_FOR_HALVES = 12  # fewest irregular nodes for that
+HOT_ROUNDS = 0.8  # share of the rounds in which a perturbation may raise the energy
+ALLOWANCE_PER_TEMPERATURE = 5.0  # further energy that a perturbation may cost once searched [temperature of the round]
 
 
 def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
-    """Return room for what a perturbation may change, and a source of chance of its own for each number."""
+    """Return scratch arrays for a perturbation, with a random sequence of its own for each number."""
     capacity, width = mesh.net.ring.shape
     return Area(
         **{name: np.zeros(capacity, np.int64) for name in ("mark", "away", "out")},
@@ -39,16 +51,16 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
         desired=np.zeros(MOST_NODES),
         ring=np.zeros((MOST_NODES, width), np.int64),
         patches=np.zeros((MOST_NODES, mesh.patches.shape[1])),
-        free=np.zeros(KEPT, np.int64),
+        free=np.zeros(SAVED_FREE_NODES, np.int64),
         **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
         seed=np.array([7919 * number]),
     )
 
 
 def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], None] | None = None) -> None:
-    """Perturb the grid at its irregular nodes: what a search from there finds is kept if it has paid.
+    """Perturb the grid at its irregular nodes, search from there, and keep what lowers the energy.
 
-    For `best` it may cost a little at first and less and less later on (simulated annealing).
+    With `best` it may rise a little at first, and less and less later on (simulated annealing).
     """
     rounds, temperature = PERTURBATIONS[effort]
     if not rounds:
@@ -60,8 +72,8 @@ def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], No
         for done in range(rounds):
             if progress:
                 progress(0.6 + 0.2 * done / rounds)
-            cooled = temperature * max(0.0, 1.0 - done / (HOT * rounds))
-            allowance = ALLOWANCE_SEARCHED + DARING * cooled if temperature else ALLOWANCE_SETTLED
+            cooled = temperature * max(0.0, 1.0 - done / (HOT_ROUNDS * rounds))
+            allowance = ALLOWANCE_SEARCHED + ALLOWANCE_PER_TEMPERATURE * cooled if temperature else ALLOWANCE_SETTLED
             waiting = np.ones(len(mesh.net.arc), np.bool_)
             perturb(mesh, mesh.net, room, waiting, terms_of(mesh, room[0]), cooled, allowance)
             mesh.renew(FARTHEST_ON_THE_WAY)
@@ -69,16 +81,16 @@ def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], No
 
 
 def perturb_in_parts(mesh: WorkingMesh) -> None:
-    """Perturb a large grid once at each irregular node, in halves side by side, and give up early what will hardly pay.
+    """Perturb a large grid once at each irregular node, two halves at a time, and give up early on what will hardly pay.
 
-    What lies between the halves is perturbed in other halves, and what is left then by itself.
+    What lies between the halves is perturbed in other halves, and the rest in the end.
     """
     net, waiting = mesh.net, np.ones(len(mesh.net.arc), np.bool_)
     rooms = [(new_scratch(mesh), new_area(mesh, number)) for number in range(3)]
 
     def perturb_both(partition: Partition) -> None:
         terms = terms_of(mesh, rooms[2][0])
-        terms = terms._replace(nodes=terms.nodes // 2)  # each half brings the mean length to the desired one by itself
+        terms = terms._replace(nodes=terms.nodes // 2)  # each half adjusts the mean length by itself
         for side in (0, 1):
             rooms[side][1].out[:] = partition.label != side
         partition.run(
@@ -87,7 +99,7 @@ def perturb_in_parts(mesh: WorkingMesh) -> None:
 
     for _ in range(HALVINGS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
-        if irregular.sum() >= FEW_NODES:
+        if irregular.sum() >= IRREGULAR_NODES_FOR_HALVES:
             perturb_both(Partition(net, irregular))
     perturb(mesh, net, rooms[2], waiting, terms_of(mesh, rooms[2][0]), 0.0, ALLOWANCE_SEARCHED)
     mesh.renew(FARTHEST_ON_THE_WAY)
@@ -102,6 +114,6 @@ def perturb(
     temperature: float,
     allowance: float,
 ) -> None:
-    """Perturb a net of the grid once at each irregular node waiting (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
+    """Perturb a net of the grid once at each waiting irregular node (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
     of_grid = mesh.patches, mesh.curves, *room, waiting, mesh.length
-    perturb_all(net, *of_grid, WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, temperature, allowance)
+    perturb_all(net, *of_grid, LENGTH_WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, temperature, allowance)

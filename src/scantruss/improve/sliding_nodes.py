@@ -1,4 +1,4 @@
-"""Nodes of lines in an opened grid: which slide, and on which curve."""
+"""Nodes of lines in an opened grid: which of them slide, and on which curves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..grid.grid import Grid
 from ..kernels.boundary.curves import Curves, nearest_on_curves
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, Net
 
-SNAP = 0.4  # the end of a line is the nearest node of a line within this distance [member lengths]
+SNAP = 0.4  # distance within which the nearest node of a line is the end of the line [member lengths]
 
 
 def joined(first: Curves, second: Curves) -> Curves:
@@ -43,7 +43,7 @@ def with_boundary_members(grid: Grid, lines: Lines, length: float) -> Grid:
 
 
 def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length: float) -> None:
-    """Let the nodes of lines slide on the nearest curve; ends, corners, meetings and fixed nodes (C,) stay at rest.
+    """Let the nodes of lines slide on the nearest curve; ends, corners, crossings and fixed nodes (C,) stay at rest.
 
     The curves of the lines are numbered from `first` on.
     """

@@ -12,7 +12,7 @@ from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
 
 class State(NamedTuple):
-    """What the stops look at."""
+    """The figures by which smoothing stops."""
 
     shape: float  #: mean shape quality of the triangles
     spread: float  #: standard deviation of the member lengths [scan unit]
@@ -22,8 +22,8 @@ class State(NamedTuple):
 class Smoothing(NamedTuple):
     """How a smoothing went."""
 
-    passes: int  #: passes that were kept
-    stop: str  #: "a", "b" or "c" as in Sec. 4.1; "" where `smooth_passes` were made
+    passes: int  #: number of passes that were kept
+    stop: str  #: "a", "b" or "c" as in Sec. 4.1; "" if `smooth_passes` were made
 
 
 def shape_no_longer_improves(before: State, after: State) -> bool:
@@ -47,10 +47,9 @@ def deviation_allowed(settings: Settings, local: float = 1.0) -> float:
 
 
 def smooth(mesh: WorkingMesh, settings: Settings) -> Smoothing:
-    """Smooth a grid by passes of Taubin's two steps, each with a return to the scan, until one of the stops.
+    """Smooth a grid by passes of Taubin's two steps and a return to the scan, until one of the stops applies.
 
-    A pass after which a stop holds is undone: the better state is kept. Corners and fixed nodes stay where they are, boundary
-    nodes slide along their curve.
+    The pass after which a stop applies is undone. Corners and fixed nodes stay in place; boundary nodes slide along their curve.
     """
     net = mesh.net
     start, before, spare = net.nodes.copy(), net.nodes.copy(), np.empty_like(net.nodes)

@@ -1,4 +1,4 @@
-"""Relief: a grid taken apart for the kernels, on the scanned surface and its boundary curves."""
+"""Working mesh: a grid opened for the kernels, on the scanned surface and its boundary curves."""
 
 from __future__ import annotations
 
@@ -15,48 +15,41 @@ from ..kernels.mesh import grid as kernels
 from ..kernels.mesh import point_location
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, REST, Net
 from ..kernels.mesh.projection import project_nodes
-from ..kernels.surface.local_surface import PATCH, Surface
+from ..kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, Surface
 from ..runtime.parallel import in_parts
 from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
 from .sliding_nodes import find_on_lines, inner_lines, joined
 
-NEAR_IN_THE_END = 0.25  # how far a node may be from the middle of its patch in the end [member lengths]
+NEAR_IN_THE_END = 0.25  # largest distance of a node from the centre of its patch in the end [member lengths]
 NODES_PER_THREAD = 300  # fewest nodes worth a thread of their own
-# parts into which the nodes of a thread are divided for projection; nodes at the boundary take less time
-PROJECTION_PARTS = 3
-WIDTH = 12  # most neighbours of a node while the grid is improved, unless it had more
-MOST_NEIGHBORS = 60  # most neighbours of a node where there are lines: their members are bits of a number
+PROJECTION_PARTS = 3  # parts per thread in projection, as nodes at the boundary take less time
+LARGEST_DEGREE = 12  # most neighbours of a node while the grid is improved, unless it had more
+LARGEST_DEGREE_WITH_LINES = 60  # most neighbours of a node in a grid with lines, which are bits of an integer
 
 #: a grid but for where it lies, and the node of the net that each of its nodes is (V,)
 Closed = tuple[Grid, np.ndarray]
 
 
-def no_boundary() -> Curves:
-    """Return the curves of a closed scan: none."""
-    return Curves(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
-
-
 def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
-    """Take a grid apart into rings of neighbours.
+    """Open a grid: return it as rings of neighbours.
 
-    A node whose triangles are several fans becomes several nodes of the net; these and the nodes of seams (edges that do
-    not have two triangles of one orientation, yet are no boundary) are LOCKED. Boundary nodes, fixed nodes and those of lines are
-    at REST.
+    A node whose triangles form several fans becomes several nodes of the net; these and the nodes of seams (edges inside the grid
+    without two triangles of one orientation) are LOCKED. Boundary nodes, fixed nodes and those of lines are at REST.
 
     Returns
     -------
     Net
-    (C,) int64 : node of the grid that each node of the net stands for, -1 where there is none yet
+    (C,) int64 : node of the grid that each node of the net stands for, -1 for none
     """
     count = len(grid.nodes)
     corner_node, partner = _half_edges(grid.triangles, count)
     valence = int(np.bincount(grid.edges.ravel(), minlength=1).max()) if len(grid.edges) else 0
-    most = count + int((partner < 0).sum())  # every fan more than one at a node is open
+    most = count + int((partner < 0).sum())  # every further fan of a node is open
     capacity = most + len(grid.triangles) // 4 + 64
     net = Net(
         nodes=np.zeros((capacity, 3)),
-        ring=np.zeros((capacity, max(WIDTH, valence + 2)), np.int64),
+        ring=np.zeros((capacity, max(LARGEST_DEGREE, valence + 2)), np.int64),
         **{name: np.zeros(capacity, np.int64) for name in ("degree", "is_open", "kind", "ideal", "line")},
         curve=np.full(capacity, -1),
         arc=np.zeros(capacity),
@@ -65,7 +58,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         in_use=np.zeros(1, np.int64),
         desired=np.ones(capacity),
     )
-    if len(grid.lines) and net.ring.shape[1] > MOST_NEIGHBORS:
+    if len(grid.lines) and net.ring.shape[1] > LARGEST_DEGREE_WITH_LINES:
         raise FrontError(f"a node came out with {valence} members; use another length", grid)
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
@@ -88,12 +81,12 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
 
 
 def close_net(net: Net, source: np.ndarray, grid: Grid) -> Grid:
-    """Put a net together again, with all else as in `grid`; nodes without a triangle are dropped."""
+    """Close a net: return it as a grid, with all else as in `grid`; nodes without a triangle are dropped."""
     return join_again(net, source, grid)[0]
 
 
 def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
-    """Put the triangles of a net together again; returns them, and the node of the net that each node stands for (V,)."""
+    """Close a net: return it as a grid, and the node of the net that each node of that stands for (V,)."""
     used = net.used
     room = np.empty((int(net.degree[:used].sum()) + 1, 3), np.int64)
     triangles = room[: kernels.list_triangles(net, room)]
@@ -111,7 +104,7 @@ def join_again(net: Net, source: np.ndarray, grid: Grid) -> Closed:
 
 
 def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Members of lines (K, 2) between the nodes kept, smaller first, sorted."""
+    """Return the members of lines (K, 2) between the nodes kept, the lower node first, sorted."""
     pairs = set()
     for v in np.flatnonzero((net.line[: net.used] != 0) & (net.degree[: net.used] > 0)).tolist():
         for i, u in enumerate(net.ring[v, : net.degree[v]].tolist()):
@@ -122,22 +115,18 @@ def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class WorkingMesh:
-    """What the improvement works on: the net, the scan below it, its boundary curves."""
+    """What the improvement works on: the net, the scan under it and its boundary curves."""
 
     net: Net
-    source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 new
+    source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 for a new one
     surface: Surface
     patches: np.ndarray  #: (C, PATCH) local surface of each node
-    fixed: np.ndarray  #: (C,) bool, nodes at positions that the user appointed
+    fixed: np.ndarray  #: (C,) bool, nodes at fixed positions
     curves: Curves
-    length: float  #: desired member length, that of the length field's 1 [scan unit]
-    projection_distance: (
-        np.ndarray
-    )  #: (C,) distance from the scan after `project_onto_scan`, NaN before and over closed holes [scan unit]
-    sharp: (
-        np.ndarray
-    )  #: (N,) bool for each curve of the boundary, whether it is a ridge, which the local surface rounds off
-    folds: float  #: weight of nodes and members off the folds of the scan
+    length: float  #: desired member length where the length field is 1 [scan unit]
+    projection_distance: np.ndarray  #: (C,) from the scan; NaN before projection and over closed holes [scan unit]
+    sharp: np.ndarray  #: (N,) bool, which of the curves are ridges, which the local surface rounds off
+    folds: float  #: weight of the distances of nodes and members from the folds of the scan
 
     @classmethod
     def from_grid(
@@ -150,10 +139,10 @@ class WorkingMesh:
         lines: Lines = NO_LINES,
         folds: float = 0.0,
     ) -> WorkingMesh:
-        """Take a grid apart; every node finds its place on the scan, on the boundary curves and lines.
+        """Open a grid and locate its nodes on the scan, its boundary curves and lines.
 
-        Boundary nodes and those of lines slide along the nearest curve; corners, ends and meetings of lines and nodes far from
-        every curve stay at rest.
+        Nodes of the boundary and of lines slide along the nearest curve; corners, ends and crossings of lines and nodes far from all
+        curves stay at rest.
 
         Parameters
         ----------
@@ -163,7 +152,7 @@ class WorkingMesh:
         corners : (K, 3) float64 corners of the boundary [scan unit]
         length : desired member length [scan unit]
         lines : the lines that the grid was made with
-        folds : weight of nodes and members off the folds of the scan
+        folds : weight of the distances of nodes and members from the folds of the scan
         """
         net, source = open_net(grid)
         curves = Curves(*(np.ascontiguousarray(array) for array in curves))
@@ -182,7 +171,7 @@ class WorkingMesh:
         return mesh
 
     def project_onto_scan(self, fine: Surface, middle: Surface, broad: Surface) -> None:
-        """Let every node down on the scanned surface as narrow patches follow it; only fixed nodes and those of ridges stay."""
+        """Project each node onto the scanned surface by patches as narrow as possible, except fixed nodes and those of ridges."""
         self.projection_distance[:] = 0.0
         stay = self.fixed | self._on_ridge()
 
@@ -203,7 +192,7 @@ class WorkingMesh:
         return is_graded(self.surface)
 
     def _on_ridge(self) -> np.ndarray:
-        """Which nodes slide on a ridge or stand at an end of one, (C,) bool."""
+        """Which nodes slide on a ridge or lie at an end of one, (C,) bool."""
         net, stay = self.net, np.zeros(len(self.fixed), np.bool_)
         if self.sharp.any():
             sliding = (net.degree > 0) & (net.line != 0) & (net.kind == ON_CURVE)
@@ -213,11 +202,11 @@ class WorkingMesh:
         return stay
 
     def name_distances(self, measured: int) -> None:
-        """Forget the distance from the scan of nodes over closed holes, whose sample is none of the first `measured`."""
-        self.projection_distance[self.patches[:, 15] >= measured] = np.nan
+        """Set the distance from the scan to NaN for nodes over closed holes, whose sample is not one of the first `measured`."""
+        self.projection_distance[self.patches[:, NEAREST_SAMPLE] >= measured] = np.nan
 
     def _scratch(self, part: int) -> Surface:
-        """The scan for one of several threads."""
+        """The scan with scratch arrays of one thread."""
         if part not in self._scans:
             self._scans[part] = self.surface if part == 0 else with_own_scratch(self.surface)
         return self._scans[part]
@@ -227,7 +216,7 @@ class WorkingMesh:
         return {}
 
     def renew(self, near: float) -> None:
-        """Fit the scan anew under nodes farther than `near` lengths from the middle of their patch; renew the lengths desired there."""
+        """Fit new patches to nodes farther than `near` lengths from the centre of theirs, and update their desired lengths."""
 
         def renew_part(part: int, begin: int, end: int) -> None:
             surface = self._scratch(part)
@@ -238,7 +227,7 @@ class WorkingMesh:
         in_parts(self.net.used, NODES_PER_THREAD, renew_part)
 
     def return_to_scan(self, near: float) -> None:
-        """Bring the nodes back onto the scan and the boundary curves; patches no farther than `near` lengths."""
+        """Return the nodes to the scan and the boundary curves, by patches centred within `near` lengths."""
         self.renew(near)
         point_location.return_to_scan(self.net, self.patches, self.curves, 0.5 * self.length)
 
@@ -252,13 +241,13 @@ class WorkingMesh:
         return values
 
     def close(self, grid: Grid) -> Closed:
-        """Put the net together again and see what it is, with all else as in `grid`."""
+        """Close the net, with all else as in `grid`, and compute its topology."""
         closed, kept = join_again(self.net, self.source, grid.replace(fixed=self.fixed))
         _ = closed.topology, closed.edge_triangles
         return closed, kept
 
     def to_grid(self, grid: Grid, closed: Closed | None = None) -> Grid:
-        """Put the net together again, with all else as in `grid`, or as it was `closed` already; deviation measured."""
+        """Close the net, with all else as in `grid`, unless it was `closed` already, and measure the deviation."""
         deviation = self.deviation()
         again, kept = closed or join_again(self.net, self.source, grid.replace(fixed=self.fixed))
         desired = self.length * self.net.desired[kept] if self.graded else None
@@ -268,8 +257,8 @@ class WorkingMesh:
 def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the node of each corner (3 T,) and the half-edge opposite to each half-edge (3 T,), -1 where there is none.
 
-    Half-edge 3 t + k runs from corner k of triangle t to the next. Two are partners only if they are the only ones on
-    their edge and run in opposite directions: the grid is cut along all other edges.
+    Half-edge 3 t + k runs from corner k of triangle t to the next. Two are opposite if they are the only ones on their edge and
+    run in opposite directions; the grid is cut along all other edges.
     """
     start = np.ascontiguousarray(triangles).reshape(-1).copy()
     end = np.ascontiguousarray(triangles[:, [1, 2, 0]]).reshape(-1)

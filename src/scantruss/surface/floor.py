@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-LEVEL = 0.996  # least upward part of the normal of a floor: 5 degrees
-FLAT = 0.004  # largest rms distance of a floor from its plane [its longest side]
-UNDER = 0.7  # share of the other pieces that lies over the floor in plan, at least
-COVERED = 0.25  # share of the floor that lies under the other pieces in plan, at least
+LEVEL_COSINE = 0.996  # least cosine between the normal of a floor and the vertical: 5 degrees
+FLOOR_RMS = 0.004  # largest rms distance of a floor from its plane [its longest side]
+SHARE_OVER_FLOOR = 0.7  # least share of the other pieces that lies over the floor in plan
+SHARE_OF_FLOOR = 0.25  # least share of the floor that lies under the other pieces in plan
 
 
 def find_floor(mean: np.ndarray, piece: np.ndarray, pieces: tuple[int, ...], cell: float) -> int | None:
-    """Return which of some pieces is the floor under the others; None where none can be told.
+    """Return which of some pieces is the floor under the others, None if none is.
 
     Parameters
     ----------
-    mean : (S, 3) samples, z upwards [scan unit]
-    piece : (S,) piece of each
+    mean : (S, 3) positions of the samples, z upwards [scan unit]
+    piece : (S,) piece of each sample
     pieces : numbers of the pieces
-    cell : width of the cells in which plans are compared, wider than samples lie apart [scan unit]
+    cell : width of the cells by which plans are compared, wider than the spacing of the samples [scan unit]
     """
     if len(pieces) < 2:
         return None
@@ -26,16 +26,16 @@ def find_floor(mean: np.ndarray, piece: np.ndarray, pieces: tuple[int, ...], cel
     floor, others = mean[piece == lowest], mean[np.isin(piece, [p for p in pieces if p != lowest])]
     middle = floor.mean(axis=0)
     _, spread, axes = np.linalg.svd(floor - middle, full_matrices=False)
-    flat = spread[2] / np.sqrt(len(floor)) <= FLAT * float(np.ptp(floor, axis=0).max())
+    flat = spread[2] / np.sqrt(len(floor)) <= FLOOR_RMS * float(np.ptp(floor, axis=0).max())
     if (
         not flat
-        or abs(axes[2, 2]) < LEVEL
+        or abs(axes[2, 2]) < LEVEL_COSINE
         or float(((others - middle) @ (axes[2] * np.sign(axes[2, 2]))).min()) <= cell
     ):
         return None
     below, above = _cells(floor, cell), _cells(others, cell)
     both = len(below & above)
-    return lowest if both >= UNDER * len(above) and both >= COVERED * len(below) else None
+    return lowest if both >= SHARE_OVER_FLOOR * len(above) and both >= SHARE_OF_FLOOR * len(below) else None
 
 
 def _cells(points: np.ndarray, cell: float) -> set[tuple[int, int]]:

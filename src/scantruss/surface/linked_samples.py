@@ -1,4 +1,4 @@
-"""Samples chosen among the points, each point given to its sample, and samples linked to those beside them."""
+"""Surface samples: chosen among the points, given the points nearest to them, and linked to their neighbours."""
 
 from __future__ import annotations
 
@@ -15,22 +15,21 @@ from ..scan.normals import SAMPLES_PER_THREAD
 from .streamline import is_dense, streamlined
 
 NEIGHBORS = 12  # most links of a sample
-CLOSE = 2.2  # size of the search boxes while samples are chosen [sample radii]
-# number of points above which they are sorted in space, because they no longer fit into the cache
-POINTS_TO_SORT = 250_000
-MANY_SAMPLES = 40_000  # the same number where most points are samples of their own, which needs more memory
-LONE = 0.3  # point spacing above which most points are samples of their own [sample radii]
-LARGE = 8.0  # radius of the samples by which points are sorted [sample radii]
+BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
+POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
+SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
+LONE_SPACING = 0.3  # point spacing above which most points are samples themselves [sample radii]
+SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]
 POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
 PATCH_SPACING = 0.3  # point spacing that is dense enough for fitting patches [sample radii]
 ROUGH = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
 SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
 MANY_ROUGH = 0.007  # share of rough samples above which they are moved; fewer may lie along ridges
 SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
-FINER = 2  # times that the samples are made twice as fine, to see whether a thick layer is several sheets
-FINEST = 1.0  # least distance between samples [point spacings]
-BENT = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
-SAMPLES_WITHOUT_ROOM_FOR_RIDGE = 2  # samples at which a smooth scan may be rough: too few for a ridge
+MOST_REFINEMENTS = 2  # most times that the sample radius is halved to see whether a thick layer is several sheets
+FINEST_RADIUS = 1.0  # smallest radius of a sample [point spacings]
+SMOOTH_THICKNESS = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
+SAMPLES_WITHOUT_ROOM_FOR_RIDGE = 2  # rough samples that a smooth scan may have: too few for a ridge
 
 
 class Linked(NamedTuple):
@@ -48,16 +47,16 @@ class Linked(NamedTuple):
 
 
 def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float) -> np.ndarray:
-    """Return those of very dense points, within these bounds, that serve as well as all of them, sorted where they are many.
+    """Return as many of the points, which lie within these bounds, as the samples need; large numbers of them sorted in space.
 
-    Sorted by much larger samples, what lies together in space does so in memory, in all that follows. By samples, not by boxes: a scan
-    that is turned or moved stays sorted as it was.
+    They are sorted by much larger samples, so that points close in space are close in memory. Samples serve better than boxes here:
+    turning or moving a scan does not change the order.
     """
     if is_dense(spacing, PATCH_SPACING * radius):
         points = points.take(streamlined(points, bounds, PATCH_SPACING * radius), axis=0)
-    if len(points) < (MANY_SAMPLES if spacing > LONE * radius else POINTS_TO_SORT):
+    if len(points) < (SAMPLES_TO_SORT if spacing > LONE_SPACING * radius else POINTS_TO_SORT):
         return points
-    owner, _, places, _, _ = _settled(points, LARGE * radius, 0.0, 0.0)
+    owner, _, places, _, _ = _settled(points, SORTING_RADIUS * radius, 0.0, 0.0)
     return group(points, owner, len(places))[0]
 
 
@@ -69,11 +68,11 @@ def link_samples(points: np.ndarray, radius: float, length: float, spacing: floa
 
 
 def is_smooth(found: Linked, length: float, uneven: float) -> bool:
-    """Whether the scan is a smooth surface at the samples, flat or evenly bent: larger samples tell as much of it as smaller ones.
+    """Whether the scan is a smooth surface, flat or evenly bent, so that larger samples describe it as well as smaller ones.
 
-    uneven : angle by which the normals of neighbours, one mirrored to the other, differ at most [degree]
+    uneven : largest angle between the normals of neighbours after one is mirrored to the other [degree]
     """
-    if (found.thickness > BENT * length).sum() > SAMPLES_WITHOUT_ROOM_FOR_RIDGE:
+    if (found.thickness > SMOOTH_THICKNESS * length).sum() > SAMPLES_WITHOUT_ROOM_FOR_RIDGE:
         return False
     marks, least = np.empty(len(found.mean), np.bool_), float(np.cos(np.radians(uneven)))
     linked = found.mean, found.normals, found.neighbors
@@ -86,13 +85,13 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
 
 
 def link_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
-    """Return finer samples, and their radius, where these form smooth sheets; None where they do not.
+    """Return finer samples and their radius if they form smooth sheets, else None.
 
-    Sheets that lie side by side, a few samples apart, look like one rough layer. They come apart as soon as the samples are finer.
+    Sheets that lie only a few samples apart look like one rough layer; finer samples tell them apart.
     """
-    for _ in range(FINER):
+    for _ in range(MOST_REFINEMENTS):
         radius *= 0.5
-        if radius < FINEST * spacing:
+        if radius < FINEST_RADIUS * spacing:
             return None
         found = link_samples(points, radius, length, spacing)
         if not is_rough(found, ROUGH * length):
@@ -101,7 +100,7 @@ def link_finer(points: np.ndarray, radius: float, length: float, spacing: float)
 
 
 def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the samples of a rough layer moved to its middle, thinned and linked anew."""
+    """Return the samples of a rough layer moved to its middle, thinned and linked again."""
     moved = np.empty_like(found.mean)
     kernels.settle_samples(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
     joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing)
@@ -111,21 +110,21 @@ def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: fl
 
 
 def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
-    """Whether the samples form a thick layer, no sheet: more than some of them, as a share, are thicker than `rough`."""
+    """Whether the samples form a thick layer and no sheet: a larger share of them than `some` is thicker than `rough`."""
     return bool((found.thickness > rough).mean() > some)
 
 
 def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
-    """Return a sample within the radius of each point, the point of each sample and where it is (S, 3), and the samples by box.
+    """Return a sample within the radius of each point, the point of each sample, its position (S, 3), and the samples by box.
 
-    Samples are points that keep the radius: each that has no earlier sample nearer.
+    Each point with no earlier sample within the radius becomes a sample.
     """
     owner = np.full(len(points), -1, np.int64)
     lower, upper = bounds_of(points)
     capacity, begin, count = 1 << 14, 0, 0
     chosen, places = np.empty(capacity, np.int64), np.empty((capacity, 3))
     while True:
-        boxes = new_boxes(lower, upper, CLOSE * radius, capacity, capacity)
+        boxes = new_boxes(lower, upper, BOX_SIZE * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
         begin, count = kernels.choose_samples(points, radius, boxes, owner, chosen, places, begin, count)
         if begin == len(points):
@@ -142,7 +141,7 @@ def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np
 def _settled(
     points: np.ndarray, radius: float, length: float, spacing: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
-    """Return the nearest sample of each point, the point of each sample and where it is, the samples by box and their neighbours."""
+    """Return the nearest sample of each point, the point and position of each sample, the samples by box, and their neighbours."""
     owner, chosen, places, boxes = samples_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
     in_parts(
@@ -168,7 +167,7 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
 
 
 def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal of each sample (either sign) and the thickness of the points there."""
+    """Return the normal of each sample, not yet oriented, and the thickness there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
         len(mean),

@@ -1,4 +1,4 @@
-"""Rods: columns, poles, scaffold and cables, too thin for a grid, that join a shell with its floor."""
+"""Rods: columns, poles, scaffold and cables that are too thin for a grid, and may connect a shell with its floor."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from ..kernels.geometry.components import component_labels
 from ..kernels.surface.rods import spreads_around
 from .linked_samples import Linked
 
-COARSE, FINE = 1.0, 0.6  # distances within which the samples around one tell whether it is a rod [member lengths]
-FEWEST = 6  # fewest samples around one, rods aside, that make a sheet
-THIN = 0.15  # spread across a rod over that along it, of squares; half a disc, as at a boundary, has 0.28
-STUB = 1.3  # distance from a rod at which samples may be its ends [member lengths]
-OFF_SHEET = 0.1  # distance from the sheet around at which a sample near a rod is an end of it [member lengths]
-MOST = 0.4  # share of the samples from which on they are no rods but the scan
-ROUNDS = 3  # times that ends of rods are looked for
+COARSE_REACH = 1.0  # radius of the neighbourhood that shows whether a sample is of a rod [member lengths]
+FINE_REACH = 0.6  # the same once rods are found, for the joints of scaffold [member lengths]
+SAMPLES_OF_SHEET = 6  # fewest samples in a neighbourhood, rods excluded, that make a sheet
+THIN_VARIANCE = 0.15  # largest variance across a rod, in that along it; half a disc, as at a boundary, has 0.28
+END_REACH = 1.3  # distance from a rod up to which samples may be its ends [member lengths]
+END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is an end of it [member lengths]
+MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
+END_ROUNDS = 3  # most rounds in which ends of rods are looked for
 
 
 def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
-    """Return which points (N,) bool belong to rods: to samples along a line, and to the ends of these where they meet a sheet.
+    """Return which points (N,) bool belong to rods: to samples along a line, or to the ends of a rod where it meets a sheet.
 
     Parameters
     ----------
@@ -29,26 +30,26 @@ def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
     length : float
         Desired member length [scan unit].
     """
-    rod = _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE * length)[0])
-    if rod.any():  # then joints of a scaffold too, which are rods to all sides
-        rod |= _thin(_spreads(found, ~rod, FINE * length)[0])
-    for _ in range(ROUNDS if rod.any() else 0):
-        near = ~rod & (_moments(found, rod, STUB * length)[2] > 0)
-        spreads, off, count = _spreads(found, ~rod, COARSE * length)
-        alone = (count < FEWEST) | _thin(spreads)
-        ends = near & (alone | (off > np.maximum(OFF_SHEET * length, 2.0 * np.sqrt(spreads[:, 0]))))
+    rod = _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)[0])
+    if rod.any():  # then also the joints of scaffold, where rods leave to all sides
+        rod |= _thin(_spreads(found, ~rod, FINE_REACH * length)[0])
+    for _ in range(END_ROUNDS if rod.any() else 0):
+        near = ~rod & (_moments(found, rod, END_REACH * length)[2] > 0)
+        spreads, off, count = _spreads(found, ~rod, COARSE_REACH * length)
+        alone = (count < SAMPLES_OF_SHEET) | _thin(spreads)
+        ends = near & (alone | (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))))
         if not ends.any():
             break
         rod |= ends
     rod &= _long_groups(found, rod, length)
-    if rod.mean() > MOST:
+    if rod.mean() > MOST_RODS:
         rod[:] = False
     marked: np.ndarray = np.where(found.owner >= 0, rod[found.owner], False)
     return marked if len(marked) == points else np.zeros(points, np.bool_)
 
 
 def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples belong to a group of rods at least a member long, (S,) bool; others are corners of a sheet."""
+    """Return which samples belong to connected rods at least a member long, (S,) bool; shorter ones are corners of a sheet."""
     beside = found.neighbors
     one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
     label = component_labels(len(rod), one, beside[one, other])
@@ -63,19 +64,19 @@ def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
 
 def _thin(spreads: np.ndarray) -> np.ndarray:
     """Return where samples lie along a line, (S,) bool."""
-    thin: np.ndarray = spreads[:, 1] < THIN * spreads[:, 2]
+    thin: np.ndarray = spreads[:, 1] < THIN_VARIANCE * spreads[:, 2]
     return thin
 
 
 def _spreads(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the spread of the living samples around each along their axes, least first, its distance from their plane, their number."""
+    """Return, for each sample, the principal variances of the `alive` ones around it, its distance from their plane, and their number."""
     moments, middle, count = _moments(found, alive, reach)
     spreads, axes = np.linalg.eigh(moments)
     return np.maximum(spreads, 0.0), np.abs(np.einsum("si,si->s", found.mean - middle, axes[:, :, 0])), count
 
 
 def _moments(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return mean products (S, 3, 3), mean (S, 3) and number (S,) of the living samples within reach of each."""
+    """Return the covariance (S, 3, 3), mean (S, 3) and number (S,) of the samples marked `alive` within reach of each."""
     moments, middle = np.empty((len(found.mean), 3, 3)), np.empty((len(found.mean), 3))
     count = np.empty(len(found.mean), np.int64)
     spreads_around(found.mean, found.boxes, alive, reach, moments, middle, count)

@@ -1,4 +1,4 @@
-"""The scan prepared for one member length: samples with oriented normals, linked on each sheet."""
+"""The scan prepared for one member length: surface samples with oriented normals, linked on each sheet."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface import normals as normal_kernels
@@ -19,7 +18,6 @@ from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
-from ..scan.vectors import dots
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .linked_samples import (
@@ -37,23 +35,24 @@ from .linked_samples import (
     settle_to_sheet,
     thin_dense,
 )
+from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
 from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 
-# distance from the points already taken within which all points of the boundary are taken [their spacings]
-BESIDE_SAMPLES = 1.5
-NOT_FINITE = "with NaN or infinite coordinates"
-SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
-UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
+BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
+WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
+SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
+UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
+POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
+ALL = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSamples:
-    """What all later steps look up in the scan."""
+    """The scan as all later steps see it."""
 
     surface: Surface
     boxes: SearchBoxes  #: the samples by box
@@ -61,56 +60,58 @@ class SurfaceSamples:
     thickness: np.ndarray  #: (S,) rms distance of each sample and its neighbours from their plane [scan unit]
     spacing: float  #: typical distance between neighbouring points [scan unit]
     area: float  #: rough area of the scanned surface [scan unit^2]
-    graded_area: float  #: the same with each part in units of its own desired length, times that of `Settings.length` [scan unit^2]
+    graded_area: float  #: the same as if the desired length were `Settings.length` everywhere, for as many triangles [scan unit^2]
     pieces: tuple[int, ...]  #: numbers of the pieces that are large enough for a grid
     scan: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  #: (N, 3) all points that were read [scan unit]
-    judged: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))  #: (N,) KEPT, DUPLICATE or OUTLIER
-    not_chosen: tuple[int, ...] = ()  #: numbers of the pieces that are large enough and that the settings leave out
+    judged: np.ndarray = field(
+        default_factory=lambda: np.zeros(0, np.uint8)
+    )  #: (N,) KEPT, DUPLICATE, OUTLIER and so on
+    not_chosen: tuple[int, ...] = ()  #: numbers of the pieces that are large enough but left out by the settings
     floor: int | None = None  #: number of the piece that was taken for a floor and left out
-    unread: tuple[tuple[str, int], ...] = ()  #: why points of the file were not read, and how many
-    measured: int = 0  #: samples with measured points; those from this number on have made-up ones only
-    whole: np.ndarray | None = None  #: (N, 3) the points, where `surface` has only some of them,
-    sample_spacing: float = 0.0  #: about so far apart [scan unit]
-    smooth: bool = False  #: the scan bends evenly at all samples: no ridge is there
+    unread: tuple[tuple[str, int], ...] = ()  #: reasons why points of the file were not read, and how many
+    measured: int = 0  #: number of samples with measured points; those after them fill holes
+    whole: np.ndarray | None = None  #: (N, 3) all points if `surface` has only some of them
+    sample_spacing: float = 0.0  #: spacing of the points of `surface` then [scan unit]
+    smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
 
     @property
     def outliers(self) -> int:
-        """Outliers that were left out."""
+        """Number of outliers that were left out."""
         return int((self.judged == OUTLIER).sum())
 
     @property
     def repeated(self) -> int:
-        """Points that were left out because they repeat another one."""
+        """Number of points that were left out because they repeat another one."""
         return int((self.judged == DUPLICATE).sum())
 
     @cached_property
     def measured_points(self) -> np.ndarray:
-        """The points that were read and are kept: no outliers, duplicates or lone points (M, 3) [scan unit]."""
+        """The points that were read and kept, without outliers and duplicates (M, 3) [scan unit]."""
         kept = self.judged == KEPT
         return self.scan if kept.all() else np.ascontiguousarray(self.scan[kept])
 
     @cached_property
     def kept(self) -> np.ndarray:
-        """Which samples are of pieces that are large enough for a grid (S,) bool."""
+        """Which samples are of pieces that get a grid (S,) bool."""
         return np.isin(self.piece, self.pieces)
 
     @property
     def left_out(self) -> tuple[int, float]:
-        """How many pieces are too small for a grid, and the share of the samples, which lie evenly, that is theirs."""
+        """Number of pieces without a grid, and their share of the samples, which is about that of the area."""
         samples = np.bincount(self.piece)
         small = np.delete(samples, self.pieces)
         return len(small), float(small.sum() / samples.sum())
 
     @cached_property
     def layers(self) -> tuple[float, float]:
-        """How far apart two layers lie that are closer than half a member, and the share of the scan that has them; 0, 0 for one."""
+        """Distance between two layers closer than half a member, and the share of the scan that has them; 0, 0 for one layer."""
         return find_layers(self)
 
     @property
     def density(self) -> float:
-        """Points for an area [1 / scan unit^2]."""
+        """Points per area [1 / scan unit^2]."""
         return len(self.surface.points if self.whole is None else self.whole) / self.area
 
     @property
@@ -120,22 +121,22 @@ class SurfaceSamples:
 
 
 class _Asked(NamedTuple):
-    """What of the settings decides over the samples."""
+    """The settings that determine the samples."""
 
     length: float
     box_size: float | None
     outlier_distance: float
     drop_duplicates: bool
-    uneven: float  #: mirrored normals differ by no more where the scan bends evenly [degree]
+    uneven: float  #: largest angle between mirrored normals where the scan bends evenly [degree]
     wish: Wish | None
     keep_rods: bool
     piece: str
     z_is_up: bool
-    judge_always: bool  #: look for outliers whether samples stand alone or not
+    judge_always: bool  #: whether outliers are looked for even if no sample stands alone
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
-        """Return it for a cloud with this origin."""
+        """Return those for a cloud with an origin."""
         outliers = settings.outlier_distance if settings.clean else 0.0
         repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
@@ -145,17 +146,17 @@ class _Asked(NamedTuple):
 
 
 class _Chosen(NamedTuple):
-    """The samples of a scan, and of what they were chosen."""
+    """The samples of a scan, and the points among which they were chosen."""
 
     found: Linked
     radius: float  #: of a sample
     points: np.ndarray  #: (N, 3) the points given to the samples
     whole: np.ndarray  #: (M, 3) all points of the scan
-    judged: np.ndarray | None  #: (M,) what each point given is: KEPT, OUTLIER, SPARSE_POINT; None where all are kept
-    smooth: bool
+    judged: np.ndarray | None  #: (M,) what each point given is: KEPT, OUTLIER, SPARSE_POINT; None if all are kept
+    smooth: bool  #: whether the scan bends evenly everywhere
 
 
-_KEPT: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
+_SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
@@ -165,16 +166,16 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     ----------
     cloud : PointCloud
     settings : Settings
-        `length` and `box_size` decide how far apart samples are, `clean`, `outlier_distance` and `drop_duplicates` which points are left
-        out, `length_field` where members are to be longer.
+        `length` and `box_size` determine the spacing of the samples; `clean`, `outlier_distance` and `drop_duplicates` which points
+        are left out; `length_field` where members are longer.
     """
     asked = _Asked.of(settings, cloud.origin, cloud.z_is_up)
-    kept = _KEPT.setdefault(cloud, {})
+    kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
         check_is_surface(made)
-        unread = (*cloud.left_out, *((NOT_FINITE, cloud.dropped) for _ in range(cloud.dropped > 0)))
+        unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)
     return kept[asked]
 
@@ -185,18 +186,18 @@ def is_graded(surface: Surface) -> bool:
 
 
 def local_field(surface: Surface, place: np.ndarray) -> float:
-    """Desired length at a place, in lengths: that of the nearest sample."""
+    """Desired length at a place: that of the nearest sample [`length`]."""
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
 def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings) -> SurfaceSamples:
-    """Return the samples of the same points and of made-up ones (F, 3) [scan unit]."""
+    """Return the samples of the same points and of added ones, which fill holes (F, 3) [scan unit]."""
     points = samples.surface.points
     both = np.concatenate([points, added])
     asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
         outlier_distance=0.0, drop_duplicates=False
     )
-    if not samples.smooth:  # then it is not with more points either
+    if not samples.smooth:  # then it is not smooth with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
     return replace(
@@ -214,7 +215,7 @@ def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings)
 def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
     """Return the local surface with patches of about so many points: the fewer, the closer it follows the scan.
 
-    More points of each sample count than while nodes are still on their way.
+    Patches take more points of each sample than while nodes are still moving.
     """
     surface = samples.surface
     radius = np.sqrt(points * samples.area / (np.pi * len(surface.points)))
@@ -224,13 +225,13 @@ def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
         if samples.smooth
         else ALL,  # as many for an area
     )
-    if np.isfinite(points):  # so many points, whatever the length of the members
+    if np.isfinite(points):  # the number of points does not depend on the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
     return surface
 
 
 def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_points: np.ndarray) -> Surface:
-    """Return the surface with all points near some of its points (R, 3), where it has only some: those of the boundary tell where it is."""
+    """Return the surface with all points of the scan near points of the boundary (R, 3), which locate it, if it has only some of them."""
     if samples.whole is None:
         return surface
     near = samples.whole.take(
@@ -260,7 +261,7 @@ def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
 
 
 def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
-    """Return normals at the scale of a member (S, 3): of the sheet as a whole where the scan is rough or overgrown."""
+    """Return normals averaged over about a member (S, 3): those of the sheet as a whole if the scan is rough or overgrown."""
     normals = surface.normals
     for _ in range(passes):
         normals = mean_normals(normals, surface.neighbors, 0.0)
@@ -274,7 +275,7 @@ def _prepare(
     asked: _Asked,
     measured: int | None = None,
 ) -> SurfaceSamples:
-    """Return the samples of points, of which those from the number `measured` on are made up: then none is left out."""
+    """Return the samples of points; those after the first `measured` were added to fill holes, and none is left out then."""
     length, scan, judged = asked.length, points, np.zeros(len(points), np.uint8)
     if asked.drop_duplicates and has_repeats(points):
         judged[find_repeated(points)] = DUPLICATE
@@ -294,12 +295,12 @@ def _prepare(
     found = chosen.found
     surface, piece = _faced_surface(found, chosen.radius, length, spacing)
     surface = surface._replace(field=length_field(surface, asked.wish))
-    piece = _number(piece)
-    area = _sample_areas(surface)
+    piece = number_pieces(piece)
+    area = sample_areas(surface)
     graded = area / surface.field**2
-    large = _large_pieces(piece, area, graded, length)
+    large = large_pieces(piece, area, graded, length)
     floor = find_floor(surface.mean, piece, large, length) if asked.piece == "auto" and asked.z_is_up else None
-    pieces = _chosen_pieces(large, asked.piece, floor)
+    pieces = chosen_pieces(large, asked.piece, floor)
     return SurfaceSamples(
         surface,
         found.boxes,
@@ -328,9 +329,9 @@ def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
 
 
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
-    """Return larger samples where nobody said how large and the scan is dense, smooth and without outliers; else None."""
+    """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    if asked.box_size is not None or asked.judge_always or spacing > SPARSE * length:
+    if asked.box_size is not None or asked.judge_always or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
@@ -340,7 +341,7 @@ def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _
 
 
 def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
-    """Return the samples of any scan, without its outliers; of a rough one moved to the middle of its sheets."""
+    """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets."""
     length, judged = asked.length, None
     radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
@@ -362,7 +363,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked samples, its normals smoothed and turned outside, and the connected piece of each sample (S,)."""
+    """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     cut_steep_links(mean, normals, neighbors)
@@ -378,7 +379,7 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         length=float(length),
         radius=float(radius),
         patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=SOME,
+        patch_points=POINTS_ON_THE_WAY,
         step=float(max(radius, 1.3 * spacing)),
         stamp=np.zeros(len(mean), np.int64),
         queue=np.zeros(len(mean), np.int64),
@@ -386,46 +387,3 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         field=np.ones(len(mean)),
     )
     return surface, piece
-
-
-def _number(piece: np.ndarray) -> np.ndarray:
-    """Number the pieces by size, largest first."""
-    counts = np.bincount(piece)
-    rank = np.empty(len(counts), np.int64)
-    rank[np.argsort(-counts, kind="stable")] = np.arange(len(counts))
-    return rank[piece]
-
-
-def _sample_areas(surface: Surface) -> np.ndarray:
-    """Rough area around each sample (S,): that of a disc through its neighbours over their number [scan unit^2]."""
-    linked = surface.neighbors >= 0
-    count = linked.sum(axis=1)
-    last = surface.neighbors[np.arange(len(count)), np.maximum(count - 1, 0)]
-    arm = surface.mean[last] - surface.mean
-    reach = dots(arm, arm)
-    return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
-
-
-def _chosen_pieces(large: tuple[int, ...], wanted: str, floor: int | None) -> tuple[int, ...]:
-    """Return those of the large pieces that the settings choose: all but the floor, all, the largest, or some by their numbers from 1.
-
-    Raises
-    ------
-    InputError
-        There is no piece of that number.
-    """
-    if wanted in ("auto", "all"):
-        return tuple(number for number in large if number != floor)
-    numbers = [1] if wanted == "largest" else [int(word) for word in wanted.split(",")]
-    if max(numbers) > len(large):
-        raise InputError(f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid")
-    return tuple(large[number - 1] for number in sorted(set(numbers)))
-
-
-def _large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, length: float) -> tuple[int, ...]:
-    """Pieces that are not debris: room for some twenty triangles, and a hundredth of the largest."""
-    count = np.bincount(piece)
-    total = np.bincount(piece, area)
-    large = (np.bincount(piece, graded) >= 20.0 * 0.433 * length**2) & (total >= 0.01 * total.max()) & (count >= 12)
-    large[0] = True
-    return tuple(int(i) for i in np.flatnonzero(large))

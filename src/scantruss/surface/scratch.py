@@ -1,4 +1,4 @@
-"""Look-ups in one surface by several threads."""
+"""Searches in one surface by several threads."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..kernels.surface.local_surface import Surface
 
 
 def with_own_scratch(surface: Surface) -> Surface:
-    """Return the same surface with room of its own for look-ups, so that threads do not meet."""
+    """Return the same surface with scratch arrays of its own, for another thread."""
     return surface._replace(
         stamp=np.zeros(surface.stamp.shape, np.int64),
         queue=np.empty_like(surface.queue),

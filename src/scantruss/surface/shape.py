@@ -1,4 +1,4 @@
-"""What kind of thing was scanned: points that lie along lines or fill a volume are no surface, and two layers are no single one."""
+"""Whether a scan is one surface: points along lines or in a volume are none, and two close layers are not one."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from ..kernels.surface.local_surface import Surface
     from .samples import SurfaceSamples
 
-PLACES = 40  # places that are looked at
-FEWEST = 60  # samples below which nothing is said
-MOST_SAMPLES = 5_000  # samples that show how the points spread around a place
-LINE = 0.02  # second spread of what lies along a line, in its first
-VOLUME = 0.45  # least spread of what fills a volume, in its largest
-NEARER_VOLUME = 0.25  # the same within half as far
-MOST_PLACES = 0.6  # share of the places from which on all is called so
+PLACES_LOOKED_AT = 40  # places of a scan that are looked at
+FEWEST_SAMPLES = 60  # samples below which nothing is concluded
+SAMPLES_LOOKED_AT = 5_000  # most samples from which the variance around a place is taken
+LINE_VARIANCE = 0.02  # largest second variance of points along a line [first variance]
+VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, within a member [largest variance]
+NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
+DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
-CLOSE_LAYERS = 0.5  # distance below which two layers are one to a grid [member lengths]
-EACH_LAYER = 0.2  # share of the points that each of two layers has at least
-CLEAR = 4.0  # distance of two layers, in the rms thickness of each
-MANY_LAYERS = 0.3  # share of the places with two layers from which on that is said
+CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
+EACH_LAYER = 0.2  # least share of the points in each of two layers
+LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
+MANY_LAYERS = 0.3  # share of the places with two layers from which on they are reported
 
 
 def check_is_surface(samples: SurfaceSamples) -> None:
@@ -32,12 +32,12 @@ def check_is_surface(samples: SurfaceSamples) -> None:
     Raises
     ------
     InputError
-        They are no scan of a surface.
+        The points are not a scan of a surface.
     """
     mean = samples.surface.mean
-    if len(mean) < FEWEST:
+    if len(mean) < FEWEST_SAMPLES:
         return
-    some = mean[:: len(mean) // MOST_SAMPLES + 1]
+    some = mean[:: len(mean) // SAMPLES_LOOKED_AT + 1]
     lines = volumes = looked = 0
     for place in mean[_spread_evenly(len(mean))]:
         distance = np.linalg.norm(some - place, axis=1) / samples.surface.length
@@ -45,37 +45,37 @@ def check_is_surface(samples: SurfaceSamples) -> None:
             continue
         looked += 1
         least, second, largest = _spread(some[distance <= 1.0])
-        lines += bool(second <= LINE * largest)
-        if least >= VOLUME * largest:  # so do two sheets, but not from half as far
+        lines += bool(second <= LINE_VARIANCE * largest)
+        if least >= VOLUME_VARIANCE * largest:  # two sheets do so too, but not within half a member
             points = _points_near(samples.surface, place, 0.5 * samples.surface.length)
             least, _, largest = _spread(points)
-            volumes += bool(least >= NEARER_VOLUME * largest)
-    if lines > MOST_PLACES * looked:
+            volumes += bool(least >= NEAR_VOLUME_VARIANCE * largest)
+    if lines > DECISIVE_SHARE * looked:
         raise InputError(
             "the points lie along lines, not on a surface; a grid needs a scan of a surface, or longer members if these are"
             " the lines of a scanner"
         )
-    if volumes > MOST_PLACES * looked:
+    if volumes > DECISIVE_SHARE * looked:
         raise InputError(
             "the points fill a volume and lie on no surface; a grid needs the points of a surface alone, such as the outermost"
         )
 
 
 def _spread(points: np.ndarray) -> np.ndarray:
-    """Return the three variances of points (N, 3), the least first; zeros for fewer than five."""
+    """Return the three principal variances of points (N, 3), least first; zeros for fewer than five points."""
     return np.linalg.eigvalsh(np.cov(points.T)) if len(points) >= 5 else np.zeros(3)
 
 
 def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
-    """Return the points (N, 3) of all samples within a radius of a place that has some."""
+    """Return the points (N, 3) of all samples within a radius of a place; at least one must be there."""
     near = np.flatnonzero(((surface.mean - place) ** 2).sum(axis=1) <= radius**2)
     return np.concatenate([surface.points[surface.start[s] : surface.start[s + 1]] for s in near])
 
 
 def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
-    """Return how far apart two layers lie that are closer than half a member, and the share of places with two; 0, 0 for one."""
+    """Return the distance between two layers closer than half a member, and the share of places with two; 0, 0 for one layer."""
     surface = samples.surface
-    if samples.smooth or len(surface.mean) < FEWEST:
+    if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
     apart, looked = [], 0
     for sample in _spread_evenly(len(surface.mean)):
@@ -90,7 +90,7 @@ def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
 
 
 def _layer_distance(points: np.ndarray) -> float:
-    """Return the distance of two layers of points (N, 3) that can be told apart, 0 where they cannot."""
+    """Return the distance between two layers of points (N, 3), 0 if they cannot be told apart."""
     centred = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     height = np.sort(centred @ axes[2])
@@ -100,9 +100,9 @@ def _layer_distance(points: np.ndarray) -> float:
     below, above = height[:cut], height[cut:]
     distance = float(above.mean() - below.mean())
     thickness = max(float(below.std()), float(above.std()))
-    return distance if distance > CLEAR * thickness and float(gaps.max()) > 0.4 * distance else 0.0
+    return distance if distance > LAYER_DISTANCE * thickness and float(gaps.max()) > 0.4 * distance else 0.0
 
 
 def _spread_evenly(count: int) -> np.ndarray:
-    """Return the numbers of some samples from everywhere; samples that follow each other lie near each other."""
-    return np.unique(np.linspace(0, count - 1, PLACES).astype(np.int64))
+    """Return the numbers of samples from all over the scan; samples with near numbers lie near each other."""
+    return np.unique(np.linspace(0, count - 1, PLACES_LOOKED_AT).astype(np.int64))

@@ -1,4 +1,4 @@
-"""The length field: which member length is desired where on the scan, as a multiple of the shortest one."""
+"""The length field: the desired member length all over the scan, as a multiple of the shortest one."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..settings import Settings, shortest_and_longest
 
-RATIO = 1.2  # largest ratio of the desired lengths of two members in a row
-SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per way; ways over the links, and members, may be longer
-FLAT = 0.002  # a longest member that bulges by less than this share of its length is flat
-BENT = 0.95  # share of the scan that is less curved than where members have the shortest length
-NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature that may be noise
-FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan, in that length
+RATIO = 1.2  # largest ratio of the desired lengths of two successive members
+SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 because links make distances longer
+FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
+BENT = 0.95  # share of the scan that is less curved than the places with the shortest members
+NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature up to which it may be noise
+FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan [that length]
 SAMPLES_PER_THREAD = 200  # fewest samples worth a thread of their own
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What the settings say of the lengths, in the frame of the cloud."""
+    """The lengths that the settings ask for, in the frame of the cloud."""
 
     field: str | Sequence[Sequence[float]]
     length: float  #: the shortest [scan unit]
-    origin: tuple[float, float, float]  #: of the cloud, which the given places have not [scan unit]
+    origin: tuple[float, float, float]  #: of the cloud; the given places are not relative to it [scan unit]
 
 
 def wish_of(settings: Settings, origin: np.ndarray) -> Wish | None:
-    """Return what decides the length field; None where one length is desired everywhere."""
+    """Return the lengths that the settings ask for, None if one length is desired everywhere."""
     if not settings.length_field:
         return None
     x, y, z = origin.tolist()
@@ -42,12 +42,12 @@ def wish_of(settings: Settings, origin: np.ndarray) -> Wish | None:
 
 
 def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
-    """Return the desired length at each sample (S,), in shortest lengths; graded, so that members that follow each other differ little.
+    """Return the desired length at each sample (S,) [shortest length], graded so that successive members differ little.
 
     Raises
     ------
     InputError
-        A given length stands farther from the scan than it is long.
+        A given length lies farther from the scan than it is long.
     """
     if wish is None:
         return np.ones(len(surface.mean))
@@ -59,7 +59,7 @@ def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
 
 
 def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
-    """Blend of the given lengths at each sample (S,), in shortest lengths."""
+    """Return the blend of the given lengths at each sample (S,) [shortest length]."""
     rows = np.array(wish.field, float)
     scale = wish.length / shortest
     places, values = np.ascontiguousarray(rows[:, :3] - wish.origin), rows[:, 3] / shortest
@@ -73,7 +73,7 @@ def _by_given(surface: Surface, wish: Wish, shortest: float) -> np.ndarray:
 
 
 def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: float) -> None:
-    """Refuse given lengths (K, 4) that stand away from the scan: they are of another part, frame or unit."""
+    """Refuse given lengths (K, 4) that lie off the scan: they are of another part, frame or unit."""
     mean = surface.mean
     allowed = FARTHEST_FROM_SCAN * scale * rows[:, 3] + 1.5 * surface.step
     low, high = mean.min(axis=0), mean.max(axis=0)
@@ -95,56 +95,56 @@ def _check_near(surface: Surface, rows: np.ndarray, places: np.ndarray, scale: f
 
 
 def _by_curvature(surface: Surface, most: float) -> np.ndarray:
-    """Length at each sample (S,) of which members bulge alike over the scan, between 1 and `most` shortest lengths.
+    """Return the length at each sample (S,) with which all members bulge alike, from 1 to `most` shortest lengths.
 
-    A member over a curvature k bulges by k l^2 / 8. The most bent twentieth of the scan gets the shortest length, unless even the
-    longest member would be flat there.
+    A member of length l over a curvature k bulges by k l^2 / 8. The most curved twentieth of the scan gets the shortest length, unless
+    even the longest member would be flat there.
     """
     bends = measured_bends(surface, most)
     shortest = surface.length
-    bulge = max(float(np.quantile(bends, BENT)) * shortest**2 / 8.0, FLAT * most * shortest)
+    bulge = max(float(np.quantile(bends, BENT)) * shortest**2 / 8.0, FLAT_BULGE * most * shortest)
     lengths = np.sqrt(8.0 * bulge / np.maximum(bends, 1e-300)) / shortest
     return np.clip(lengths, 1.0, most)
 
 
 def measured_bends(surface: Surface, most: float) -> np.ndarray:
-    """Return the largest curvature of the scan at each sample (S,), less what may be noise [1 / scan unit].
+    """Return the larger principal curvature of the scan at each sample (S,), less what may be noise [1 / scan unit].
 
-    Measured by patches as wide as the members may become, where those bend as narrow ones do, but for what may be noise (Lepski).
+    It is measured by the widest patches, up to the longest member, that agree with narrower ones except for noise (Lepski).
     """
     chosen = np.zeros(len(surface.mean), np.bool_)
     kernels.choose_apart(surface.neighbors, chosen)
     samples = np.flatnonzero(chosen)
     low, high, best = np.zeros(len(samples)), np.full(len(samples), np.inf), np.zeros(len(samples))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt = _bends(surface, samples, most**share).T
+        bend, doubt = _curvatures(surface, samples, most**share)
         low, high = np.maximum(low, bend - NOISE_DEVIATIONS * doubt), np.minimum(high, bend + NOISE_DEVIATIONS * doubt)
         best = np.where(low <= high, np.maximum(bend - NOISE_DEVIATIONS * doubt, 0.0), best)
     bends = np.zeros(len(chosen))
     bends[samples] = best
     bends = _spread(surface.neighbors, bends, chosen)
     everywhere = np.ones_like(chosen)
-    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # what bends at one sample alone is noise
+    return np.minimum(bends, _spread(surface.neighbors, bends, everywhere))  # curvature at one sample alone is noise
 
 
-def _bends(surface: Surface, samples: np.ndarray, wider: float) -> np.ndarray:
-    """Curvature and its doubt at some samples, (P, 2) [1 / scan unit], by patches so many times wider."""
+def _curvatures(surface: Surface, samples: np.ndarray, wider: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the curvature at some samples and its standard deviation, (P,) each [1 / scan unit], by patches so many times wider."""
     from .scratch import with_own_scratch
 
     scaled = surface._replace(
         patch_radius=surface.patch_radius * wider, patch_points=max(surface.patch_points / wider**2, 1.0)
     )
-    found = np.empty((len(samples), 2))
+    found, deviations = np.empty(len(samples)), np.empty(len(samples))
 
     def measure_part(part: int, begin: int, end: int) -> None:
-        kernels.measure_bends(with_own_scratch(scaled), samples, found, begin, end)
+        kernels.measure_curvatures(with_own_scratch(scaled), samples, found, deviations, begin, end)
 
     in_parts(len(samples), SAMPLES_PER_THREAD, measure_part)
-    return found
+    return found, deviations
 
 
 def _spread(neighbors: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Values (S,) at all samples: the mean of those known at a sample and its neighbours."""
+    """Return values at all samples (S,): the mean of the known ones at a sample and its neighbours."""
     weight = np.where(neighbors >= 0, known[neighbors], False)
     total = weight.sum(axis=1) + known
     summed = (weight * values[neighbors]).sum(axis=1) + known * values

@@ -1,7 +1,6 @@
-"""Streamlining: of a scan much denser than the grid needs, one point in each small search box (Sec. 2 leaves that to the scanner).
+"""Streamlining: of a scan much denser than the grid needs, one point per small search box is kept (Sec. 2 leaves that to the scanner).
 
-Nodes come down on patches of some hundred points. What lies denser than that is not looked at; where the scan is sparse every
-point stays.
+Nodes are projected onto patches of some hundred points, so denser points are not needed; where the scan is sparse every point is kept.
 """
 
 from __future__ import annotations
@@ -14,17 +13,17 @@ from ..kernels.scan import streamline as kernels
 from ..runtime.parallel import in_parts, processors
 from ..scan.cloud import Bounds
 
-DENSE = 0.35  # point spacing below which a scan is streamlined [boxes]
+DENSE_SPACING = 0.35  # point spacing below which a scan is streamlined [box size]
 POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
-ALL = np.zeros(0, np.int64)  # stands for all points
-MARKS = 1 << 20  # marks for boxes near a place; there are some thousands of these, so two hardly ever share a mark
-ROOM, MOST_ROOM = 1 << 16, 1 << 19  # points that there is room for at first
-FILLED = 64  # of these, in a block of boxes
+EVERY_POINT = np.zeros(0, np.int64)  # stands for the numbers of all points
+MARKS = 1 << 20  # marks for boxes near a place; of some thousands of boxes two hardly ever share one
+LEAST_ROOM, MOST_ROOM = 1 << 16, 1 << 19  # bounds of the number of points that there is room for at first
+FILLED_BOXES = 64  # boxes of a block that are expected to be occupied
 
 
 def is_dense(spacing: float, size: float) -> bool:
-    """Whether so many points lie in a box of this size that one of them serves as well."""
-    return 0.0 < spacing < DENSE * size
+    """Whether points of a spacing lie so dense in boxes of a size that one point of a box is enough."""
+    return 0.0 < spacing < DENSE_SPACING * size
 
 
 def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
@@ -42,12 +41,12 @@ def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
         Which points stay; the same for any number of processors.
     """
     lower, upper = bounds
-    room = min(max(len(points) // 2, ROOM), MOST_ROOM)
+    room = min(max(len(points) // 2, LEAST_ROOM), MOST_ROOM)
     parts: dict[int, _First] = {}
 
     def choose(part: int, begin: int, end: int) -> None:
         parts[part] = _First(points, lower, upper, size, room)
-        parts[part].choose(ALL, begin, end)
+        parts[part].choose(EVERY_POINT, begin, end)
 
     in_parts(len(points), POINTS_PER_THREAD, choose)
     first, *others = (parts[part] for part in sorted(parts))
@@ -57,7 +56,7 @@ def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
 
 
 class _First:
-    """The first points of boxes, as far as they have been looked at."""
+    """The first point in each box, of the points looked at so far."""
 
     def __init__(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, room: int) -> None:
         self.points, self.boxes = points, new_boxes(lower, upper, size, 0, 0)
@@ -66,11 +65,11 @@ class _First:
 
     @property
     def chosen(self) -> np.ndarray:
-        """(K,) int64 the points so far."""
+        """The points found so far (K,) int64."""
         return self.found[: self.count[kernels.CHOSEN]]
 
     def choose(self, among: np.ndarray, begin: int, end: int) -> None:
-        """Look at the points `among` (M,) from `begin` to `end` - 1, at all points for an empty one."""
+        """Look at the points `among` (M,) from `begin` to `end` - 1, or among all points for EVERY_POINT."""
         while begin < end:
             begin = self._choose(among, begin, end)
             if begin < end:
@@ -82,8 +81,8 @@ class _First:
         )
 
     def _make_room(self, room: int) -> None:
-        """Make room for so many points, and for the blocks that these fill, or four times as many as there are."""
-        old, rows = self.chosen, max(room // FILLED, 4 * int(self.count[kernels.BLOCKS]), 1)
+        """Make room for so many points and their blocks, at least four times as many blocks as there are."""
+        old, rows = self.chosen, max(room // FILLED_BOXES, 4 * int(self.count[kernels.BLOCKS]), 1)
         self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
         self.taken = np.zeros((rows, kernels.BYTES), np.uint8)
         table = new_boxes(np.zeros(3), np.ones(3), 1.0, rows, rows)
@@ -92,7 +91,7 @@ class _First:
 
 
 def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
-    """Return which points (N, 3) lie within `reach` of any of the places (K, 3), and some more, (M,) int64 in order."""
+    """Return, in order, the points (N, 3) within `reach` of any of the places (K, 3), and a few more, (M,) int64."""
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), reach, 0, 0)
     marked = np.zeros(MARKS, np.bool_)
     nearby.mark_around(boxes, places, reach, marked)

@@ -9,7 +9,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.triangles import quality, turned
 from ..geometry.vectors import Vector, along, norm, row, subtract
-from ..surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.size_field import length_at
 from .cases import choose_by_case, far_from_front
 from .fits import fits, left_angle, near_nodes, right_angle
@@ -60,7 +60,7 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
     if fit_patch(surface, patch, sample, place) < 3:
         return False
     foot = onto_patch(patch, place)
-    near = walk(surface, int(patch[15]), foot)
+    near = walk(surface, int(patch[NEAREST_SAMPLE]), foot)
     gap = norm(subtract(row(surface.mean, near), foot))
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)

@@ -11,7 +11,7 @@ from ..geometry.boxes import search
 from ..geometry.triangles import distance_to_segment
 from ..geometry.vectors import dot, norm, row, subtract
 from ..mesh.point_location import nearest_sample
-from ..surface.local_surface import PATCH, Surface, fit_patch, patch_normal, walk
+from ..surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch, patch_normal, walk
 from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
@@ -36,7 +36,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
         if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > 2.0 * surface.step:
             sample = nearest_sample(surface, place[0], place[1], place[2])
         fit_patch(surface, patch, sample, place)
-        propose_node(front, place, patch_normal(patch, place), int(patch[15]), True)
+        propose_node(front, place, patch_normal(patch, place), int(patch[NEAREST_SAMPLE]), True)
         add_node(front)
     return first
 

@@ -13,6 +13,7 @@ from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, u
 from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, patch_normal, walk
 from .fits import clear_of_front, fits, left_angle, near_nodes, right_angle
 from .front import (
+    INACTIVE,
     NODES,
     Front,
     Rules,
@@ -185,9 +186,9 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
     remove_segment(front, after)
     add_triangle(front, a, b, keep)
     link(front, x, y)
-    if front.state[x] != 2:
+    if front.state[x] != INACTIVE:
         enqueue(front, x)
-    if front.state[y] != 2:
+    if front.state[y] != INACTIVE:
         enqueue(front, y)
     return True
 

@@ -23,9 +23,10 @@ from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, sub
 from ..surface.local_surface import Surface, linked
 from .front import NODES, Front, edge_exists
 
-FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, in lengths
+FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, [member lengths]
 FACES = 0.5  # least cosine of the angle between such a line and the triangle
-SHEET = 0.45  # what is farther from a triangle than this is another sheet, in lengths
+SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
+NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
 @kernel
@@ -88,7 +89,7 @@ def right_angle(front: Front, s: int) -> float:
 
 @kernel
 def _sector(front: Front, leaving: int, q: int) -> float:
-    """Angle at the tail of a segment, from it to node q; 9 where q is outside the unmeshed area there, less than `margin` is 0."""
+    """Angle at the tail of a segment, from it to node q; NO_SECTOR where q is outside the unmeshed area there."""
     p = front.tail[leaving]
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
@@ -96,7 +97,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
     if front.tail[front.previous[leaving]] == front.head[leaving] or whole < 1e-9:
         whole = 2.0 * math.pi
     angle = angle_from(base, subtract(row(front.nodes, q), place), normal)
-    return angle if angle < whole else 9.0
+    return angle if angle < whole else NO_SECTOR
 
 
 @kernel
@@ -106,7 +107,7 @@ def passage_of(front: Front, s: int, p: int) -> int:
     at = front.out[p]
     while at >= 0:
         to_a, to_b = _sector(front, at, a), _sector(front, at, b)
-        if 0.0 < to_a < to_b < 9.0 and at != s and front.previous[at] != s:
+        if 0.0 < to_a < to_b < NO_SECTOR and at != s and front.previous[at] != s:
             return at
         at = front.out_next[at]
     return -1
@@ -141,16 +142,16 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
         return True, -1
     # the edges that are new must not exist and must lie inside the sectors
     if not closes_left:
-        if edge_exists(front, a, p) or _sector(front, s, p) >= 9.0:
+        if edge_exists(front, a, p) or _sector(front, s, p) >= NO_SECTOR:
             return False, -1
     if not closes_right:
-        if edge_exists(front, b, p) or _sector(front, after, p) >= 9.0:
+        if edge_exists(front, b, p) or _sector(front, after, p) >= NO_SECTOR:
             return False, -1
     if closes_left:
-        if _sector(front, before, b) >= 9.0:
+        if _sector(front, before, b) >= NO_SECTOR:
             return False, -1
     elif closes_right:
-        if _sector(front, front.next[after], a) >= 9.0:
+        if _sector(front, front.next[after], a) >= NO_SECTOR:
             return False, -1
     else:
         if p < front.count[NODES] and front.out[p] >= 0:

@@ -23,7 +23,7 @@ from ..geometry.vectors import Vector
 
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
-NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # counters
+NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # places of the counters in `Front.count`
 MOST_NEAR_NODES = 400  # most front nodes looked at in one step
 
 

@@ -9,6 +9,8 @@ from ..geometry.triangles import shape_quality
 from ..geometry.vectors import cross, dot, norm, row, subtract, unit
 from .front import Front, add_triangle, edge_exists, link, remove_segment
 
+MOST_SEGMENTS_OF_GAP = 120  # most segments of a loop that is triangulated; the time grows with their cube
+
 
 @kernel
 def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
@@ -50,7 +52,7 @@ def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
     node = np.empty(count, np.int64)
     for i in range(count):
         node[i] = front.tail[loop[i]]
-    if count < 3 or count > 120:
+    if count < 3 or count > MOST_SEGMENTS_OF_GAP:
         return 0
     cost = np.full((count, count), np.inf)
     split = np.full((count, count), -1, np.int64)

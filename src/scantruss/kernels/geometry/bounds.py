@@ -1,4 +1,4 @@
-"""Bounds of points; points moved to a local origin, and how they spread, in one pass."""
+"""Bounds of points; points moved to a local origin and their second moments, in one pass."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
-POINTS_PER_BLOCK = 1 << 14  # points that are summed up at a time
+POINTS_PER_BLOCK = 1 << 14  # points whose moments are summed into one row
 
 
 @kernel
 def widen_bounds(points: np.ndarray, bounds: np.ndarray, begin: int, end: int) -> None:
-    """Widen bounds (2, 3), smallest and largest coordinates, by points[begin:end]; NaN for an axis with one that is not finite."""
+    """Widen bounds (2, 3), lower and upper corner, to hold points[begin:end]; NaN along an axis with a coordinate that is not finite."""
     x0, x1, y0, y1, z0, z1 = bounds[0, 0], bounds[1, 0], bounds[0, 1], bounds[1, 1], bounds[0, 2], bounds[1, 2]
     odd_x = odd_y = odd_z = 0.0
     for p in range(begin, end):
@@ -31,9 +31,9 @@ def widen_bounds(points: np.ndarray, bounds: np.ndarray, begin: int, end: int) -
 def move_points(
     points: np.ndarray, origin: np.ndarray, moved: np.ndarray, sums: np.ndarray, begin: int, end: int
 ) -> None:
-    """Fill moved (N, 3) with points less origin, and sums (blocks, 9) with their x, y, z, xx, xy, xz, yy, yz, zz.
+    """Fill moved (N, 3) with points less origin, and sums (blocks, 9) with sums of their x, y, z, xx, xy, xz, yy, yz, zz.
 
-    A row of `sums` for each `POINTS_PER_BLOCK` of points, from block `begin` to `end` - 1: these do not depend on who fills them.
+    Each block from `begin` to `end` - 1 is `POINTS_PER_BLOCK` points, so that the sums do not depend on the number of threads.
     """
     for block in range(begin, end):
         sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0

@@ -1,6 +1,6 @@
-"""Search boxes and look-up in them (Sec. 3.2, Eqs. 2-4).
+"""Search boxes (Sec. 3.2, Eqs. 2-4).
 
-Only occupied boxes are kept, in a hash table from the number of the box to its first item; the items of a box are chained.
+Only occupied boxes are stored, in a hash table from the number of a box to its first item; the items of a box form a chain.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ class SearchBoxes(NamedTuple):
 
     lower: np.ndarray  #: (3,) float64 lower bounds
     size: np.ndarray  #: (3,) float64, D of Eq. 3
-    inverse: np.ndarray  #: (3,) float64, 1 / D: a product takes a fraction of the time of a quotient
+    inverse: np.ndarray  #: (3,) float64, 1 / D: multiplying is much faster than dividing
     counts: np.ndarray  #: (3,) int64, N of Eq. 2
-    keys: np.ndarray  #: (H,) int64 number of the box in each slot, -1 free; H is a power of two
-    first: np.ndarray  #: (H,) int64 first item of the box
-    next: np.ndarray  #: (capacity,) int64 next item of the same box, -1 at the end
+    keys: np.ndarray  #: (H,) int64 number of the box in each slot, -1 for a free slot; H is a power of two
+    first: np.ndarray  #: (H,) int64 first item of the box in each slot
+    next: np.ndarray  #: (capacity,) int64 next item of the same box, -1 after the last
 
 
 def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, slots: int) -> SearchBoxes:
@@ -47,14 +47,14 @@ def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, s
 
 @kernel
 def box_index(boxes: SearchBoxes, axis: int, x: float) -> int:
-    """Eq. 4, counted from 0; places outside the bounds belong to the outermost box."""
+    """Index of the box of a coordinate along an axis (Eq. 4), from 0; places outside the bounds belong to the outermost box."""
     i = int((x - boxes.lower[axis]) * boxes.inverse[axis])
     return min(max(i, 0), boxes.counts[axis] - 1)
 
 
 @kernel
 def slot_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
-    """Slot of a box in the table: where it is, or the free slot where it would go."""
+    """Slot of a box in the table; if the box is not there, the free slot where it would go."""
     key = (i * boxes.counts[1] + j) * boxes.counts[2] + k
     mask = len(boxes.keys) - 1
     mixed = key * 613  # at most 1e15 boxes: no overflow
@@ -66,7 +66,7 @@ def slot_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
 
 @kernel
 def put_into(boxes: SearchBoxes, item: int, i: int, j: int, k: int) -> int:
-    """Put an item into a box; returns 1 when that box was new."""
+    """Put an item into a box; returns 1 if the box is new, else 0."""
     slot = slot_of(boxes, i, j, k)
     new = 0
     if boxes.keys[slot] == -1:
@@ -79,13 +79,13 @@ def put_into(boxes: SearchBoxes, item: int, i: int, j: int, k: int) -> int:
 
 @kernel
 def put(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> int:
-    """Put an item into the box of a place; returns 1 when that box was new."""
+    """Put an item into the box of a place; returns 1 if the box is new, else 0."""
     return put_into(boxes, item, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
 
 
 @kernel
 def take(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> None:
-    """Take an item out of its box; x, y, z as it was put in."""
+    """Take an item out of its box; x, y, z is the place at which it was put in."""
     slot = slot_of(boxes, box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z))
     at = boxes.first[slot]
     if at == item:
@@ -102,7 +102,7 @@ def take(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> None:
 def search(
     boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float, found: np.ndarray
 ) -> int:
-    """Items within `reach` of a place, into `found`; returns their number (at most len(found))."""
+    """Find the items within `reach` of a place; returns how many, at most len(found)."""
     count = 0
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
@@ -119,7 +119,7 @@ def search(
 
 @kernel
 def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float) -> int:
-    """The item nearest to x, y, z within `reach`, the first of equals; -1 where there is none."""
+    """The item nearest to x, y, z within `reach`, of equals the first; -1 if there is none."""
     best, least = -1, reach * reach
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):

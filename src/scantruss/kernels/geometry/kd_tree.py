@@ -1,7 +1,7 @@
-"""A tree of points that are as close together here and as far apart there as they like: the nearest of a place, all near a place.
+"""A k-d tree of points: the nearest to a place, and all within a radius.
 
-Search boxes suit what is spread evenly (samples, nodes). A scan as it comes is thousands of times denser beside the scanner than far
-from it; a tree of halves does not mind.
+Search boxes suit points that are spread evenly (samples, nodes). A raw scan is thousands of times denser beside the scanner than far from
+it, which does not slow a k-d tree down.
 """
 
 from __future__ import annotations
@@ -12,33 +12,36 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
-LEAF = 10  # most points of a leaf
-STACK_LEVELS = 64  # levels of the stack of a search, more than any tree has
+POINTS_OF_LEAF = 10  # most points of a leaf
+STACK_LEVELS = 64  # levels that the stack of a search has room for, more than any tree has
 
 
 class KDTree(NamedTuple):
-    """Points in halves of halves; node n has the halves 2 n + 1 and 2 n + 2."""
+    """Points halved again and again; the children of node n are 2 n + 1 and 2 n + 2."""
 
     points: np.ndarray  #: (N, 3) in the order of the leaves
-    ids: np.ndarray  #: (N,) int64 number that each had
-    bounds: np.ndarray  #: (nodes, 6) lower and upper corner
-    ranges: np.ndarray  #: (nodes, 2) int64 first point and the one after the last
+    ids: np.ndarray  #: (N,) int64 number of each point before they were sorted
+    lower: np.ndarray  #: (nodes, 3) lower corner of the bounds of each node
+    upper: np.ndarray  #: (nodes, 3) upper corner
+    first: np.ndarray  #: (nodes,) int64 first point of each node
+    end: np.ndarray  #: (nodes,) int64 the one after its last point
 
 
 def empty_kd_tree(points: np.ndarray) -> KDTree:
     """Return a tree of points (N, 3) that is not yet divided; see `divide`."""
     levels = 0
-    while len(points) > LEAF << levels:
+    while len(points) > POINTS_OF_LEAF << levels:
         levels += 1
     nodes = (2 << levels) - 1
-    ranges = np.zeros((nodes, 2), np.int64)
-    ranges[0, 1] = len(points)
-    return KDTree(np.array(points, np.float64, order="C"), np.arange(len(points)), np.zeros((nodes, 6)), ranges)
+    first, end = np.zeros((2, nodes), np.int64)
+    end[0] = len(points)
+    lower, upper = np.zeros((2, nodes, 3))
+    return KDTree(np.array(points, np.float64, order="C"), np.arange(len(points)), lower, upper, first, end)
 
 
 @kernel
 def _swap(tree: KDTree, i: int, j: int) -> None:
-    """Let two points change places."""
+    """Swap two points."""
     for c in range(3):
         kept = tree.points[i, c]
         tree.points[i, c] = tree.points[j, c]
@@ -50,7 +53,7 @@ def _swap(tree: KDTree, i: int, j: int) -> None:
 
 @kernel
 def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
-    """Order the points from begin to end - 1 so that none before `middle` has a larger coordinate than any from there on."""
+    """Order the points from begin to end - 1 so that none before `middle` has a larger coordinate than any from it on."""
     low, high = begin, end - 1
     while low < high:
         a, b, c = tree.points[low, axis], tree.points[(low + high) // 2, axis], tree.points[high, axis]
@@ -75,27 +78,27 @@ def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
 
 @kernel
 def divide(tree: KDTree, root: int, levels: int) -> None:
-    """Divide a node across its longest side, and its halves, so many levels deep; what one root holds no other touches."""
-    nodes = len(tree.ranges)
+    """Divide a node across its longest side, and its halves, over some levels; different roots may be divided at once."""
+    nodes = len(tree.first)
     first, count = root, 1
     for _ in range(levels):
         for node in range(first, first + count):
-            begin, end = tree.ranges[node, 0], tree.ranges[node, 1]
+            begin, end = tree.first[node], tree.end[node]
             for c in range(3):
                 low, high = np.inf, -np.inf
                 for p in range(begin, end):
                     low, high = min(low, tree.points[p, c]), max(high, tree.points[p, c])
-                tree.bounds[node, c], tree.bounds[node, 3 + c] = low, high
+                tree.lower[node, c], tree.upper[node, c] = low, high
             if 2 * node + 2 >= nodes:
                 continue
             axis, longest = 0, -1.0
             for c in range(3):
-                if tree.bounds[node, 3 + c] - tree.bounds[node, c] > longest:
-                    axis, longest = c, tree.bounds[node, 3 + c] - tree.bounds[node, c]
+                if tree.upper[node, c] - tree.lower[node, c] > longest:
+                    axis, longest = c, tree.upper[node, c] - tree.lower[node, c]
             middle = (begin + end) // 2
             _select(tree, axis, begin, end, middle)
-            tree.ranges[2 * node + 1, 0], tree.ranges[2 * node + 1, 1] = begin, middle
-            tree.ranges[2 * node + 2, 0], tree.ranges[2 * node + 2, 1] = middle, end
+            tree.first[2 * node + 1], tree.end[2 * node + 1] = begin, middle
+            tree.first[2 * node + 2], tree.end[2 * node + 2] = middle, end
         first, count = 2 * first + 1, 2 * count
         if first >= nodes:
             return
@@ -103,10 +106,10 @@ def divide(tree: KDTree, root: int, levels: int) -> None:
 
 @kernel
 def _away(tree: KDTree, node: int, x: float, y: float, z: float) -> float:
-    """Squared distance of a place from the box of a node."""
-    dx = max(tree.bounds[node, 0] - x, 0.0, x - tree.bounds[node, 3])
-    dy = max(tree.bounds[node, 1] - y, 0.0, y - tree.bounds[node, 4])
-    dz = max(tree.bounds[node, 2] - z, 0.0, z - tree.bounds[node, 5])
+    """Squared distance of a place from the bounds of a node."""
+    dx = max(tree.lower[node, 0] - x, 0.0, x - tree.upper[node, 0])
+    dy = max(tree.lower[node, 1] - y, 0.0, y - tree.upper[node, 1])
+    dz = max(tree.lower[node, 2] - z, 0.0, z - tree.upper[node, 2])
     return dx * dx + dy * dy + dz * dz
 
 
@@ -114,9 +117,9 @@ def _away(tree: KDTree, node: int, x: float, y: float, z: float) -> float:
 def nearest(
     tree: KDTree, x: float, y: float, z: float, most: int, stack: np.ndarray, found: np.ndarray, squares: np.ndarray
 ) -> int:
-    """The `most` points nearest to a place, nearest first, with their squared distances; returns how many there are.
+    """Find the `most` points nearest to a place, nearest first, and their squared distances; returns how many there are.
 
-    stack (2 `STACK_LEVELS`,), found (>= most,) int64 and squares (>= most,) are filled.
+    stack : (2 `STACK_LEVELS`,) int64 scratch. found, squares : (>= most,) int64 and float64, filled.
     """
     held, top = 0, 1
     stack[0] = 0
@@ -125,14 +128,14 @@ def nearest(
         node = stack[top]
         if held == most and _away(tree, node, x, y, z) > squares[held - 1]:
             continue
-        if 2 * node + 2 < len(tree.ranges):
+        if 2 * node + 2 < len(tree.first):
             one, other = 2 * node + 1, 2 * node + 2
             if _away(tree, one, x, y, z) > _away(tree, other, x, y, z):
                 one, other = other, one
             stack[top], stack[top + 1] = other, one
             top += 2
             continue
-        for p in range(tree.ranges[node, 0], tree.ranges[node, 1]):
+        for p in range(tree.first[node], tree.end[node]):
             dx, dy, dz = tree.points[p, 0] - x, tree.points[p, 1] - y, tree.points[p, 2] - z
             square = dx * dx + dy * dy + dz * dz
             if held == most and square >= squares[held - 1]:
@@ -148,7 +151,7 @@ def nearest(
 
 @kernel
 def within(tree: KDTree, x: float, y: float, z: float, radius: float, stack: np.ndarray, found: np.ndarray) -> int:
-    """All points within a radius of a place, in the order of the leaves; returns how many, at most len(found)."""
+    """Find all points within a radius of a place, in the order of the leaves; returns how many, at most len(found)."""
     count, top = 0, 1
     stack[0] = 0
     limit = radius * radius
@@ -157,11 +160,11 @@ def within(tree: KDTree, x: float, y: float, z: float, radius: float, stack: np.
         node = stack[top]
         if _away(tree, node, x, y, z) > limit:
             continue
-        if 2 * node + 2 < len(tree.ranges):
+        if 2 * node + 2 < len(tree.first):
             stack[top], stack[top + 1] = 2 * node + 2, 2 * node + 1
             top += 2
             continue
-        for p in range(tree.ranges[node, 0], tree.ranges[node, 1]):
+        for p in range(tree.first[node], tree.end[node]):
             dx, dy, dz = tree.points[p, 0] - x, tree.points[p, 1] - y, tree.points[p, 2] - z
             if dx * dx + dy * dy + dz * dz <= limit and count < len(found):
                 found[count] = p
@@ -171,9 +174,9 @@ def within(tree: KDTree, x: float, y: float, z: float, radius: float, stack: np.
 
 @kernel
 def nearest_others(tree: KDTree, neighbors: np.ndarray, squares: np.ndarray, begin: int, end: int) -> None:
-    """The K nearest other points of those from `begin` to `end` - 1, nearest first, by their places in the tree; -1 where there are fewer.
+    """Find the K nearest other points of each point from `begin` to `end` - 1, nearest first, in the numbering of the tree.
 
-    neighbors (N, K) int64 and squares (N, K), squared distances, inf where there is none, are filled.
+    neighbors, squares : (N, K) int64 and float64, filled with the points and their squared distances, -1 and inf where there are fewer.
     """
     most = neighbors.shape[1]
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1)
@@ -190,9 +193,9 @@ def nearest_others(tree: KDTree, neighbors: np.ndarray, squares: np.ndarray, beg
 
 @kernel
 def nearest_of_places(tree: KDTree, places: np.ndarray, rank: int, squares: np.ndarray, which: np.ndarray) -> None:
-    """Squared distance of each place (P, 3) from its nearest point for rank 1, from its second nearest for rank 2, and so on.
+    """Find the nearest point of each place (P, 3) for rank 1, the second nearest for rank 2, and so on.
 
-    squares (P,) and which (P,) int64, the number that this point had, are filled; where there are fewer points the farthest counts.
+    squares, which : (P,) float64 and int64, filled with its squared distance and its number; of fewer points, the farthest is taken.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(rank, np.int64), np.empty(rank)
     for i in range(len(places)):

@@ -10,7 +10,7 @@ from .vectors import Vector, smallest_eigenvector, spread_along
 
 @kernel
 def plane_of(offsets: np.ndarray, count: int) -> tuple[Vector, Vector, float, float]:
-    """Mean and unit normal of the plane through offsets (>=count, 3), and sums of squares about the mean: off the plane, and in all."""
+    """Mean and unit normal of the plane through offsets (>= count, 3), sum of squares off the plane, and about the mean in all."""
     cx = cy = cz = xx = xy = xz = yy = yz = zz = 0.0
     for k in range(count):
         x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]

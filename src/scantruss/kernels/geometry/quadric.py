@@ -1,8 +1,7 @@
-"""Heights over a plane by least squares: a quadric, a plane where a quadric is not told.
+"""Quadrics fitted to heights over a plane by weighted least squares; where the points do not determine one, a plane.
 
-The points of a fit are rows of a buffer:
-
-    0:3 position   3 squared distance   4 weight   5 height over the fit   6 a   7 b   8 height over the plane; a, b in radii
+The height over the point (a, b) of the plane is c0 + c1 a + c2 b + c3 a^2 + c4 a b + c5 b^2. The points of a fit are the rows of a
+buffer, a position in the columns 0 to 2 and the columns named below.
 """
 
 from __future__ import annotations
@@ -12,8 +11,15 @@ import numpy as np
 from ...runtime.jit import kernel
 from .vectors import Vector, cross, dot
 
-WEIGHT, AWAY, HEIGHT = 4, 5, 8  # columns of a buffer
-COLUMNS = 9
+SQUARE = 3  # column of the squared distance from the middle of the fit
+WEIGHT = 4  # column of the weight of the point
+RESIDUAL = 5  # column of the height over the fitted surface
+PLANE_A, PLANE_B = 6, 7  # columns of the place in the plane [radii of the fit]
+HEIGHT = 8  # column of the height over the plane
+COLUMNS = 9  # columns of a buffer
+TERMS_OF_QUADRIC, TERMS_OF_PLANE = 6, 3  # coefficients of either surface
+
+Coefficients = tuple[float, float, float, float, float, float]
 
 
 @kernel
@@ -22,7 +28,7 @@ def second_moments(buffer: np.ndarray, taken: int) -> tuple[float, float, float,
     total = cx = cy = cz = 0.0
     xx = xy = xz = yy = yz = zz = 0.0
     for i in range(taken):
-        w = buffer[i, 4]
+        w = buffer[i, WEIGHT]
         x, y, z = buffer[i, 0], buffer[i, 1], buffer[i, 2]
         wx, wy, wz = w * x, w * y, w * z
         total, cx, cy, cz = total + w, cx + wx, cy + wy, cz + wz
@@ -37,11 +43,12 @@ def second_moments(buffer: np.ndarray, taken: int) -> tuple[float, float, float,
 
 @kernel
 def project(buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Vector) -> None:
-    """Where the points lie in the plane of a normal and a tangent through the origin, and how far over it."""
+    """Fill in the places of the points in the plane through the origin with a normal and a tangent u, and their heights over it."""
     v = cross(normal, u)
     for i in range(taken):
         d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-        buffer[i, 6], buffer[i, 7], buffer[i, 8] = dot(d, u) / radius, dot(d, v) / radius, dot(d, normal)
+        buffer[i, PLANE_A], buffer[i, PLANE_B] = dot(d, u) / radius, dot(d, v) / radius
+        buffer[i, HEIGHT] = dot(d, normal)
 
 
 @kernel
@@ -50,7 +57,7 @@ def normal_equations(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None
     m00 = m10 = m01 = m20 = m11 = m02 = m30 = m21 = m12 = m03 = m40 = m31 = m22 = m13 = m04 = 0.0
     z00 = z10 = z01 = z20 = z11 = z02 = 0.0
     for i in range(taken):
-        w, a, b, z = buffer[i, 4], buffer[i, 6], buffer[i, 7], buffer[i, 8]
+        w, a, b, z = buffer[i, WEIGHT], buffer[i, PLANE_A], buffer[i, PLANE_B], buffer[i, HEIGHT]
         wa, wb = w * a, w * b
         waa, wab, wbb = wa * a, wa * b, wb * b
         m00, m10, m01, m20, m11, m02 = m00 + w, m10 + wa, m01 + wb, m20 + waa, m11 + wab, m02 + wbb
@@ -74,7 +81,7 @@ def normal_equations(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None
 
 @kernel
 def solve(matrix: np.ndarray, size: int) -> bool:
-    """Solve the symmetric system in matrix[:size, :size + 1] in place; the last column gets the solution."""
+    """Solve the symmetric system in matrix[:size, :size + 1] in place; the solution is left in its last column."""
     for i in range(size):
         pivot = matrix[i, i]
         if pivot <= 1e-10:
@@ -93,28 +100,44 @@ def solve(matrix: np.ndarray, size: int) -> bool:
 
 @kernel
 def fit_heights(
-    buffer: np.ndarray, taken: int, radius: float, size: int, patch: np.ndarray, first: int, matrix: np.ndarray
+    buffer: np.ndarray, taken: int, radius: float, size: int, heights: np.ndarray, matrix: np.ndarray
 ) -> int:
-    """Coefficients of 1 a b aa ab bb into patch[first:]; of a plane where a quadric is not told. Returns how many.
+    """Fit heights (6,), the coefficients of 1 a b a^2 ab b^2 [scan unit], to the points; returns how many are not zero.
 
-    buffer[:, AWAY] gets the heights over the fit. matrix (6, 7) is scratch.
+    Where the points do not determine `size` coefficients, a plane is fitted, or their mean height. The residuals go into the buffer.
+    matrix : (6, 7) scratch
     """
     while True:
         normal_equations(buffer, taken, matrix)
         for r in range(size):
-            matrix[r, size] = matrix[r, 6]
+            matrix[r, size] = matrix[r, TERMS_OF_QUADRIC]
             matrix[r, r] += 1e-9 * matrix[0, 0]
         if solve(matrix, size) or size == 1:
             break
-        size = 3 if size == 6 else 1
-    for c in range(6):
-        patch[first + c] = matrix[c, size] if c < size else 0.0
-    c0, c1, c2, c3, c4, c5 = (
-        patch[first], patch[first + 1], patch[first + 2], patch[first + 3], patch[first + 4], patch[first + 5]
-    )  # fmt: skip
+        size = TERMS_OF_PLANE if size == TERMS_OF_QUADRIC else 1
+    for c in range(TERMS_OF_QUADRIC):
+        heights[c] = matrix[c, size] if c < size else 0.0
+    fitted = coefficients_from(heights, 0)
     for i in range(taken):
-        a, b = buffer[i, 6], buffer[i, 7]
-        buffer[i, AWAY] = buffer[i, HEIGHT] - (c0 + a * (c1 + a * c3 + b * c4) + b * (c2 + b * c5))
-    for c in range(1, 6):
-        patch[first + c] /= radius if c < 3 else radius * radius
+        buffer[i, RESIDUAL] = buffer[i, HEIGHT] - height_at(fitted, buffer[i, PLANE_A], buffer[i, PLANE_B])
+    for c in range(1, TERMS_OF_QUADRIC):
+        heights[c] /= radius if c < TERMS_OF_PLANE else radius * radius
     return size
+
+
+@kernel
+def coefficients_from(values: np.ndarray, first: int) -> Coefficients:
+    """The six coefficients of a quadric in a row, from a column on."""
+    return values[first], values[first + 1], values[first + 2], values[first + 3], values[first + 4], values[first + 5]
+
+
+@kernel
+def height_at(c: Coefficients, a: float, b: float) -> float:
+    """Height of a quadric over its plane at (a, b)."""
+    return c[0] + a * (c[1] + a * c[3] + b * c[4]) + b * (c[2] + b * c[5])
+
+
+@kernel
+def slopes_at(c: Coefficients, a: float, b: float) -> tuple[float, float]:
+    """Slopes of a quadric along a and b at (a, b)."""
+    return c[1] + 2.0 * a * c[3] + b * c[4], c[2] + 2.0 * b * c[5] + a * c[4]

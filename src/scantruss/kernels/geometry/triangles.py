@@ -20,7 +20,7 @@ def shape_quality(a: Vector, b: Vector, c: Vector) -> float:
 
 @kernel
 def size_quality(length: float, l1: float, l2: float) -> float:
-    """Size quality rho (Eq. 6): how near the two new sides are to a length."""
+    """Size quality rho (Eq. 6): how close the two new sides, l1 and l2, are to a length."""
     if l1 <= 0.0 or l2 <= 0.0 or length <= 0.0:
         return 0.0
     return min(l1 / length, length / l1) * min(l2 / length, length / l2)
@@ -48,7 +48,7 @@ def angle_from(base: Vector, arm: Vector, normal: Vector) -> float:
 
 @kernel
 def onto_tangent_plane(p: Vector, origin: Vector, u: Vector, v: Vector) -> tuple[float, float]:
-    """Coordinates of a place in the tangent plane of u and v (Sec. 3.4: lines near each other are projected to a plane)."""
+    """Coordinates of a place in the tangent plane of u and v (Sec. 3.4)."""
     d = subtract(p, origin)
     return dot(d, u), dot(d, v)
 
@@ -68,9 +68,9 @@ def segments_cross(
 
 @kernel
 def lines_cross(a: Vector, b: Vector, c: Vector, d: Vector, near: float) -> bool:
-    """Eqs. 8 and 9 in space: whether ab and cd cross in the tangent plane that lies between them by least squares.
+    """Eqs. 8 and 9 in space: whether ab and cd cross in the plane parallel to both and half-way between them.
 
-    That plane is parallel to both and half way. Lines that pass each other farther than `near` lie on different sheets.
+    Lines that pass each other at more than `near` lie on different sheets and do not cross.
     """
     ab, cd = subtract(b, a), subtract(d, c)
     normal = cross(ab, cd)
@@ -91,7 +91,7 @@ def lines_cross(a: Vector, b: Vector, c: Vector, d: Vector, near: float) -> bool
 def inside_triangle(
     p: tuple[float, float], a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
-    """Whether p lies in the anticlockwise triangle abc, its sides included."""
+    """Whether p lies in the anticlockwise triangle abc or on its sides."""
     return _side(a, b, p) >= 0.0 and _side(b, c, p) >= 0.0 and _side(c, a, p) >= 0.0
 
 
@@ -106,7 +106,7 @@ def distance_to_segment(p: Vector, a: Vector, b: Vector) -> float:
 
 @kernel
 def across_edge(edge: Vector, arm: Vector) -> Vector:
-    """Part of an arm at right angles to an edge; the arm itself where the edge has no length."""
+    """Component of a vector at right angles to an edge; the vector itself if the edge has no length."""
     square = dot(edge, edge)
     t = dot(arm, edge) / square if square > 0.0 else 0.0
     return arm[0] - t * edge[0], arm[1] - t * edge[1], arm[2] - t * edge[2]
@@ -114,7 +114,7 @@ def across_edge(edge: Vector, arm: Vector) -> Vector:
 
 @kernel
 def distance_to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
-    """Distance of a place from the triangle abc, its inside included."""
+    """Distance of a place from the triangle abc."""
     ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
     normal = cross(ab, ac)
     square = dot(normal, normal)
@@ -127,7 +127,7 @@ def distance_to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
 
 @kernel
 def turned(direction: Vector, normal: Vector, angle: float) -> Vector:
-    """Unit vector at an angle anticlockwise from a direction, in the plane of a unit normal."""
+    """Unit vector in the plane of a unit normal, turned anticlockwise by an angle from a direction."""
     flat = subtract(
         direction,
         (normal[0] * dot(direction, normal), normal[1] * dot(direction, normal), normal[2] * dot(direction, normal)),

@@ -18,8 +18,26 @@ def row(array: np.ndarray, i: int) -> Vector:
 
 
 @kernel
+def vector_from(values: np.ndarray, first: int) -> Vector:
+    """Three numbers of a row, from a column on."""
+    return values[first], values[first + 1], values[first + 2]
+
+
+@kernel
+def vector_in(array: np.ndarray, i: int, first: int) -> Vector:
+    """Three numbers of row i of an array, from a column on."""
+    return array[i, first], array[i, first + 1], array[i, first + 2]
+
+
+@kernel
+def put_vector(values: np.ndarray, first: int, vector: Vector) -> None:
+    """Write a vector into three columns of a row, from a column on."""
+    values[first], values[first + 1], values[first + 2] = vector
+
+
+@kernel
 def fill_row(target: np.ndarray, source: np.ndarray) -> None:
-    """Fill a row with another: ``target[:] = source`` compiles 40 times longer, for the words of an error that cannot come."""
+    """Copy a row into another: ``target[:] = source`` takes 40 times longer to compile, for an error that cannot occur."""
     for i in range(len(target)):
         target[i] = source[i]
 
@@ -65,7 +83,7 @@ def unit(a: Vector) -> Vector:
 
 @kernel
 def across(normal: Vector) -> Vector:
-    """Return a unit vector at right angles to a unit normal, the same for the same normal."""
+    """Return a unit vector at right angles to a unit normal, always the same for a normal."""
     x, y, z = abs(normal[0]), abs(normal[1]), abs(normal[2])
     if x <= y and x <= z:
         return unit((0.0, -normal[2], normal[1]))
@@ -107,7 +125,7 @@ def smallest_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, 
         best = other
     if dot(best, best) > 1e-20 * p * p * p * p:
         return unit(best)
-    longest = first  # points on a line: the rows are all along it
+    longest = first  # the points lie on a line: all rows point along it
     if dot(second, second) > dot(longest, longest):
         longest = second
     if dot(third, third) > dot(longest, longest):

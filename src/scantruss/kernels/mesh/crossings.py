@@ -1,8 +1,8 @@
-"""Triangles that may cut each other: pairs nearby, less those that floats prove to be apart.
+"""Pairs of triangles that may intersect: those close together, except those proved to be apart in floating point.
 
-A proof is a plane between the two whose sides are certain for all that rounding may have done; whoever calls decides the few
-that are left in exact numbers. Differences of nearby nodes are rounded once, so a sum of products of such differences is off by
-at most ROUNDING times the sum of their sizes.
+A proof is a plane between the two, with both certainly on its sides whatever rounding did; the caller decides the few pairs left in
+exact numbers. Differences of nearby nodes are rounded once, so the error of a sum of products of such differences is at most ROUNDING
+times the sum of the absolute products.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from ..geometry.boxes import SearchBoxes, box_index, put, slot_of
 from ..geometry.triangles import across_edge
 from ..geometry.vectors import Vector, cross, dot, row, subtract, unit
 
-ROUNDING = 1e-14  #: forty times the last bit: more than a product of three differences can lose
+ROUNDING = 1e-14  # relative error of a product of three differences, with a margin: forty times the last bit
 
 
 @kernel
 def _certain_side(axis: Vector, arm: Vector) -> int:
-    """Side of a plane through the foot of an arm: 1 or -1 where rounding cannot change it, else 0."""
+    """Sign of axis . arm: 1 or -1 if rounding cannot change it, else 0."""
     value = dot(axis, arm)
     size = abs(axis[0] * arm[0]) + abs(axis[1] * arm[1]) + abs(axis[2] * arm[2])
     if abs(value) <= ROUNDING * size:
@@ -29,7 +29,7 @@ def _certain_side(axis: Vector, arm: Vector) -> int:
 
 @kernel
 def _certain_turn(a: Vector, b: Vector, c: Vector) -> int:
-    """Sign of a . (b x c): 1 or -1 where rounding cannot change it, else 0."""
+    """Sign of a . (b x c): 1 or -1 if rounding cannot change it, else 0."""
     value = dot(a, cross(b, c))
     size = abs(a[0]) * (abs(b[1] * c[2]) + abs(b[2] * c[1]))
     size += abs(a[1]) * (abs(b[2] * c[0]) + abs(b[0] * c[2]))
@@ -41,7 +41,7 @@ def _certain_turn(a: Vector, b: Vector, c: Vector) -> int:
 
 @kernel
 def _parts(axis: Vector, a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
-    """Whether the arms a, b certainly point to one side of the plane across an axis and c, d to the other."""
+    """Whether the arms a, b certainly point to one side of the plane at right angles to an axis, and c, d to the other."""
     side = _certain_side(axis, a)
     return (
         side != 0
@@ -62,21 +62,21 @@ def fans_apart(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
     )
     if _parts(axis, a, b, c, d):
         return True
-    near, far, best = ua, uc, dot(ua, uc)  # the two arms between which the gap is
+    near, far, best = ua, uc, dot(ua, uc)  # the two arms with the gap between them
     for p, q in ((ua, ud), (ub, uc), (ub, ud)):
         if dot(p, q) > best:
             near, far, best = p, q, dot(p, q)
     if _parts(subtract(near, far), a, b, c, d):
         return True
     abc, abd, cda, cdb = _certain_turn(a, b, c), _certain_turn(a, b, d), _certain_turn(c, d, a), _certain_turn(c, d, b)
-    if abc * abd > 0 or cda * cdb > 0:  # one lies on one side of the other's plane
+    if abc * abd > 0 or cda * cdb > 0:  # one triangle lies on one side of the plane of the other
         return True
     return abc * cda > 0 or abd * cda < 0 or abc * cdb < 0 or abd * cdb > 0  # planes through an arm of each
 
 
 @kernel
 def wings_apart(edge: Vector, c: Vector, d: Vector) -> bool:
-    """Whether two triangles at one edge, their third nodes at arms c and d from its start, certainly meet there only."""
+    """Whether two triangles at one edge, with third nodes at arms c and d from its start, certainly meet there only."""
     if _certain_turn(edge, c, d) != 0:
         return True
     p, q = across_edge(edge, c), across_edge(edge, d)
@@ -85,7 +85,7 @@ def wings_apart(edge: Vector, c: Vector, d: Vector) -> bool:
 
 @kernel
 def _gap(axis: Vector, a: Vector, b: Vector, c: Vector, d: Vector, e: Vector) -> bool:
-    """Whether the triangle of the arms 0, a, b and that of c, d, e have a certain gap between them along an axis."""
+    """Whether there is certainly a gap along an axis between the triangle of the arms 0, a, b and that of c, d, e."""
     pa, pb, pc, pd, pe = dot(axis, a), dot(axis, b), dot(axis, c), dot(axis, d), dot(axis, e)
     most = 0.0
     for arm in (a, b, c, d, e):
@@ -97,10 +97,10 @@ def _gap(axis: Vector, a: Vector, b: Vector, c: Vector, d: Vector, e: Vector) ->
 
 @kernel
 def triangles_apart(a: Vector, b: Vector, c: Vector, d: Vector, e: Vector) -> bool:
-    """Whether the triangle 0, a, b and the triangle c, d, e (arms from the first one's first node) are certainly apart.
+    """Whether the triangle 0, a, b and the triangle c, d, e (arms from the first node of the first) are certainly apart.
 
-    Looked at are the axis between their middles, both normals, and across each side in either plane. Gaps between two sides that
-    pass each other askew are rare where triangles are regular, and left to those who count in fractions.
+    A gap is looked for along the line between their centres, both normals, and at right angles to each side in its plane. Gaps between
+    two skew sides are rare among regular triangles, and left to the exact test.
     """
     middle = (
         c[0] + d[0] + e[0] - a[0] - b[0],
@@ -123,8 +123,8 @@ def triangles_apart(a: Vector, b: Vector, c: Vector, d: Vector, e: Vector) -> bo
 @kernel
 def proved_apart(nodes: np.ndarray, triangles: np.ndarray, t: int, u: int) -> bool:
     """Whether two triangles certainly have nothing in common but the nodes and the edge that they share."""
-    shared, i, j = 0, 0, 0  # i, j: the places in t and u of the shared node, or of the nodes that are not
-    alone_t, alone_u = 3, 3  # sums of the places that are not shared
+    shared, i, j = 0, 0, 0  # i, j: positions in t and u of the last shared node
+    alone_t, alone_u = 3, 3  # sums of the positions that are not shared
     for k in range(3):
         for m in range(3):
             if triangles[t, k] == triangles[u, m]:
@@ -160,12 +160,12 @@ def doubtful_pairs(
     boxes: SearchBoxes,
     pairs: np.ndarray,
 ) -> int:
-    """Pairs of triangles that are not proved to be apart, into `pairs` (P, 2); returns their number, which may exceed P.
+    """Fill pairs (P, 2) with triangles that are not proved to be apart; returns how many there are, which may exceed P.
 
     Parameters
     ----------
     nodes, triangles : (V, 3), (T, 3)
-    middles, radii : (T, 3), (T,) balls that hold the triangles; widest : the largest radius
+    middles, radii : (T, 3), (T,) bounding balls of the triangles; widest : the largest radius
     boxes : empty, with room for T items
     """
     count = 0

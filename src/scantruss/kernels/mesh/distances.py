@@ -1,4 +1,4 @@
-"""How far measured points lie from the triangles of a grid, and nodes from the plane of the points around them."""
+"""Distances of measured points from the triangles of a grid, and of nodes from the planes of the points around them."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ..geometry.vectors import Vector, dot, norm, row, subtract
 
 
 class TriangleBoxes(NamedTuple):
-    """The triangles of a grid by box: each is in all boxes that come within `reach` of it."""
+    """The triangles of a grid by search box: each is entered in all boxes within `reach` of it."""
 
     boxes: SearchBoxes  #: entries by box
     triangle: np.ndarray  #: (entries,) int64 triangle of each entry
-    middle: np.ndarray  #: (T, 3) centre of a ball around each triangle [scan unit]
+    middle: np.ndarray  #: (T, 3) centre of the bounding ball of each triangle [scan unit]
     radius: np.ndarray  #: (T,) radius of that ball [scan unit]
     reach: float  #: [scan unit]
 
 
 def triangle_boxes(nodes: np.ndarray, triangles: np.ndarray, box: float, reach: float) -> TriangleBoxes:
-    """Return triangles (T, 3) of nodes (V, 3) by box of at most `box` [scan unit]."""
+    """Return triangles (T, 3) of nodes (V, 3) by search boxes no larger than `box` [scan unit]."""
     corners = nodes[triangles]
     middle = corners.mean(axis=1)
     radius = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
@@ -42,7 +42,7 @@ def triangle_boxes(nodes: np.ndarray, triangles: np.ndarray, box: float, reach: 
 def enter_triangles(
     boxes: SearchBoxes, nodes: np.ndarray, triangles: np.ndarray, reach: float, triangle: np.ndarray
 ) -> int:
-    """Put triangles into all boxes within `reach` of them, as far as `triangle` has room; returns how many entries that takes."""
+    """Enter triangles in all boxes within `reach` of them, as far as `triangle` has room; returns how many entries there are."""
     count = 0
     for t in range(len(triangles)):
         a, b, c = row(nodes, triangles[t, 0]), row(nodes, triangles[t, 1]), row(nodes, triangles[t, 2])
@@ -71,7 +71,7 @@ def nearest_triangles(
     begin: int,
     end: int,
 ) -> None:
-    """Nearest triangle of points `which` and the distance to it, where that is at most the reach of the index; else -1 and inf."""
+    """Find the nearest triangle of some points, `which`, and its distance, if that is within the reach of the index; else -1 and inf."""
     boxes = index.boxes
     for at in range(begin, end):
         p = which[at]
@@ -96,7 +96,7 @@ def nearest_triangles(
 def nearest_points(
     boxes: SearchBoxes, points: np.ndarray, place: Vector, reach: float, found: np.ndarray, squares: np.ndarray
 ) -> int:
-    """The points nearest to a place within reach, nearest first, the first of equals before; returns how many, len(found) at most."""
+    """Find the points nearest to a place within reach, nearest first, of equals the first; returns how many, at most len(found)."""
     count = 0
     x, y, z = place
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
@@ -132,10 +132,10 @@ def plane_distances(
     distance: np.ndarray,
     noise: np.ndarray,
 ) -> None:
-    """Distance of places (Q, 3) from the plane through the `around` nearest points, or from the nearest of them if that is less.
+    """Fill in the distance of places (Q, 3) from the plane through the `around` nearest points, or from the nearest if that is less.
 
-    boxes : the points by box. near : where the search begins [scan unit]. noise : (Q,), filled with the rms distance of those
-    points from their plane.
+    boxes : the points by box. near : first search radius [scan unit]. noise : (Q,), filled with the rms distance of those points
+    from their plane.
     """
     wanted = min(around, len(points))
     found, squares, offsets = np.empty(wanted, np.int64), np.empty(wanted), np.empty((wanted, 3))
@@ -146,7 +146,7 @@ def plane_distances(
         while count < wanted:  # ends when all points are within reach
             reach *= 1.5
             count = nearest_points(boxes, points, place, reach, found, squares)
-        first = row(points, found[0])  # from there the plane is exact, however far the place is
+        first = row(points, found[0])  # offsets from there stay exact, however far away the place is
         for k in range(wanted):
             offsets[k, 0], offsets[k, 1], offsets[k, 2] = subtract(row(points, found[k]), first)
         mean, normal, off, _ = plane_of(offsets, wanted)

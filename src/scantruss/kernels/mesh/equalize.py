@@ -1,8 +1,8 @@
-"""Equalizing: nodes move on the scanned surface until the energy of members and triangles is least.
+"""Equalizing: nodes move on the scanned surface downhill on the energy of members and triangles.
 
-The energy is E = weight * sum (L / l_0 - 1)^2 over the members + sum (1 - G) over the triangles, G negative where a triangle is
-turned over; l_0 is the mean of the lengths desired at both nodes of a member. Its first part is springs, its second is Laplace: for
-a fixed opposite side, G grows towards the middle.
+The energy is E = weight * sum (L / l_0 - 1)^2 over the members + sum (1 - G) over the triangles. l_0 is the mean of the desired
+lengths at the two nodes of a member; G is the shape quality (Eq. 5), negative for a triangle that is turned over. The first part acts
+like springs, the second like Laplacian smoothing.
 """
 
 from __future__ import annotations
@@ -13,27 +13,29 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, slide
+from ..geometry.vectors import dot, subtract, vector_in
 from ..surface.folds import BENT, chord_energy, chord_slope, fold_energy, fold_slope
-from ..surface.local_surface import onto_patch
+from ..surface.local_surface import CENTRE, NORMAL, onto_patch
 from .grid import INTERIOR, ON_CURVE, REST, Net
 
-ROOT = 4.0 * math.sqrt(3.0)
-STRIDE = 1.4  # steps longer than to the least energy of a node alone: nodes move together
-LEASH = 0.8  # farther from its middle a patch says nothing of the surface, in lengths
+FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular triangle 1 (Eq. 5)
+RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
+PATCH_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
+SHORTEST_STEP = 1e-4  # shortest step that is made while nodes settle [member lengths]
 
 
 @kernel
 def star_energy(
     net: Net, patches: np.ndarray, v: int, x: float, y: float, z: float, length: float, weight: float, slope: bool
 ) -> tuple[float, float, float, float]:
-    """Energy of the members and triangles at node v if it stood at (x, y, z), and its gradient, which takes time, if asked for.
+    """Energy of the members and triangles at node v if it stood at (x, y, z), and with `slope` its gradient, which takes time.
 
-    A triangle counts as turned over where it faces against the others of the node, as seen along the normal of its patch.
+    A triangle counts as turned over if it faces against most triangles of the node, seen along the normal of its patch.
     """
     nodes = net.nodes
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
-    nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
+    nx, ny, nz = vector_in(patches, v, NORMAL)
     d, half = net.degree[v], 0.5 * length
     own = half * net.desired[v]
     w = net.ring[v, d - 1]
@@ -61,7 +63,7 @@ def star_energy(
         doubled = math.sqrt(ux * ux + uy * uy + uz * uz)
         if squares <= 0.0 or doubled <= 1e-12 * squares:
             continue
-        f = 0.5 * ROOT / (doubled * squares)
+        f = 0.5 * FOUR_ROOT_3 / (doubled * squares)
         if ux * nx + uy * ny + uz * nz < 0.0:
             f = -f
         g = f * doubled * doubled
@@ -93,9 +95,9 @@ def star_energy(
 def settle_node(
     net: Net, patches: np.ndarray, curves: Curves, v: int, length: float, weight: float, still: float, stride: float
 ) -> float:
-    """Move node v downhill by one step on the surface or along its curve; returns by how much its energy fell.
+    """Move node v one step downhill, on the surface or along its curve; returns by how much its energy fell.
 
-    Steps shorter than `still`, where members are to have the length, are not made.
+    still : shortest step that is made where `length` is desired [scan unit]. stride : over-relaxation
     """
     kind = net.kind[v]
     if kind >= REST or net.degree[v] == 0:
@@ -103,7 +105,7 @@ def settle_node(
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
     if kind == INTERIOR:
-        nx, ny, nz = patches[v, 3], patches[v, 4], patches[v, 5]
+        nx, ny, nz = vector_in(patches, v, NORMAL)
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
@@ -121,8 +123,8 @@ def settle_node(
             arc, px, py, pz = slide(curves, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
-            dx, dy, dz = px - patches[v, 0], py - patches[v, 1], pz - patches[v, 2]
-            if dx * dx + dy * dy + dz * dz > LEASH * LEASH * local * local:
+            d = subtract((px, py, pz), vector_in(patches, v, CENTRE))
+            if dot(d, d) > PATCH_REACH * PATCH_REACH * local * local:
                 step *= 0.3
                 continue
         after = star_energy(net, patches, v, px, py, pz, length, weight, False)[0]
@@ -147,9 +149,9 @@ def settle_some(
     sweeps: int,
     stride: float,
 ) -> tuple[float, int]:
-    """Settle some nodes (K,) again and again until a sweep gains less than `enough` a node; returns the last gain and the sweeps.
+    """Settle some nodes (K,) in sweeps until one gains less than `enough` a node; returns the last gain and the sweeps made.
 
-    `awake` (C,) int64, 1 at the start, tells which nodes have moved, or a neighbour has, since they were last looked at.
+    awake : (C,) int64, 1 at the start; 1 for nodes that have moved, or a neighbour has, since they were last settled
     """
     gain = 0.0
     for sweep in range(sweeps):
@@ -158,7 +160,7 @@ def settle_some(
             v = some[k]
             if awake[v] == 1:
                 awake[v] = 0
-                gained = settle_node(net, patches, curves, v, length, weight, 1e-4 * length, stride)
+                gained = settle_node(net, patches, curves, v, length, weight, SHORTEST_STEP * length, stride)
                 gain += gained
                 if gained > 0.1 * enough:
                     awake[v] = 1

@@ -1,4 +1,4 @@
-"""Figures of a grid that are taken triangle by triangle, or link by link."""
+"""Angles of a grid: of its triangles, and between neighbouring triangles."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 
 @kernel
 def _angle_between(u: Vector, w: Vector) -> float:
-    """Angle between two vectors [degree]; 0 where one has no length."""
-    return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w) + 0.0))  # of -0 and 0 it would be 180
+    """Angle between two vectors [degree]; 0 if one has no length."""
+    return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w) + 0.0))  # atan2(0, -0) would be 180
 
 
 @kernel
 def angles_of(nodes: np.ndarray, triangles: np.ndarray, angles: np.ndarray) -> None:
-    """Angle of each triangle (T, 3) at each of its nodes, into (T, 3) [degree]."""
+    """Fill in the angle of each triangle (T, 3) at each of its nodes (T, 3) [degree]."""
     for t in range(len(triangles)):
         for k in range(3):
             corner = row(nodes, triangles[t, k])
@@ -34,7 +34,7 @@ def _normal_of(nodes: np.ndarray, triangles: np.ndarray, t: int) -> Vector:
 
 @kernel
 def folds_of(nodes: np.ndarray, triangles: np.ndarray, two: np.ndarray, angles: np.ndarray) -> None:
-    """Angle between the two triangles (E, 2) at each member, into (E,) [degree]: 180 level, 0 folded flat; NaN where there is one."""
+    """Fill in the angle (E,) between the two triangles `two` (E, 2) at each member [degree]: 180 level, 0 folded flat, NaN for one."""
     for e in range(len(two)):
         angles[e] = math.nan
         if two[e, 1] >= 0:

@@ -1,4 +1,4 @@
-"""Flips by the largest smallest angle (Sec. 4.1) and by valence."""
+"""Flips that raise the smallest angle (Sec. 4.1)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .grid import Net, flip, may_flip, wings
 
 @kernel
 def smallest_angle(a: Vector, b: Vector, c: Vector) -> float:
-    """Smallest angle of a triangle [radian]; 0 where two corners meet."""
+    """Smallest angle of a triangle [radian]; 0 if two corners coincide."""
     u, v, w = subtract(b, a), subtract(c, b), subtract(a, c)
     uu, vv, ww = dot(u, u), dot(v, v), dot(w, w)
-    if uu <= vv and uu <= ww:  # it lies opposite to the shortest side
+    if uu <= vv and uu <= ww:  # opposite to the shortest side
         u, w = v, w
     elif ww <= vv:
         u, w = u, v
@@ -26,10 +26,9 @@ def smallest_angle(a: Vector, b: Vector, c: Vector) -> float:
 
 @kernel
 def gain_of_flip(net: Net, a: int, b: int, fold: float) -> float:
-    """By how much the smallest angle of the two triangles at edge a-b grows if it is flipped [radian].
+    """By how much the smallest angle of the two triangles at the edge a-b grows if it is flipped [radian].
 
-    Negative where the flip would fold the grid: the triangles after it must not meet at less than 90 degrees, unless
-    those before it did so more (`fold` is the cosine between the normals that is always allowed).
+    Negative if the flip would fold the grid: the cosine between the normals after it must be at least `fold`, or that before it.
     """
     right, left = wings(net, a, b)
     pa, pb, pr, pl = row(net.nodes, a), row(net.nodes, b), row(net.nodes, right), row(net.nodes, left)
@@ -46,10 +45,10 @@ def gain_of_flip(net: Net, a: int, b: int, fold: float) -> float:
 
 @kernel
 def flip_by_angle(net: Net, fold: float, rounds: int, changed: np.ndarray) -> int:
-    """Flip every edge whose flip makes the smallest angle of its two triangles larger, until none does; returns the flips.
+    """Flip each edge where that raises the smallest angle of its two triangles, until no flip does; returns the number of flips.
 
-    `changed` (C,) int64, -1 at the start, is the last round in which the ring of a node or of one beside it has changed: after the
-    first, only edges between such nodes are looked at again.
+    changed : (C,) int64, -1 at the start, the last round in which the ring of a node or of a neighbour changed: after the first
+        round, only edges between such nodes are tried again
     """
     count = 0
     for turn in range(rounds):

@@ -1,8 +1,8 @@
 """The net: a grid as rings of neighbours, with the three moves that change its topology.
 
-Each node has the ring of its neighbours, anticlockwise seen from outside. Triangle i of node v is (v, ring[v, i], ring[v, i + 1]);
-the ring of an interior node closes, that of a boundary node is open: first and last neighbour lie on the boundary with it.
-Members along lines (fixed lines, ridges) are marked at both ends: they are never flipped, and a line stays a chain of members.
+Each node has a ring of neighbours, anticlockwise seen from outside. Triangle i of node v is (v, ring[v, i], ring[v, i + 1]); the ring of
+an interior node is closed, that of a boundary node open: its first and last neighbours lie on the boundary too. Members along lines
+(fixed lines, ridges) are marked at both ends: they are never flipped, and a line stays a chain of members.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
-INTERIOR = 0  # slides on the scanned surface
-ON_CURVE = 1  # slides on its curve: of the boundary, or, for a node that is not open, of a line
-REST = 2  # corner or fixed node: never moved, never removed
-LOCKED = 3  # at a defect of the grid (pinch, seam): nothing near it changes
+INTERIOR = 0  # kind of a node that slides on the scanned surface
+ON_CURVE = 1  # kind of a node that slides on its curve: of the boundary, or of a line if its ring is closed
+REST = 2  # kind of a corner or fixed node: never moved or removed
+LOCKED = 3  # kind of a node at a defect of the grid (pinch, seam): nothing near it changes
 
 
 class Net(NamedTuple):
-    """A grid while it is improved; capacity C nodes of at most W neighbours."""
+    """A grid while it is improved, with room for C nodes of at most W neighbours."""
 
     nodes: np.ndarray  #: (C, 3) positions
     ring: np.ndarray  #: (C, W) int64 neighbours, anticlockwise
-    degree: np.ndarray  #: (C,) int64 number of neighbours; 0: the node is free
+    degree: np.ndarray  #: (C,) int64 number of neighbours; 0 for a free node
     is_open: np.ndarray  #: (C,) int64, 1 on the boundary, 0 inside
-    kind: np.ndarray  #: (C,) int64 INTERIOR, RIM, REST or LOCKED
-    curve: np.ndarray  #: (C,) int64 curve of the boundary or of a line on which the node slides, -1 none
-    ideal: np.ndarray  #: (C,) int64 number of neighbours that suits the node: 6 inside, on the boundary by its angle
-    line: np.ndarray  #: (C,) int64, bit i is set where the member to neighbour i of the ring is part of a line
-    arc: np.ndarray  #: (C,) place of a boundary node on its curve, as arc length from the start
+    kind: np.ndarray  #: (C,) int64 INTERIOR, ON_CURVE, REST or LOCKED
+    curve: np.ndarray  #: (C,) int64 curve of the boundary or of a line on which the node slides, -1 for none
+    ideal: np.ndarray  #: (C,) int64 ideal number of neighbours: 6 inside, on the boundary by its angle
+    line: np.ndarray  #: (C,) int64, bit i is set if the member to neighbour i of the ring is part of a line
+    arc: np.ndarray  #: (C,) place of a node on its curve, as arc length from the start [scan unit]
     free: np.ndarray  #: (C,) int64 stack of free nodes
-    spare: np.ndarray  #: (1,) int64 how many free nodes there are
-    in_use: np.ndarray  #: (1,) int64: only nodes below this number have been in use
-    desired: np.ndarray  #: (C,) desired member length at each node, in lengths: ones where there is one length
+    spare: np.ndarray  #: (1,) int64 number of free nodes
+    in_use: np.ndarray  #: (1,) int64; no node from this number on has ever been used
+    desired: np.ndarray  #: (C,) desired member length at each node [`length`]; all ones where there is one length
 
     @property
     def used(self) -> int:
-        """Nodes 0 to `used` - 1 have been in use."""
+        """The nodes from 0 to `used` - 1 have been used."""
         return int(self.in_use[0])
 
 
@@ -54,21 +54,21 @@ def fill_rings(
     source: np.ndarray,
     used: int,
 ) -> int:
-    """Walk the fan of each corner and write the rings.
+    """Write the ring of each node by walking round the fan of each corner.
 
     Parameters
     ----------
     corner_node : (3 T,) int64 node of the grid at corner 3 t + k
-    partner : (3 T,) int64 the half-edge opposite to each half-edge (from its corner on), -1 none
-    fan : (3 T,) int64, -1 at the start; filled with the node of the net at each corner: a node with two fans becomes two
+    partner : (3 T,) int64 half-edge opposite to the one that starts at each corner, -1 for none
+    fan : (3 T,) int64, -1 at the start, filled with the node of the net at each corner: a node with two fans becomes two nodes
     first : (C,) int64 scratch
     ring, degree, is_open : arrays of the net, degree 0 at the start
-    source : (C,) int64 node of the grid that each node of the net stands for, filled
-    used : nodes of the grid
+    source : (C,) int64, filled with the node of the grid that each node of the net stands for
+    used : number of nodes of the grid
 
     Returns
     -------
-    int : nodes of the net
+    int : number of nodes of the net
     """
     for node in range(used):
         source[node] = node
@@ -110,13 +110,13 @@ def fill_rings(
 
 @kernel
 def target_length(net: Net, v: int, u: int, length: float) -> float:
-    """Length that the member from v to u shall have: the mean of what is desired at its ends, where `length` is the unit."""
+    """Desired length of the member from v to u: the mean of those at its ends, which are in units of `length` [scan unit]."""
     return 0.5 * length * net.desired[v] + 0.5 * length * net.desired[u]
 
 
 @kernel
 def list_triangles(net: Net, triangles: np.ndarray) -> int:
-    """Write each triangle of the net once, by its smallest node; returns their number."""
+    """List the triangles of the net, each once, its lowest node first; returns how many."""
     count = 0
     for v in range(net.in_use[0]):
         d = net.degree[v]
@@ -130,7 +130,7 @@ def list_triangles(net: Net, triangles: np.ndarray) -> int:
 
 @kernel
 def place_of(net: Net, v: int, u: int) -> int:
-    """Position of node u in the ring of node v, -1 where they are not neighbours."""
+    """Position of node u in the ring of node v, -1 if they are not neighbours."""
     for i in range(net.degree[v]):
         if net.ring[v, i] == u:
             return i
@@ -176,7 +176,7 @@ def take_out(net: Net, v: int, u: int) -> None:
 
 @kernel
 def wings(net: Net, a: int, b: int) -> tuple[int, int]:
-    """Nodes right and left of the edge from a to b: (a, right, b) and (a, b, left) are triangles; -1 where there is none."""
+    """Nodes right and left of the edge from a to b, in the triangles (a, right, b) and (a, b, left); -1 if there is no triangle."""
     i, d = place_of(net, a, b), net.degree[a]
     if net.is_open[a] == 1:
         return (net.ring[a, i - 1] if i > 0 else -1), (net.ring[a, i + 1] if i + 1 < d else -1)
@@ -185,13 +185,13 @@ def wings(net: Net, a: int, b: int) -> tuple[int, int]:
 
 @kernel
 def lowest_degree(net: Net, v: int) -> int:
-    """Fewest neighbours that a node may be left with."""
+    """Fewest neighbours that a move may leave a node with."""
     return 2 if net.is_open[v] == 1 else 4
 
 
 @kernel
 def may_flip(net: Net, a: int, b: int) -> bool:
-    """Whether the edge a-b can become the other diagonal of its quadrangle."""
+    """Whether the edge a-b can be flipped."""
     right, left = wings(net, a, b)
     if right < 0 or left < 0 or right == left or is_line(net, a, b):
         return False
@@ -210,7 +210,7 @@ def may_flip(net: Net, a: int, b: int) -> bool:
 
 @kernel
 def flip(net: Net, a: int, b: int) -> None:
-    """Replace the edge a-b by the other diagonal of its quadrangle."""
+    """Flip the edge a-b: replace it by the other diagonal of its quadrangle."""
     right, left = wings(net, a, b)
     take_out(net, a, b)
     take_out(net, b, a)
@@ -220,14 +220,14 @@ def flip(net: Net, a: int, b: int) -> None:
 
 @kernel
 def may_collapse(net: Net, a: int, b: int) -> bool:
-    """Whether node b can be drawn into node a without a change of topology (link condition)."""
+    """Whether node b can be collapsed into node a without a change of topology (link condition)."""
     if net.kind[b] >= REST or net.kind[a] == LOCKED or net.kind[b] > net.kind[a]:
         return False
     right, left = wings(net, a, b)
     if net.line[b] != 0 and not (
         is_line(net, a, b) and not (right >= 0 and is_line(net, b, right)) and not (left >= 0 and is_line(net, b, left))
     ):
-        return False  # a line stays a chain: its nodes go along it, and not where it turns back at once
+        return False  # a line stays a chain: its nodes collapse along it only, and not where it turns back at once
     common = 0
     for i in range(net.degree[b]):
         u = net.ring[b, i]
@@ -249,11 +249,11 @@ def may_collapse(net: Net, a: int, b: int) -> bool:
 
 @kernel
 def collapse(net: Net, a: int, b: int) -> None:
-    """Draw node b into node a; b becomes free."""
+    """Collapse node b into node a; b becomes free."""
     right, left = wings(net, a, b)
     d = net.degree[b]
     line = net.line[b]
-    if net.is_open[b] == 1:  # along the boundary: the ring of b without a stands in order
+    if net.is_open[b] == 1:  # along the boundary the ring of b, without a, is in order
         begin = 1 if left < 0 else 0
         others = d - 1
     else:
@@ -285,7 +285,7 @@ def slides_on_line(net: Net, v: int) -> bool:
 
 @kernel
 def may_split(net: Net, a: int, b: int) -> bool:
-    """Whether a node can be put on the edge a-b."""
+    """Whether the edge a-b can be split."""
     right, left = wings(net, a, b)
     most = net.ring.shape[1] - 1
     for v in (a, b, right, left):
@@ -302,7 +302,7 @@ def may_split(net: Net, a: int, b: int) -> bool:
 
 @kernel
 def split(net: Net, a: int, b: int) -> int:
-    """Put a free node on the edge a-b; returns it. The caller gives it its place."""
+    """Split the edge a-b by a free node and return that; the caller gives it its position."""
     right, left = wings(net, a, b)
     line = is_line(net, a, b)
     net.spare[0] -= 1

@@ -9,7 +9,7 @@ from .grid import Net
 
 @kernel
 def arc_on_line(net: Net, curves: Curves, v: int, a: int, b: int) -> float:
-    """Arc length of node a on the line of node v; a node of several lines is at an end of it, the one on the side away from node b."""
+    """Arc length of node a on the line of node v; a node of several lines is at an end of it, the one away from node b."""
     curve = net.curve[v]
     if net.curve[a] == curve:
         return net.arc[a]
@@ -21,12 +21,12 @@ def arc_on_line(net: Net, curves: Curves, v: int, a: int, b: int) -> float:
     total = curves.total[curve]
     if abs(before - after) > 1e-6 * total * total:
         return 0.0 if before < after else total
-    return 0.0 if net.arc[b] < 0.5 * total else total  # a line that comes back to where it starts
+    return 0.0 if net.arc[b] < 0.5 * total else total  # a line that ends where it starts
 
 
 @kernel
 def halfway(curves: Curves, curve: int, a: float, b: float) -> float:
-    """Arc length half way between two on a line; on a closed one the shorter way."""
+    """Arc length half-way between two on a line; on a closed one, the shorter way round."""
     ahead = b - a
     if not is_open(curves, curve):
         total = curves.total[curve]

@@ -1,4 +1,4 @@
-"""Local search of the topology: flip, collapse, split, settle the nodes around, keep what lowers the energy."""
+"""Local search of the topology: an edge is flipped, collapsed or split, the nodes around settle, and a lower energy is kept."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc
-from ..geometry.vectors import cross, dot, norm, row, subtract
-from .equalize import STRIDE, settle_node
+from ..geometry.vectors import cross, dot, fill_row, norm, row, subtract
+from .equalize import RELAXATION, settle_node
 from .grid import (
     ON_CURVE,
     Net,
@@ -26,21 +26,23 @@ from .grid import (
 from .lines import arc_on_line, halfway
 from .trial import Scratch, gather, local_energy, may_change, put_back
 
-FLIP, COLLAPSE, SPLIT = 0, 1, 2
-TOLERATED = (2, 0, 2)  # growth of the disorder by a flip, collapse, split
-SWEEPS = 2
-EARLY = (0.35, 1.2, 2.0)  # growth of the energy that may still turn out well, once the quadrangle has settled ...
-ALLOWANCE = (0.06, 0.3, 0.5)  # ... and once all nodes around have; for a flip, collapse, split
-STRAINED = 0.15  # a member that is longer or shorter by this asks for a move
-SHORT, LONG = 1.05, 1.1  # members shorter are not split, longer are not collapsed, in lengths
-STILL = 0.005  # shorter steps are not made in trials, in lengths
-TIDIED = 6  # growth beyond that which flips around may take back
-FLIPS = 4  # most of these flips
+FLIP, COLLAPSE, SPLIT = 0, 1, 2  # moves
+NO_MOVE = -1  # stands for a move that cannot be made or makes no sense
+TOLERATED_DISORDER = (2, 0, 2)  # growth of the disorder by a flip, collapse or split up to which it is tried
+REPAIRABLE_DISORDER = 6  # growth beyond that up to which flips around are tried first
+MOST_REPAIRS = 4  # most of these flips
+SETTLING_SWEEPS = 2  # sweeps in which all nodes around a move settle
+EARLY_ALLOWANCE = (0.35, 1.2, 2.0)  # growth of the energy up to which a trial goes on once the quadrangle has settled
+LATE_ALLOWANCE = (0.06, 0.3, 0.5)  # the same once all nodes around have settled; for a flip, collapse, split
+STRAINED = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
+SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
+LONGEST_COLLAPSED = 1.1  # length of the longest member that is collapsed [desired length]
+SHORTEST_TRIAL_STEP = 0.005  # shortest step that is made in a trial [member lengths]
 
 
 @kernel
 def place_between(net: Net, curves: Curves, v: int, a: int, b: int) -> None:
-    """Put node v halfway between a and b: along their curve if it is on the boundary."""
+    """Put node v half-way between a and b, along their curve if it slides on one."""
     if slides_on_line(net, v):
         first = arc_on_line(net, curves, v, a, b)
         middle = halfway(curves, net.curve[v], first, arc_on_line(net, curves, v, b, a))
@@ -60,7 +62,7 @@ def place_between(net: Net, curves: Curves, v: int, a: int, b: int) -> None:
 
 @kernel
 def disorder(net: Net, move: int, a: int, b: int) -> int:
-    """By how much a move at the edge a-b changes the sum of squared differences between neighbours and ideal."""
+    """By how much a move at the edge a-b changes the disorder: the sum of squares of valence less ideal valence."""
     right, left = wings(net, a, b)
     curves = right < 0 or left < 0
     da, db = net.degree[a] - net.ideal[a], net.degree[b] - net.ideal[b]
@@ -81,9 +83,9 @@ def disorder(net: Net, move: int, a: int, b: int) -> int:
 
 @kernel
 def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
-    """Flip edges at the first `seeds` nodes of the neighbourhood while that lessens the disorder; returns the change of it."""
+    """Flip edges at the first `seeds` nodes of the neighbourhood while that lowers the disorder; returns its change."""
     stamp, total = scratch.trial[0], 0
-    for _ in range(FLIPS):
+    for _ in range(MOST_REPAIRS):
         best, a, b = 0, scratch.around[0], scratch.around[0]
         for k in range(seeds):
             v = scratch.around[k]
@@ -106,7 +108,7 @@ def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
 
 @kernel
 def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, move: int, a: int, b: int) -> int:
-    """Make a move at the edge a-b; returns the node that a split adds, else -1."""
+    """Make a move at the edge a-b; returns the node that a split adds, -1 for other moves."""
     if move == FLIP:
         flip(net, a, b)
         return -1
@@ -116,8 +118,7 @@ def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, m
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
-    for c in range(patches.shape[1]):
-        patches[added, c] = patches[a, c]
+    fill_row(patches[added], patches[a])
     place_between(net, curves, added, a, b)
     net.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.held[added] = scratch.trial[0]
@@ -128,7 +129,7 @@ def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, m
 
 @kernel
 def undo_move(net: Net, scratch: Scratch, move: int, added: int) -> None:
-    """Put all around back as it was before a move."""
+    """Undo a move: restore the nodes around it."""
     if added >= 0:
         scratch.held[added] = 0
         scratch.gathered[0] -= 1
@@ -152,18 +153,18 @@ def try_move(
     weight: float,
     worth: float,
 ) -> bool:
-    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy has fallen.
+    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy falls.
 
-    `worth` is what one more node may cost. Moves that leave the numbers of neighbours farther from the ideal hardly ever pay and
-    are not made; those that flips around can make good are.
+    `worth` is the energy that one more node may cost. Moves that raise the disorder hardly ever pay and are not tried, unless flips
+    around them can repair it.
     """
     change = disorder(net, move, a, b)
     tidied = move != FLIP and change > 0
-    if change > TOLERATED[move] + (TIDIED if tidied else 0):
+    if change > TOLERATED_DISORDER[move] + (REPAIRABLE_DISORDER if tidied else 0):
         return False
     gather(net, scratch, a, b)
     before = after = 0.0
-    rehearse = change > TOLERATED[move]  # whether flips make it good is seen before anything is settled
+    rehearse = change > TOLERATED_DISORDER[move]  # flips are tried first, before anything settles
     for turn in range(2):
         if turn == 1 or not rehearse:
             before = local_energy(net, patches, scratch, length, weight)
@@ -173,17 +174,19 @@ def try_move(
             change += tidy(net, scratch, 4)
         if turn == 0 and rehearse:
             undo_move(net, scratch, move, added)
-            if change > TOLERATED[move]:
+            if change > TOLERATED_DISORDER[move]:
                 return False
             continue
         break
-    for turn in range(1 + SWEEPS):
+    for turn in range(1 + SETTLING_SWEEPS):
         for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
-            settle_node(net, patches, curves, scratch.around[i], length, weight, STILL * length, STRIDE)
+            settle_node(
+                net, patches, curves, scratch.around[i], length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION
+            )
         if turn == 0 and added >= 0:
-            settle_node(net, patches, curves, added, length, weight, STILL * length, STRIDE)
+            settle_node(net, patches, curves, added, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
         after = local_energy(net, patches, scratch, length, weight)
-        if after > before + (EARLY[move] if turn == 0 else ALLOWANCE[move]):
+        if after > before + (EARLY_ALLOWANCE[move] if turn == 0 else LATE_ALLOWANCE[move]):
             break
     if after < before - 1e-4:
         for i in range(scratch.gathered[0]):
@@ -196,7 +199,7 @@ def try_move(
 
 @kernel
 def is_regular(net: Net, v: int, length: float) -> bool:
-    """Whether nothing about node v asks for a move: neighbours as ideal, members near their length."""
+    """Whether nothing at node v asks for a move: its valence is ideal and its members are near their lengths."""
     if net.degree[v] != net.ideal[v]:
         return False
     for i in range(net.degree[v]):
@@ -218,6 +221,25 @@ def is_allowed(net: Net, move: int, a: int, b: int) -> bool:
 
 
 @kernel
+def move_at(net: Net, v: int, u: int, way: int, length: float) -> tuple[int, int, int]:
+    """One of four moves at the edge v-u and its nodes a, b: flip, collapse u into v, collapse v into u, split; or NO_MOVE.
+
+    There is none where the topology would change, or the member is too short to be split or too long to be collapsed.
+    """
+    move, a, b = (way + 1) // 2, v, u
+    if way == 2:
+        if net.kind[u] == net.kind[v]:
+            return NO_MOVE, v, u  # the same as the other collapse: both nodes would come to the middle
+        a, b = u, v
+    if not is_allowed(net, move, a, b):
+        return NO_MOVE, a, b
+    size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
+    if (move == SPLIT and size < SHORTEST_SPLIT) or (move == COLLAPSE and size > LONGEST_COLLAPSED):
+        return NO_MOVE, a, b
+    return move, a, b
+
+
+@kernel
 def search(
     net: Net,
     patches: np.ndarray,
@@ -230,11 +252,11 @@ def search(
     share: float,
     count: int,
 ) -> int:
-    """One round over all nodes that ask for a move; returns how many moves were kept.
+    """Try moves at all nodes that ask for them, once; returns how many were kept.
 
-    Beside members, triangles and folds, `price * V * strain^2` shall fall, so that the mean length comes to the desired one: `strain`
-    is mean / desired length - 1 at the start, and falls by 1 / (2 V) with each node added; V is `count`, the nodes within bounds. The
-    `share` of energy that any node has does not count, or nodes would be taken away for being nodes.
+    The energy includes `price * V * strain^2`, which draws the mean length to the desired one: `strain` is mean / desired length - 1
+    at the start and falls by 1 / (2 V) with each node added; V is `count`, the nodes within bounds. `share`, the energy of an average
+    node, is not counted, or nodes would be removed just to save it.
     """
     kept, free = scratch.paid[0], net.spare[0]
     for v in range(net.in_use[0]):
@@ -242,7 +264,7 @@ def search(
         if left:
             continue
         while i < 4 * net.degree[v] and scratch.paid[0] - kept < count:
-            u, way = net.ring[v, i // 4], i % 4  # flip, draw u into v, draw v into u, split
+            u, way = net.ring[v, i // 4], i % 4
             if i == 0 and scratch.tried[v] == 1:
                 break
             if way == 0:
@@ -255,18 +277,11 @@ def search(
                     continue
             scratch.tried[v] = 1
             i += 1
-            move, a, b = (way + 1) // 2, v, u
-            if way == 2:
-                if net.kind[u] == net.kind[v]:
-                    continue  # both would come to the middle
-                a, b = u, v
-            if not is_allowed(net, move, a, b):
-                continue
-            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
-            if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
+            move, a, b = move_at(net, v, u, way, length)
+            if move == NO_MOVE:
                 continue
             if not may_change(net, scratch, a, b):
-                left = True  # for those who may
+                left = True  # for a search that may
                 continue
             half = 0.5 if move == SPLIT else -0.5
             worth = share + price * (strain - 0.5 * (free - net.spare[0] + half) / count)
@@ -279,7 +294,7 @@ def search(
 
 @kernel
 def suit_nodes(net: Net) -> None:
-    """Fill in how many neighbours suit each node: 6 inside, on the boundary as many as its angle has room for."""
+    """Fill in the ideal valence of each node: 6 inside, on the boundary what its angle has room for."""
     for v in range(len(net.arc)):
         net.ideal[v] = 6
         if net.degree[v] > 0 and net.is_open[v] == 1:

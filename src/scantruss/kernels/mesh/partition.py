@@ -1,7 +1,7 @@
-"""Two halves of a grid that two threads work on at once, and the nodes between them, which stay as they are meanwhile.
+"""Two halves of a grid on which two threads work at once, and the nodes between them, which do not change meanwhile.
 
-Whatever changes a node looks two members farther at most. Between the halves two rings of nodes rest, so that neither half sees
-what happens in the other, and the result is the same however fast either is.
+A move depends on nodes at most two members away. Two rings of nodes between the halves do not change, so that neither half depends on
+the other and the result does not depend on the timing of the threads.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import numpy as np
 from ...runtime.jit import kernel
 from .grid import Net
 
-BETWEEN = -1  # label of the nodes that rest
+BETWEEN = -1  # label of the nodes between the halves
 
 
 @kernel
 def farthest(net: Net, start: int, among: np.ndarray, away: np.ndarray, queue: np.ndarray) -> int:
-    """Fill in how many members each node is away from a node, -1 where none lead there; returns the last reached of those `among`."""
+    """Fill in how many members away from `start` each node is, -1 if not connected; returns the last one reached of those `among`."""
     away[:] = -1
     queue[0], away[start] = start, 0
     count, at, last = 1, 0, start
@@ -36,9 +36,9 @@ def farthest(net: Net, start: int, among: np.ndarray, away: np.ndarray, queue: n
 
 @kernel
 def paths_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.ndarray) -> bool:
-    """Fill away (2, C) with the members from two far ends of the nodes `among` (C,) bool to each node; False where none is among.
+    """Fill away (2, C) with how many members each node is from two far ends of the nodes `among` (C,) bool; False if there are none.
 
-    The ends depend on the net alone, not on where it lies.
+    The ends depend on the topology alone, not on the position of the grid.
     """
     for v in range(net.in_use[0]):
         if among[v]:
@@ -50,7 +50,7 @@ def paths_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.nda
 
 @kernel
 def part(net: Net, nearer: np.ndarray, label: np.ndarray) -> None:
-    """Label the nodes 0 or 1 by the end that they are nearer to (C,) int64, or BETWEEN beside the other half."""
+    """Label the nodes 0 or 1 by the end they are nearer to (C,) int64, or BETWEEN if a neighbour is nearer to the other."""
     for v in range(net.in_use[0]):
         label[v] = nearer[v]
         for i in range(net.degree[v]):

@@ -1,4 +1,4 @@
-"""Perturbations: moves at random, after which the grid around settles and is searched; what has lowered the energy is kept."""
+"""Perturbations: random moves, after which the grid around settles and is searched; kept if the energy falls."""
 
 from __future__ import annotations
 
@@ -9,67 +9,73 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves
-from ..geometry.vectors import fill_row, norm, row, subtract
-from .equalize import STRIDE, settle_node
-from .grid import LOCKED, Net, place_of, target_length, wings
-from .local_search import COLLAPSE, FLIP, LONG, SHORT, SPLIT, STILL, is_allowed, is_regular, make_move, try_move
+from ..geometry.vectors import fill_row
+from .equalize import RELAXATION, settle_node
+from .grid import LOCKED, Net, place_of, wings
+from .local_search import (
+    COLLAPSE,
+    FLIP,
+    NO_MOVE,
+    SHORTEST_TRIAL_STEP,
+    SPLIT,
+    is_allowed,
+    is_regular,
+    make_move,
+    move_at,
+    try_move,
+)
 from .trial import Scratch, gather, local_energy
 
-WIDE, SEARCHED, PERTURBED = (
-    5,
-    2,
-    1,
-)  # rings around the perturbed node that may change, are searched, get the random moves
-MOST_NODES = 400  # nodes of an area
-KEPT = 32  # free nodes at the top of the stack that are written down
-MOVES = 3  # most random moves of a perturbation
-SEARCH_ROUNDS = 2  # of settling and searching
-CALM = 2  # sweeps of settling in a round
-ALLOWANCE_SETTLED = 2.2  # energy that moves at random may cost once settled: what costs more never pays in the end
-ALLOWANCE_SEARCHED = 0.2  # the same once searched: what costs more hardly ever does
-LISTED, UNFIT, BEYOND = 0, 1, 2  # areas
+AREA_RINGS = 5  # rings of nodes around the perturbed node that may change
+SEARCHED_RINGS = 2  # rings whose nodes are searched
+PERTURBED_RINGS = 1  # rings in which random moves are made
+MOST_NODES = 400  # most nodes of an area
+SAVED_FREE_NODES = 32  # free nodes from the top of the stack that are saved with an area
+MOST_RANDOM_MOVES = 3  # most random moves of a perturbation
+SEARCH_ROUNDS = 2  # most rounds of settling and searching
+AREA_SWEEPS = 2  # sweeps in which the area settles in a round
+ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; more never pays in the end
+ALLOWANCE_SEARCHED = 0.2  # the same once it has been searched; what costs more hardly ever pays
+LISTED, UNFIT, OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
 
 
 class Area(NamedTuple):
-    """The nodes that a perturbation may change, as they were before it."""
+    """The nodes that a perturbation may change, saved as they were before it."""
 
-    mark: np.ndarray  #: (C,) int64 number of the perturbation that has the node in its area
-    away: np.ndarray  #: (C,) int64 rings away from the perturbed node
-    out: np.ndarray  #: (C,) int64, 1 where the node is out of bounds
+    mark: np.ndarray  #: (C,) int64 number of the last perturbation with the node in its area
+    away: np.ndarray  #: (C,) int64 rings between the node and the perturbed node
+    out: np.ndarray  #: (C,) int64, 1 for a node out of bounds
     around: np.ndarray  #: (A,) int64 the nodes
     nodes: np.ndarray  #: (A, 3) their places
     arc: np.ndarray  #: (A,) their arcs
     desired: np.ndarray  #: (A,) their desired lengths
     ring: np.ndarray  #: (A, W) int64 their rings
-    degree: np.ndarray  #: (A,) int64 and all else of a `Net` that they have
+    degree: np.ndarray  #: (A,) int64; this and the next five as in `Net`
     is_open: np.ndarray  #: (A,) int64
     kind: np.ndarray  #: (A,) int64
     curve: np.ndarray  #: (A,) int64
     ideal: np.ndarray  #: (A,) int64
     line: np.ndarray  #: (A,) int64
     patches: np.ndarray  #: (A, PATCH) their local surfaces: a node that is freed may come back elsewhere
-    free: np.ndarray  #: (KEPT,) int64 the top of the stack of free nodes
-    saved: np.ndarray  #: (1,) int64 how many of these there are
+    free: np.ndarray  #: (SAVED_FREE_NODES,) int64 the top of the stack of free nodes
+    saved: np.ndarray  #: (1,) int64 how many of these are saved
     spare: np.ndarray  #: (1,) int64 how many nodes were free
     number: np.ndarray  #: (1,) int64 number of the perturbation
-    gathered: np.ndarray  #: (1,) int64 nodes of the area
+    gathered: np.ndarray  #: (1,) int64 number of nodes of the area
     seed: np.ndarray  #: (1,) int64 state of the random numbers
-    paid: np.ndarray  #: (1,) int64 perturbations that paid
+    paid: np.ndarray  #: (1,) int64 how many perturbations were kept
 
 
 @kernel
 def random_choice(area: Area, choices: int) -> int:
-    """A number from 0 to choices - 1, the same in every run."""
+    """A pseudo-random number from 0 to choices - 1, the same in every run."""
     area.seed[0] = (area.seed[0] * 1103515245 + 12345) & 0x7FFFFFFF
     return (area.seed[0] >> 8) % choices
 
 
 @kernel
 def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
-    """List the nodes around a node as they are now: LISTED, or UNFIT where there are too many or a defect is among them.
-
-    BEYOND where one is out of bounds.
-    """
+    """Save the nodes around a node: LISTED, UNFIT if there are too many or a defect is among them, or OUT_OF_BOUNDS if one is."""
     area.number[0] += 1
     stamp = area.number[0]
     area.around[0] = v
@@ -79,10 +85,10 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         u = area.around[at]
         at += 1
         if area.out[u] == 1:
-            return BEYOND
+            return OUT_OF_BOUNDS
         if net.kind[u] == LOCKED:
             return UNFIT
-        if area.away[u] == WIDE:
+        if area.away[u] == AREA_RINGS:
             continue
         for i in range(net.degree[u]):
             w = net.ring[u, i]
@@ -103,7 +109,7 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         area.curve[k], area.ideal[k], area.line[k] = net.curve[u], net.ideal[u], net.line[u]
         fill_row(area.patches[k], patches[u])
     free = net.spare[0]
-    area.spare[0], area.saved[0] = free, min(free, KEPT)
+    area.spare[0], area.saved[0] = free, min(free, SAVED_FREE_NODES)
     for k in range(area.saved[0]):
         area.free[k] = net.free[free - 1 - k]
     return LISTED
@@ -130,18 +136,18 @@ def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
 
 @kernel
 def added_node(net: Net, area: Area, k: int) -> int:
-    """Free node k of those written down if it is in use now and not in the area, else -1; it joins the area at its middle."""
+    """Free node k of the saved ones if it is in use by now, else -1; it joins the area beside the perturbed node."""
     v = area.free[k]
     if net.degree[v] == 0:
         return -1
     if area.mark[v] != area.number[0]:
-        area.mark[v], area.away[v] = area.number[0], PERTURBED
+        area.mark[v], area.away[v] = area.number[0], PERTURBED_RINGS
     return v
 
 
 @kernel
 def area_energy(net: Net, patches: np.ndarray, scratch: Scratch, area: Area, length: float, weight: float) -> float:
-    """Energy of all members and triangles that have a node in the area."""
+    """Energy of all members and triangles with a node in the area."""
     scratch.trial[0] += 1
     count = 0
     for k in range(area.gathered[0] + area.saved[0]):
@@ -172,11 +178,11 @@ def is_within(net: Net, area: Area, a: int, b: int) -> bool:
 
 @kernel
 def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, area: Area) -> int:
-    """Make some random moves near the perturbed node; returns how many."""
+    """Make some random moves at and around the perturbed node; returns how many."""
     made = 0
-    for _ in range(1 + random_choice(area, MOVES)):
+    for _ in range(1 + random_choice(area, MOST_RANDOM_MOVES)):
         near = 1
-        while near < area.gathered[0] and area.away[area.around[near]] <= PERTURBED:
+        while near < area.gathered[0] and area.away[area.around[near]] <= PERTURBED_RINGS:
             near += 1
         a = area.around[random_choice(area, near)]
         if net.degree[a] == 0:
@@ -188,20 +194,20 @@ def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scrat
             gather(net, scratch, a, b)
             added = make_move(net, patches, curves, scratch, move, a, b)
             if added >= 0:
-                area.mark[added], area.away[added] = area.number[0], PERTURBED
+                area.mark[added], area.away[added] = area.number[0], PERTURBED_RINGS
             made += 1
     return made
 
 
 @kernel
 def settle_area(net: Net, patches: np.ndarray, curves: Curves, area: Area, length: float, weight: float) -> None:
-    """Settle the nodes of the area but those at its edge."""
-    for _ in range(CALM):
+    """Settle the nodes of the area, except those at its edge."""
+    for _ in range(AREA_SWEEPS):
         for k in range(area.gathered[0] + area.saved[0]):
             listed = k < area.gathered[0]
             v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
-            if v >= 0 and net.degree[v] > 0 and area.away[v] < WIDE:
-                settle_node(net, patches, curves, v, length, weight, STILL * length, STRIDE)
+            if v >= 0 and net.degree[v] > 0 and area.away[v] < AREA_RINGS:
+                settle_node(net, patches, curves, v, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
 
 
 @kernel
@@ -215,12 +221,12 @@ def search_area(
     weight: float,
     worth: float,
 ) -> int:
-    """Try moves at the irregular nodes in the middle of the area that are not marked as tried; returns how many were kept."""
+    """Try moves at the irregular nodes in the middle of the area that are not yet marked as tried; returns how many were kept."""
     kept = 0
     for k in range(area.gathered[0] + area.saved[0]):
         listed = k < area.gathered[0]
         v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
-        if v < 0 or net.degree[v] == 0 or area.away[v] > SEARCHED:
+        if v < 0 or net.degree[v] == 0 or area.away[v] > SEARCHED_RINGS:
             continue
         if scratch.tried[v] == 1 or is_regular(net, v, length):
             continue
@@ -232,15 +238,8 @@ def search_area(
                 continue
             scratch.tried[v] = 1
             i += 1
-            move, a, b = (way + 1) // 2, v, u
-            if way == 2:
-                if net.kind[u] == net.kind[v]:
-                    continue
-                a, b = u, v
-            if not (is_allowed(net, move, a, b) and is_within(net, area, a, b)):
-                continue
-            size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
-            if (move == SPLIT and size < SHORT) or (move == COLLAPSE and size > LONG):
+            move, a, b = move_at(net, v, u, way, length)
+            if move == NO_MOVE or not is_within(net, area, a, b):
                 continue
             if try_move(net, patches, curves, scratch, move, a, b, length, weight, worth):
                 kept += 1
@@ -284,10 +283,11 @@ def perturb(
     temperature: float,
     allowance: float,
 ) -> bool:
-    """Perturb the grid in the area that is listed; True if that has paid, else all is as before.
+    """Perturb the grid in the area that is listed; True if the result is kept, else all is as before.
 
     worth, bend : n more nodes may cost worth n - bend n^2
-    allowance : what still costs more once it is searched is given up; below ALLOWANCE_SETTLED, so is what the search has undone
+    allowance : energy that a perturbation may still cost once it is searched; if it is below ALLOWANCE_SETTLED, one that the search has
+        undone is given up too
     """
     before = area_energy(net, patches, scratch, area, length, weight)
     if move_at_random(net, patches, curves, scratch, area) == 0:
@@ -333,13 +333,12 @@ def perturb_all(
     temperature: float,
     allowance: float,
 ) -> int:
-    """Perturb the grid once at every node waiting that has more or fewer neighbours than suit it; returns how often that paid.
+    """Perturb the grid once at each waiting node whose valence is not ideal; returns how many perturbations were kept.
 
     Parameters
     ----------
-    waiting : (C,) bool; on return only of nodes with one out of bounds around them
-    strain, price, share : as in `search`
-    count : V, as in `search`; those within bounds
+    waiting : (C,) bool; on return, True only for nodes whose area is partly out of bounds
+    strain, price, share, count : as in `search`
     temperature, allowance : as in `perturb`
     """
     paid, free = area.paid[0], net.spare[0]
@@ -349,7 +348,7 @@ def perturb_all(
         listed = UNFIT
         if net.degree[v] > 0 and net.degree[v] != net.ideal[v]:
             listed = list_area(net, patches, area, v)
-        waiting[v] = listed == BEYOND
+        waiting[v] = listed == OUT_OF_BOUNDS
         if listed == LISTED:
             worth = share + price * (strain - 0.5 * (free - net.spare[0]) / count)
             perturb(

@@ -1,4 +1,4 @@
-"""The local surface of the scan under each node of a net."""
+"""Point location: the sample, the patch and the place on a curve of each node of a net."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
 from ..geometry.vectors import fill_row, norm, row, subtract
 from ..surface.folds import REACH, fit_fold
-from ..surface.local_surface import Surface, fit_patch, onto_patch, walk
+from ..surface.local_surface import IS_FITTED, NEAREST_SAMPLE, Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
 from .grid import INTERIOR, ON_CURVE, REST, Net
 
-OFF_SHEET = 0.5  # a patch that passes a node at this distance is none of its sheet, in lengths
+FARTHEST_PATCH = 0.5  # distance of a new patch from its node above which it is of another sheet [member lengths]
 
 
 @kernel
 def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
-    """Sample of the scan nearest to a place, by trying all."""
+    """Sample of the scan nearest to a place, by exhaustive search."""
     best, sample = np.inf, 0
     for s in range(len(surface.mean)):
         dx, dy, dz = surface.mean[s, 0] - x, surface.mean[s, 1] - y, surface.mean[s, 2] - z
@@ -31,7 +31,7 @@ def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
 def locate_nodes(
     net: Net, surface: Surface, patches: np.ndarray, length: float, queue: np.ndarray, located: np.ndarray
 ) -> None:
-    """Find the sample under every node; from node to node over the members, so that each stays on its sheet of the scan.
+    """Find the sample nearest to each node, from node to node over the members, so that each stays on its sheet of the scan.
 
     `queue` and `located` (C,) int64 are scratch, zero at the start.
     """
@@ -41,27 +41,29 @@ def locate_nodes(
             continue
         queue[0], count, at = seed, 1, 0
         located[seed] = 1
-        patches[seed, 15] = nearest_sample(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
+        patches[seed, NEAREST_SAMPLE] = nearest_sample(
+            surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2]
+        )
         while at < count:
             v = queue[at]
             at += 1
             place = row(net.nodes, v)
-            sample = walk(surface, int(patches[v, 15]), place)
+            sample = walk(surface, int(patches[v, NEAREST_SAMPLE]), place)
             if norm(subtract(row(surface.mean, sample), place)) > 0.5 * length:
                 sample = nearest_sample(surface, place[0], place[1], place[2])
-            patches[v, 15] = sample
+            patches[v, NEAREST_SAMPLE] = sample
             for i in range(net.degree[v]):
                 u = net.ring[v, i]
                 if located[u] == 0:
                     located[u] = 1
-                    patches[u, 15] = sample
+                    patches[u, NEAREST_SAMPLE] = sample
                     queue[count] = u
                     count += 1
 
 
 @kernel
 def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
-    """Find the place of every boundary node on the curves; those that are no corner (K, 3) and not fixed may slide from there."""
+    """Find the place of each boundary node on the curves, along which all may slide except corners (K, 3) and fixed nodes."""
     for v in range(net.in_use[0]):
         if net.is_open[v] == 0 or net.kind[v] != REST:
             continue
@@ -81,21 +83,24 @@ def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.
 def renew_patches(
     net: Net, surface: Surface, patches: np.ndarray, near: float, strength: float, begin: int, end: int
 ) -> int:
-    """Fit the local surface anew under each node from `begin` to `end` - 1 not within `near` of the middle of its patch.
+    """Fit new patches to the nodes from `begin` to `end` - 1 that are farther than `near` from the centres of theirs; returns how many.
 
-    Where the new one passes far from the node it is another sheet's, or follows too few points: the old one is kept. Returns how many.
+    A new patch far from its node is of another sheet or follows too few points: the old one is kept.
     """
     count = 0
     before = np.empty(patches.shape[1])
     for v in range(begin, end):
         if net.degree[v] > 0:
             place = row(net.nodes, v)
-            if patches[v, 16] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
+            if patches[v, IS_FITTED] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
-                fit_patch(surface, patches[v], int(patches[v, 15]), place)
+                fit_patch(surface, patches[v], int(patches[v, NEAREST_SAMPLE]), place)
                 fit_fold(surface, patches[v], REACH, strength)
                 local = surface.length * net.desired[v]
-                if before[16] != 0.0 and norm(subtract(place, onto_patch(patches[v], place))) > OFF_SHEET * local:
+                if (
+                    before[IS_FITTED] != 0.0
+                    and norm(subtract(place, onto_patch(patches[v], place))) > FARTHEST_PATCH * local
+                ):
                     fill_row(patches[v], before)
                 count += 1
     return count
@@ -103,15 +108,15 @@ def renew_patches(
 
 @kernel
 def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, end: int) -> None:
-    """Give each node from `begin` to `end` - 1 the member length that is desired where it stands."""
+    """Look up the desired member length at each node from `begin` to `end` - 1."""
     for v in range(begin, end):
         if net.degree[v] > 0:
-            net.desired[v] = length_at(surface, int(patches[v, 15]), row(net.nodes, v))
+            net.desired[v] = length_at(surface, int(patches[v, NEAREST_SAMPLE]), row(net.nodes, v))
 
 
 @kernel
 def return_to_scan(net: Net, patches: np.ndarray, curves: Curves, reach: float) -> None:
-    """Bring every free node back: onto its patch of the scanned surface, or onto its boundary curve within `reach` along it."""
+    """Return each free node to its patch of the scanned surface, or to its curve within `reach` along it."""
     for v in range(net.in_use[0]):
         x, y, z = row(net.nodes, v)
         if net.degree[v] > 0 and net.kind[v] == INTERIOR:
@@ -123,7 +128,7 @@ def return_to_scan(net: Net, patches: np.ndarray, curves: Curves, reach: float) 
 
 @kernel
 def distances_from_scan(net: Net, patches: np.ndarray, distance: np.ndarray) -> None:
-    """Distance of each node from its patch of the scanned surface, (C,)."""
+    """Fill in the distance of each node from its patch of the scanned surface (C,)."""
     for v in range(net.in_use[0]):
         if net.degree[v] > 0:
             place = row(net.nodes, v)

@@ -1,40 +1,46 @@
-"""The last step: every node comes down on the scanned surface itself, not on the smoother one that it was moved over."""
+"""Projection: in the end each node goes onto the scanned surface itself, not the smoother one over which it was moved."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.vectors import Vector, along, dot, fill_row, norm, row, subtract
+from ..geometry.quadric import TERMS_OF_QUADRIC
+from ..geometry.vectors import Vector, along, dot, fill_row, norm, put_vector, row, subtract
 from ..surface.folds import fit_fold, onto_crest
-from ..surface.local_surface import Surface, fit_patch, onto_patch, patch_normal
+from ..surface.local_surface import (
+    CENTRE,
+    MEAN_DISTANCE,
+    NEAREST_SAMPLE,
+    ROUNDNESS,
+    Surface,
+    fit_patch,
+    onto_patch,
+    patch_normal,
+)
 from .grid import INTERIOR, Net
 
-LIKE = 1.08  # a wider patch serves as well when the points lie as near to it, but for this factor
-SETTLED = 0.03  # a node that has come down by less has found its patch, in lengths
-EQUAL_PATCH_RATIO = 0.85  # patches of radii nearer to each other are as good as one
-LINED = 0.75  # points less spread than this (1 in a disc, 0 on a line) lie on few scan lines
-CREST_REACH = 0.4  # samples that tell where the crest of a fold is [member lengths]
-TERMS = 6.0  # of a quadric: so many points it passes through
-FEWEST_FOR_WIDE_PATCH = (
-    24  # a patch of fewer points, as there are at a boundary, has an edge that their noise moves too much
-)
+EQUALLY_NEAR = 1.08  # largest distance of the points from a wider patch that fits as well [that from the narrow one]
+SMALL_MOVE = 0.03  # distance below which a projected node keeps its patch [member lengths]
+EQUAL_PATCH_RATIO = 0.85  # ratio of the radii of two patches above which one of them is enough
+ROUND_ENOUGH = 0.75  # least roundness of the points of a patch; below it they lie on few scan lines
+CREST_REACH = 0.4  # distance up to which samples count for the crest of a fold [member lengths]
+FEWEST_FOR_WIDE_PATCH = 24  # fewest points of a patch; the noise of fewer, as at a boundary, moves its edge too much
 
 
 @kernel
 def _away(patch: np.ndarray, taken: int) -> float:
-    """Mean distance of the points of a surface from a patch fitted to so many: that of the points, and what the patch used up of it."""
-    return float(patch[17] * np.sqrt(taken / max(taken - TERMS, 1.0)))
+    """Mean distance of the points from a patch fitted to `taken` of them, corrected for the coefficients fitted."""
+    return float(patch[MEAN_DISTANCE] * np.sqrt(taken / max(taken - TERMS_OF_QUADRIC, 1.0)))
 
 
 @kernel
 def _fit_widest(
     fine: Surface, middle: Surface, broad: Surface, patch: np.ndarray, narrow: np.ndarray, sample: int, place: Vector
 ) -> int:
-    """Fit the widest of three patches to which the points lie as near as to the narrowest: least noise without rounding off.
+    """Fit the widest of three patches that the points fit as well as the narrowest: least noise, and nothing is rounded off.
 
-    Points along one scan line tell nothing of the surface beside it, and a few too little: such a patch is too narrow, however near
-    they lie.
+    A patch of few points, or of points along one scan line, is too narrow however well they fit.
     """
     taken = fit_patch(fine, patch, sample, place)
     fill_row(narrow, patch)
@@ -44,9 +50,9 @@ def _fit_widest(
         if turn == 0 and middle.patch_radius > EQUAL_PATCH_RATIO * broad.patch_radius:
             continue
         more = fit_patch(middle if turn == 0 else broad, patch, sample, place)
-        too_narrow = kept[18] < LINED or taken < FEWEST_FOR_WIDE_PATCH
+        too_narrow = kept[ROUNDNESS] < ROUND_ENOUGH or taken < FEWEST_FOR_WIDE_PATCH
         away = _away(patch, more)
-        if more < 4 or (away > LIKE * least and not too_narrow):
+        if more < 4 or (away > EQUALLY_NEAR * least and not too_narrow):
             fill_row(patch, kept)
             break
         if too_narrow:
@@ -69,16 +75,16 @@ def project_nodes(
     begin: int,
     end: int,
 ) -> None:
-    """Move each node to its foot on the surface of the nearest points; nodes of a boundary only along the normal.
+    """Move each node to its foot on the surface of the nearest points, nodes of a boundary only along the normal.
 
     Parameters
     ----------
     fine, middle, broad : Surface
-        The same scan with narrow patches, which follow it, and with wider ones, which average its noise.
-    patches : (C, PATCH), scratch; column 15 is the sample near each node
-    fixed : (C,) bool, nodes that stay where they are
-    deviation : (C,), filled with the distance of each node from the narrow patch fitted at its place or close by [scan unit]
-    folds : weight of folds; nodes go to their crests where there is any
+        The same scan with narrow patches, which follow it, and with wider ones, which average out its noise.
+    patches : (C, PATCH) patches of the nodes, replaced
+    fixed : (C,) bool, nodes that are not moved
+    deviation : (C,), filled with the distance of each node from a narrow patch fitted at its place or close by [scan unit]
+    folds : weight of folds; if it is positive, nodes near folds go to their crests
     begin, end : the nodes from `begin` to `end` - 1
     """
     narrow = np.empty(patches.shape[1])
@@ -88,7 +94,7 @@ def project_nodes(
         local, stayed = broad.length * net.desired[v], False
         for _ in range(2):
             place = row(net.nodes, v)
-            taken = _fit_widest(fine, middle, broad, patches[v], narrow, int(patches[v, 15]), place)
+            taken = _fit_widest(fine, middle, broad, patches[v], narrow, int(patches[v, NEAREST_SAMPLE]), place)
             if taken < 4:
                 break
             foot = onto_patch(patches[v], place)
@@ -98,14 +104,14 @@ def project_nodes(
             if fixed[v] or norm(subtract(foot, place)) > 0.6 * local:
                 break
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
-            if norm(subtract(foot, place)) < SETTLED * local:
+            if norm(subtract(foot, place)) < SMALL_MOVE * local:
                 stayed = True
                 break
         if folds > 0.0 and net.kind[v] == INTERIOR and not fixed[v]:
-            patches[v, 0], patches[v, 1], patches[v, 2] = row(net.nodes, v)
+            put_vector(patches[v], CENTRE, row(net.nodes, v))
             fit_fold(broad, patches[v], CREST_REACH, 1.0)
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))
         place = row(net.nodes, v)
         if not stayed:
-            fit_patch(fine, narrow, int(patches[v, 15]), place)
+            fit_patch(fine, narrow, int(patches[v, NEAREST_SAMPLE]), place)
         deviation[v] = norm(subtract(place, onto_patch(narrow, place)))

@@ -1,4 +1,4 @@
-"""Which part of a scan belongs to which node of a grid."""
+"""Which samples of a scan belong to which node of a grid, and where the grid does not connect what the scan does."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..surface.local_surface import Surface, flood
 
 @kernel
 def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach: float, nearest: np.ndarray) -> None:
-    """The node (V, 3) nearest to each sample among those within `reach` on its own sheet, going over the links; -1 where there is none.
+    """Find the nearest node (V, 3) of each sample within `reach` over the links of its own sheet; -1 if there is none.
 
     boxes : of the samples. nearest : (S,) int64, filled.
     """
@@ -40,14 +40,14 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
 def first_disconnected(
     links: np.ndarray, nearest: np.ndarray, first: np.ndarray, ends: np.ndarray, most: int, enough: int
 ) -> int:
-    """The first sample whose node is far in the grid from that of a sample linked to it; -1 where there are fewer than `enough` such links.
+    """The first sample whose node is far in the grid from the node of a linked sample; -1 if there are fewer than `enough` such links.
 
     Parameters
     ----------
     links : (S, K) int64, linked samples, -1 for none
     nearest : (S,) int64, node of each sample, -1 for none
-    first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of each node's members
-    most : members one after the other that still lead from node to node
+    first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of the members of each node
+    most : members between two nodes up to which they are close
     """
     stamp, queue = np.full(len(first) - 1, -1, np.int64), np.empty(len(first) - 1, np.int64)
     disconnected, sample, number = 0, -1, 0

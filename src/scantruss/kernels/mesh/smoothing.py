@@ -1,4 +1,4 @@
-"""One pass of Taubin's smoothing, and the figures that its stops look at (Sec. 4.1)."""
+"""Taubin's smoothing, and the figures by which it stops (Sec. 4.1)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.vectors import cross, dot, norm, row, subtract
-from .equalize import ROOT
+from .equalize import FOUR_ROOT_3
 from .grid import INTERIOR, ON_CURVE, Net, slides_on_line
 
 
 @kernel
 def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
-    """Move every free node by `factor` of the way to the middle of its neighbours; on the boundary or a line, of its two neighbours there.
+    """Move each free node by `factor` of the way to the mean of its neighbours; on the boundary or a line, of its two neighbours there.
 
-    Neighbours weigh as much as their members are long beside what is desired there, so that long members become shorter: with equal
-    weights a grid keeps the uneven density that the front has left. All nodes move at once: `before` (C, 3) gets the places from
-    which they start.
+    A neighbour weighs as much as the length of its member over the desired one, so that long members become shorter: with equal weights
+    a grid keeps the uneven density that the front has left. All nodes move at once, from the positions kept in `before` (C, 3).
     """
     used = net.in_use[0]
     for v in range(used):
@@ -45,9 +44,9 @@ def move_to_middle(net: Net, factor: float, before: np.ndarray) -> None:
 
 @kernel
 def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
-    """Mean shape quality of the triangles, standard deviation of the member lengths, mean way of the nodes from their start (C, 3).
+    """Mean shape quality of the triangles, standard deviation of the member lengths, mean distance of the nodes from `start` (C, 3).
 
-    The lengths are those of members where one reference length is desired.
+    Lengths count in the desired length at the member.
     """
     shape = total = squares = moved = 0.0
     triangles = members = count = 0
@@ -71,7 +70,7 @@ def state_of(net: Net, start: np.ndarray) -> tuple[float, float, float]:
                 c = subtract(b, a)
                 edges = dot(a, a) + dot(b, b) + dot(c, c)
                 if edges > 0.0:
-                    shape += 0.5 * ROOT * norm(cross(a, b)) / edges
+                    shape += 0.5 * FOUR_ROOT_3 * norm(cross(a, b)) / edges
     mean = total / max(members, 1)
     return (
         shape / max(triangles, 1),

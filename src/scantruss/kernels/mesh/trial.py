@@ -1,4 +1,4 @@
-"""Trials: the nodes around an edge, what they were before, and the energy that a trial changes."""
+"""Trials: the nodes around an edge, saved as they were, and the energy that a trial changes."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 from ..surface.folds import BENT, chord_energy, fold_energy
-from .equalize import ROOT
+from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
 
 
 class Scratch(NamedTuple):
-    """Room for one trial: what is around, and how it was before."""
+    """The neighbourhood of one trial, as it was before, and what is known of the nodes."""
 
-    held: np.ndarray  #: (C,) int64 number of the trial that holds the node
-    tried: np.ndarray  #: (C,) int64, 1 where nothing has changed since the node was tried
-    out: np.ndarray  #: (C,) int64, 1 where the node must not change
-    around: np.ndarray  #: (C,) int64 nodes that may move
-    nodes: np.ndarray  #: (C, 3) their places before
-    arc: np.ndarray  #: (C,) their arcs before
-    ring: np.ndarray  #: (C, W) int64 their rings before
-    degree: np.ndarray  #: (C,) int64 their numbers of neighbours before
-    line: np.ndarray  #: (C,) int64 their members along lines before
+    held: np.ndarray  #: (C,) int64 number of the last trial with the node in its neighbourhood
+    tried: np.ndarray  #: (C,) int64, 1 if nothing near the node has changed since its moves were tried
+    out: np.ndarray  #: (C,) int64, 1 for a node that must not change
+    around: np.ndarray  #: (C,) int64 nodes of the neighbourhood; the next five are theirs, as before the trial
+    nodes: np.ndarray  #: (C, 3) positions
+    arc: np.ndarray  #: (C,) arc lengths
+    ring: np.ndarray  #: (C, W) int64 rings
+    degree: np.ndarray  #: (C,) int64 numbers of neighbours
+    line: np.ndarray  #: (C,) int64 members along lines
     trial: np.ndarray  #: (1,) int64 number of the trial
-    gathered: np.ndarray  #: (1,) int64 how many nodes are around
-    paid: np.ndarray  #: (1,) int64 how many trials have paid
+    gathered: np.ndarray  #: (1,) int64 number of nodes of the neighbourhood
+    paid: np.ndarray  #: (1,) int64 how many trials were kept
 
 
 @kernel
 def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
-    """List the nodes around the edge a-b: its quadrangle and all their neighbours, as they are now."""
+    """Save the neighbourhood of the edge a-b: the nodes of its quadrangle and all their neighbours."""
     scratch.trial[0] += 1
     stamp = scratch.trial[0]
     right, left = wings(net, a, b)
@@ -67,7 +67,7 @@ def gather(net: Net, scratch: Scratch, a: int, b: int) -> None:
 
 @kernel
 def may_change(net: Net, scratch: Scratch, a: int, b: int) -> bool:
-    """Whether all that a trial at the edge a-b may change is within bounds."""
+    """Whether all nodes that a trial at the edge a-b may change are within bounds."""
     right, left = wings(net, a, b)
     for v in (a, b, right, left):
         if v >= 0:
@@ -81,7 +81,7 @@ def may_change(net: Net, scratch: Scratch, a: int, b: int) -> bool:
 
 @kernel
 def put_back(net: Net, scratch: Scratch) -> None:
-    """Undo a trial: all around as it was."""
+    """Undo a trial: restore its neighbourhood."""
     for i in range(scratch.gathered[0]):
         v = scratch.around[i]
         for c in range(3):
@@ -94,10 +94,10 @@ def put_back(net: Net, scratch: Scratch) -> None:
 
 @kernel
 def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
-    """Whether triangle (v, a, b) of this normal is folded over a-b, a member with no end in the neighbourhood that v is of."""
+    """Whether triangle (v, a, b) with a normal is folded over the member a-b, whose ends are not in the neighbourhood of v."""
     beyond = wings(net, a, b)[0]
     if beyond < 0 or (beyond < v and scratch.held[beyond] == scratch.trial[0]):
-        return False  # the boundary, or counted from the other side
+        return False  # on the boundary, or counted from the other side
     p = row(net.nodes, a)
     other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
     return dot(normal, other) < 0.0
@@ -105,10 +105,10 @@ def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: V
 
 @kernel
 def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> float:
-    """Energy of all members and triangles that have a node in the neighbourhood, each counted once; 1 for a folded member.
+    """Energy of all members and triangles with a node in the neighbourhood, each counted once, and 1 for each folded member.
 
-    A member is folded where its two triangles meet at less than 90 degrees; those with only a triangle in the neighbourhood count
-    too, or trials beside each other could lower the energy of both in turn for ever.
+    A member is folded if its two triangles meet at less than 90 degrees. Members of which only a triangle is in the neighbourhood count
+    too, or two trials side by side could lower the energy in turn for ever.
     """
     nodes, held, stamp = net.nodes, scratch.held, scratch.trial[0]
     energy = 0.0
@@ -149,7 +149,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
             squares = bb + cc + ex * ex + ey * ey + ez * ez
             energy += 1.0
             if squares > 0.0:
-                energy -= 0.5 * ROOT * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
+                energy -= 0.5 * FOUR_ROOT_3 * math.sqrt(ux * ux + uy * uy + uz * uz) / squares
             if not inside and not was_inside and folds_outwards(net, scratch, v, before, w, (ux, uy, uz)):
                 energy += 1.0
     return energy
@@ -159,7 +159,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
 def total_energy(
     net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float
 ) -> tuple[float, float, int]:
-    """Energy of the whole grid, mean length of its members where `length` is desired, and its nodes."""
+    """Energy of the whole grid, mean length of its members (as if `length` were desired everywhere), and its number of nodes."""
     scratch.trial[0] += 1
     count = members = 0
     total = 0.0

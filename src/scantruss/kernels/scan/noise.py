@@ -6,9 +6,9 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree
-from ..geometry.quadric import COLUMNS
+from ..geometry.quadric import COLUMNS, RESIDUAL, SQUARE
 from ..geometry.vectors import along, dot, row, subtract, unit
-from ..surface.patches import PATCH, fit, foot, gather
+from ..surface.patches import Patches, fit, foot, gather
 
 ROOM = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
@@ -22,7 +22,8 @@ def fit_patches(
     radii: np.ndarray,
     widest: float,
     usual: np.ndarray,
-    patches: np.ndarray,
+    patches: Patches,
+    flatness: np.ndarray,
     begin: int,
     end: int,
 ) -> None:
@@ -34,10 +35,11 @@ def fit_patches(
     radii : (C,) of the narrowest
     widest : radius of the widest in these
     usual : (C,) rms distance of the points from a patch that fits
-    patches : (C, PATCH), filled; column 13 with how flat the distances of the points from it are distributed, see `_flatness`
+    patches : filled
+    flatness : (C,), filled with how flat the distances of the points from each patch are distributed, see `_flatness`
     """
     stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(ROOM, np.int64)
-    buffer, matrix, patch = np.zeros((ROOM, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
+    buffer, matrix = np.zeros((ROOM, COLUMNS)), np.zeros((6, 7))
     for i in range(begin, end):
         place = row(tree.points, centres[i])
         taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
@@ -46,13 +48,11 @@ def fit_patches(
             share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:
-            fit(buffer, taken, share * radii[i], PATCH_FITS, patch, matrix)
-            if patch[12] <= usual[i] or share <= 1.0:
+            fit(buffer, taken, share * radii[i], PATCH_FITS, patches, i, matrix)
+            if patches.rms[i] <= usual[i] or share <= 1.0:
                 break
             share = max(share / RADIUS_RATIO, 1.0)
-        patch[13] = _flatness(buffer, taken, patch[15])
-        for c in range(PATCH):
-            patches[i, c] = patch[c]
+        flatness[i] = _flatness(buffer, taken, patches.radius[i])
 
 
 @kernel
@@ -60,8 +60,8 @@ def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
     """Fourth moment of the distances from a patch over the square of the second: 3 for noise, 1 for points at two distances."""
     total = second = fourth = 0.0
     for i in range(taken):
-        w = max(1.0 - buffer[i, 3] / (radius * radius), 0.0)
-        square = buffer[i, 5] * buffer[i, 5]
+        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
+        square = buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
         total, second, fourth = total + w, second + w * square, fourth + w * square * square
     return fourth * total / (second * second) if second > 0.0 else 3.0
 
@@ -70,7 +70,7 @@ def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
 def onto_patches(
     tree: KDTree,
     number: np.ndarray,
-    patches: np.ndarray,
+    patches: Patches,
     neighbors: np.ndarray,
     moved: np.ndarray,
     normals: np.ndarray,
@@ -81,7 +81,6 @@ def onto_patches(
 
     number : (N,) int64 patch of each point that is a centre, else -1. moved, normals (N, 3), filled.
     """
-    patch = np.empty(PATCH)
     for p in range(begin, end):
         place = row(tree.points, p)
         total, shift, facing = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -89,13 +88,12 @@ def onto_patches(
             n = p if k < 0 else neighbors[p, k]
             if n < 0 or number[n] < 0:
                 continue
-            for c in range(PATCH):
-                patch[c] = patches[number[n], c]
             d = subtract(place, row(tree.points, n))
-            at, normal = foot(patch, d)
+            at, normal = foot(patches, number[n], d)
             e = subtract(at, d)
-            thick = max(patch[12], 1e-9 * patch[15])
-            near = max(1.0 - dot(d, d) / (patch[15] * patch[15]), 1e-3)
+            radius = patches.radius[number[n]]
+            thick = max(patches.rms[number[n]], 1e-9 * radius)
+            near = max(1.0 - dot(d, d) / (radius * radius), 1e-3)
             off = 1.0 + dot(e, e) / (9.0 * thick * thick)
             weight = near * near / (thick * thick * thick * thick * off * off)
             total += weight

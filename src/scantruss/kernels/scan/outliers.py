@@ -9,9 +9,9 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.planes import plane_of
-from ..geometry.quadric import COLUMNS
+from ..geometry.quadric import COLUMNS, SQUARE
 from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
-from ..surface.patches import FLAT, FULL, PATCH, doubt, fit
+from ..surface.patches import POINTS_FOR_PLANE, POINTS_FOR_QUADRIC, empty_patches, fit, height_variance, terms_for
 
 PATCH_FITS = 3  # fits of a patch, each with the points that lie off the one before weighed down
 BULK = 40  # points around a place that tell a cloud from a crease
@@ -83,7 +83,7 @@ def stand_off(
     about the surface, large at a boundary. least : part of the radius that counts as thickness in any case.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
-    buffer, matrix, patch = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), np.zeros(PATCH)
+    buffer, matrix, patches = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), empty_patches(1)
     for i in range(begin, end):
         p = which[i]
         off[i] = 0.0
@@ -96,18 +96,19 @@ def stand_off(
                 if found[k] != p and alive[found[k]] and taken < around:
                     d = subtract(row(tree.points, found[k]), place)
                     buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                    buffer[taken, 3] = away[k]
+                    buffer[taken, SQUARE] = away[k]
                     radius = 1.1 * math.sqrt(away[k])
                     taken += 1
             most *= 2
-        if taken < FULL or radius <= 0.0:
+        if taken < POINTS_FOR_QUADRIC or radius <= 0.0:
             continue
-        fit(buffer, taken, radius, PATCH_FITS, patch, matrix)
-        if patch[12] > THICK * radius:
+        fit(buffer, taken, radius, PATCH_FITS, patches, 0, matrix)
+        rms = patches.rms[0]
+        if rms > THICK * radius:
             continue
-        doubt(buffer, taken, 6 if patch[14] >= FULL else (3 if patch[14] >= FLAT else 1), patch, matrix)
-        expected = (patch[12] * patch[12]) * (1.0 + patch[13]) + (least * radius) ** 2
-        off[i] = abs(patch[6]) / math.sqrt(max(expected, 1e-300))
+        variance = height_variance(buffer, taken, terms_for(patches.points[0]), matrix)
+        expected = (rms * rms) * (1.0 + variance) + (least * radius) ** 2
+        off[i] = abs(patches.heights[0, 0]) / math.sqrt(max(expected, 1e-300))
 
 
 @kernel
@@ -212,7 +213,7 @@ def measure_planes(
                 count += 1
         radius = norm(row(offsets, count - 1)) if count else 0.0
         thick[i], aside[i] = np.inf, np.inf
-        if count < FLAT or radius == 0.0:
+        if count < POINTS_FOR_PLANE or radius == 0.0:
             continue
         mean, normal, spread, _ = plane_of(offsets, count)
         rms = math.sqrt(spread / count)
@@ -236,6 +237,6 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
                 offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(row(tree.points, found[k]), place)
                 count += 1
         bulk[i] = 0.0
-        if count >= FLAT:
+        if count >= POINTS_FOR_PLANE:
             _, _, off_plane, spread = plane_of(offsets, count)
             bulk[i] = off_plane / max(spread, 1e-300)

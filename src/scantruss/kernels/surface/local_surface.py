@@ -1,10 +1,7 @@
 """The local surface of the scan: moving least squares on the points of one sheet.
 
-Nodes are kept on it while they move. Each node caches one quadric patch, a row of `patches`:
-
-    0:3 centre   3:6 unit normal (oriented)   6:9 tangent u (v = normal x u)   9:15 coefficients of 1 u v uu uv vv
-    15 sample nearest to the centre   16 fitted (1) or not (0)   17 mean distance of the points from the patch
-    18 spread of the points, 1 in a disc, 0 on a line   19:31 the fold, see `folds`
+Nodes are kept on it while they move. Each node keeps the patch that was fitted last, a quadric over a plane, as a row of `patches`
+whose columns are named below: one row is copied and fitted as a whole, and `folds` adds columns of its own from 19 on.
 """
 
 from __future__ import annotations
@@ -15,11 +12,42 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.quadric import AWAY, COLUMNS, WEIGHT, fit_heights, project, second_moments
-from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, smallest_eigenvector, subtract
+from ..geometry.quadric import (
+    COLUMNS,
+    RESIDUAL,
+    TERMS_OF_PLANE,
+    TERMS_OF_QUADRIC,
+    WEIGHT,
+    coefficients_from,
+    fit_heights,
+    height_at,
+    project,
+    second_moments,
+    slopes_at,
+)
+from ..geometry.vectors import (
+    Vector,
+    across,
+    along,
+    cross,
+    dot,
+    norm,
+    put_vector,
+    row,
+    smallest_eigenvector,
+    subtract,
+    vector_from,
+)
 
-PATCH = 31  # columns of a patch row
-HEIGHTS = 9  # first of its coefficients
+PATCH = 31  # columns of a patch
+CENTRE = 0  # first of three columns: where the patch was fitted [scan unit]
+NORMAL = 3  # first of three columns: oriented unit normal of its plane
+TANGENT = 6  # first of three columns: unit vector u in the plane; v = normal x u
+HEIGHTS = 9  # first of six columns: height over the plane as coefficients of 1 u v u^2 uv v^2
+NEAREST_SAMPLE = 15  # column of the sample nearest to the centre
+IS_FITTED = 16  # column that is 1 once the patch is fitted, 0 before
+MEAN_DISTANCE = 17  # column of the mean distance of the points from the patch [scan unit]
+ROUNDNESS = 18  # column of how the points spread in the plane: 1 in a disc, 0 on a line
 
 
 class Surface(NamedTuple):
@@ -38,20 +66,18 @@ class Surface(NamedTuple):
     stamp: np.ndarray  #: (S,) int64 scratch of `flood`
     queue: np.ndarray  #: (S,) int64 scratch of `flood`
     counter: np.ndarray  #: (1,) int64 number of the last flood
-    field: (
-        np.ndarray
-    )  #: (S,) desired member length at each sample, in units of `length`: ones where there is one length
+    field: np.ndarray  #: (S,) desired member length at each sample [`length`]; all ones where there is one length
 
 
 @kernel
 def walk(surface: Surface, sample: int, place: Vector) -> int:
-    """Sample nearest to a place, reached by going downhill over the links: never leaves the sheet."""
+    """Sample nearest to a place, reached from another over links that each come nearer: it never leaves the sheet."""
     return descend(surface, sample, place, place, math.inf)
 
 
 @kernel
 def descend(surface: Surface, sample: int, target: Vector, place: Vector, reach: float) -> int:
-    """Sample reached over links by steps that each come nearer to a target, to samples within `reach` of a place only."""
+    """Sample nearest to a target, reached over links that each come nearer to it, through samples within `reach` of a place only."""
     best = _square(row(surface.mean, sample), target)
     while True:
         to = -1
@@ -77,7 +103,7 @@ def _square(a: Vector, b: Vector) -> float:
 
 @kernel
 def flood(surface: Surface, sample: int, place: Vector, reach: float) -> int:
-    """Samples within `reach` of a place that are linked to `sample` within that reach, into surface.queue; returns their number."""
+    """List in surface.queue the samples within `reach` of a place that links within that reach join to `sample`; returns how many."""
     surface.counter[0] += 1
     mark = surface.counter[0]
     surface.queue[0] = sample
@@ -107,7 +133,7 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
         return True
     if _square(target, place) > reach * reach:
         return False
-    if descend(surface, a, target, place, reach) == b:  # most that are linked are so
+    if descend(surface, a, target, place, reach) == b:  # finds most pairs, faster than a flood
         return True
     count = flood(surface, a, place, reach)
     return surface.stamp[b] == surface.counter[0] and _queued(surface, b, count)
@@ -115,7 +141,7 @@ def linked(surface: Surface, a: int, b: int, place: Vector, reach: float) -> boo
 
 @kernel
 def _queued(surface: Surface, sample: int, count: int) -> bool:
-    """Whether a sample is among those the last flood found (it stamps the samples just outside too)."""
+    """Whether a sample is among those the last flood listed; it also stamps the samples just outside."""
     found = False
     for i in range(count):
         found = found or surface.queue[i] == sample
@@ -133,10 +159,10 @@ def gather_points(
     least: float,
     buffer: np.ndarray,
 ) -> int:
-    """Points around a place, relative to it, with their weights, into the buffer of a fit; returns their number.
+    """Put the points around a place, relative to it, into the buffer of a fit with weights (1 - d^2 / R^2)^2; returns how many.
 
-    Taken are the points of the first `count` samples in surface.queue whose normal has a cosine over `least` to `facing`, of each at most
-    about `most`. They weigh (1 - d^2 / R^2)^2.
+    They are points of the first `count` samples in surface.queue, about `most` of each, where the cosine between the normal of the
+    sample and `facing` exceeds `least`.
     """
     taken = 0
     for i in range(count):
@@ -156,17 +182,17 @@ def gather_points(
 
 @kernel
 def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -> int:
-    """Fit the quadric of a patch (one row) to the points around a place, on the sheet of `sample`; returns the points used.
+    """Fit a patch (PATCH,) to the points around a place, on the sheet of `sample`; returns how many points it was fitted to.
 
-    Points weigh (1 - d^2 / R^2)^2; where some lie far off the first fit (plants, noise) they are weighed down and it is fitted again.
+    Points weigh (1 - d^2 / R^2)^2. Where they lie off the fit (plants, noise), it is fitted again with those far off weighing less.
     """
     sample = walk(surface, sample, place)
     facing = row(surface.normals, sample)
     local = surface.field[
         sample
-    ]  # a patch is as wide as the members there; the wider, the fewer points of a sample suffice
+    ]  # a patch grows with the members; the wider it is, the fewer points of a sample are enough
     radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
-    patch[15] = sample
+    patch[NEAREST_SAMPLE] = sample
     taken = 0
     while True:
         count = flood(surface, sample, place, radius + 0.5 * surface.step)
@@ -178,26 +204,27 @@ def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)
-    project(buffer, taken, radius, (patch[3], patch[4], patch[5]), (patch[6], patch[7], patch[8]))
-    matrix = np.empty((6, 7))
-    size = fit_heights(buffer, taken, radius, 6 if taken >= 10 else (3 if taken >= 4 else 1), patch, HEIGHTS, matrix)
+    project(buffer, taken, radius, vector_from(patch, NORMAL), vector_from(patch, TANGENT))
+    matrix, heights = np.empty((6, 7)), patch[HEIGHTS : HEIGHTS + TERMS_OF_QUADRIC]
+    size = TERMS_OF_QUADRIC if taken >= 10 else (TERMS_OF_PLANE if taken >= 4 else 1)
+    size = fit_heights(buffer, taken, radius, size, heights, matrix)
     mean = 0.0
     for i in range(taken):
-        mean += abs(buffer[i, AWAY])
+        mean += abs(buffer[i, RESIDUAL])
     mean = mean / max(taken, 1)
     if mean > 0.002 * surface.length * local and taken > 12:
         for i in range(taken):
-            r = buffer[i, AWAY] / (2.0 * mean)
+            r = buffer[i, RESIDUAL] / (2.0 * mean)
             buffer[i, WEIGHT] /= (1.0 + r * r) * (1.0 + r * r)
-        fit_heights(buffer, taken, radius, size, patch, HEIGHTS, matrix)
-    patch[0], patch[1], patch[2] = place
-    patch[16], patch[17] = 1.0, mean
+        fit_heights(buffer, taken, radius, size, heights, matrix)
+    put_vector(patch, CENTRE, place)
+    patch[IS_FITTED], patch[MEAN_DISTANCE] = 1.0, mean
     return taken
 
 
 @kernel
 def _points_at_most(surface: Surface, count: int, most: int) -> int:
-    """Points of the first `count` samples in surface.queue, of each about `most` at most."""
+    """Room for the points of the first `count` samples in surface.queue, at most `most` of each."""
     points = 0
     for i in range(count):
         s = surface.queue[i]
@@ -207,72 +234,48 @@ def _points_at_most(surface: Surface, count: int, most: int) -> int:
 
 @kernel
 def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray) -> None:
-    """Normal and tangent of the weighted least-squares plane, turned to face as the sample does."""
+    """Fit the plane of a patch by weighted least squares, its normal on the side of `facing`; `facing` itself where points are few."""
     normal = facing
-    patch[18] = 0.0
+    patch[ROUNDNESS] = 0.0
     if taken >= 4:
         xx, xy, xz, yy, yz, zz = second_moments(buffer, taken)
         normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
         trace = xx + yy + zz
         if trace > 0.0:
             minors = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz
-            patch[18] = 4.0 * minors / (trace * trace)
+            patch[ROUNDNESS] = 4.0 * minors / (trace * trace)
         side = dot(normal, facing)
         if side < 0.0:
             normal = (-normal[0], -normal[1], -normal[2])
         if abs(side) < 0.5:
             normal = facing
-    patch[3], patch[4], patch[5] = normal
-    patch[6], patch[7], patch[8] = across(normal)
-
-
-@kernel
-def height(patch: np.ndarray, a: float, b: float) -> float:
-    """Height of a patch over its plane at (a, b) [scan unit]."""
-    return patch[9] + a * (patch[10] + a * patch[12] + b * patch[13]) + b * (patch[11] + b * patch[14])
+    put_vector(patch, NORMAL, normal)
+    put_vector(patch, TANGENT, across(normal))
 
 
 @kernel
 def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
     """Foot of a place on a patch, nearly at right angles to it."""
-    centre = (patch[0], patch[1], patch[2])
-    normal = (patch[3], patch[4], patch[5])
-    u = (patch[6], patch[7], patch[8])
-    v = cross(normal, u)
+    centre, normal, u = vector_from(patch, CENTRE), vector_from(patch, NORMAL), vector_from(patch, TANGENT)
+    heights, v = coefficients_from(patch, HEIGHTS), cross(normal, u)
     d = subtract(place, centre)
     x, y, h = dot(d, u), dot(d, v), dot(d, normal)
     a, b = x, y
-    for _ in range(2):  # of the foot on the tangent plane
-        slope_a = patch[10] + 2.0 * a * patch[12] + b * patch[13]
-        slope_b = patch[11] + 2.0 * b * patch[14] + a * patch[13]
-        over = h - height(patch, a, b) - slope_a * (x - a) - slope_b * (y - b)
+    for _ in range(2):  # each time to the foot on the tangent plane at (a, b)
+        slope_a, slope_b = slopes_at(heights, a, b)
+        over = h - height_at(heights, a, b) - slope_a * (x - a) - slope_b * (y - b)
         t = over / (1.0 + slope_a * slope_a + slope_b * slope_b)
         a, b = x + t * slope_a, y + t * slope_b
-    return along(along(along(centre, a, u), b, v), height(patch, a, b), normal)
+    return along(along(along(centre, a, u), b, v), height_at(heights, a, b), normal)
 
 
 @kernel
 def patch_normal(patch: np.ndarray, place: Vector) -> Vector:
     """Unit normal of a patch over a place."""
-    normal = (patch[3], patch[4], patch[5])
-    u = (patch[6], patch[7], patch[8])
+    normal, u = vector_from(patch, NORMAL), vector_from(patch, TANGENT)
     v = cross(normal, u)
-    d = subtract(place, (patch[0], patch[1], patch[2]))
-    a, b = dot(d, u), dot(d, v)
-    slope_a = patch[10] + 2.0 * a * patch[12] + b * patch[13]
-    slope_b = patch[11] + 2.0 * b * patch[14] + a * patch[13]
+    d = subtract(place, vector_from(patch, CENTRE))
+    slope_a, slope_b = slopes_at(coefficients_from(patch, HEIGHTS), dot(d, u), dot(d, v))
     n = along(along(normal, -slope_a, u), -slope_b, v)
     length = norm(n)
     return n[0] / length, n[1] / length, n[2] / length
-
-
-@kernel
-def onto_surface(surface: Surface, patches: np.ndarray, node: int, x: float, y: float, z: float) -> Vector:
-    """Foot of a place on the scanned surface by the patch of a node; fitted anew when the place has left the middle of it."""
-    patch = patches[node]
-    place = (x, y, z)
-    d = subtract(place, (patch[0], patch[1], patch[2]))
-    reach = 0.25 * surface.length
-    if patch[16] == 0.0 or dot(d, d) > reach * reach:
-        fit_patch(surface, patch, int(patch[15]), place)
-    return onto_patch(patch, place)

@@ -1,4 +1,4 @@
-"""Normals of the samples: planes through their neighbours, all turned to one side of the sheet."""
+"""Normals of the samples: those of planes through their neighbours, all oriented to one side of the sheet."""
 
 from __future__ import annotations
 
@@ -39,10 +39,7 @@ def _plane_at(mean: np.ndarray, neighbors: np.ndarray, s: int) -> tuple[Vector, 
 def sample_normals(
     mean: np.ndarray, neighbors: np.ndarray, normals: np.ndarray, thickness: np.ndarray, begin: int, end: int
 ) -> None:
-    """Normal of the least-squares plane of each sample from `begin` to `end` - 1 and its neighbours, and their rms distance from it.
-
-    The sign is not settled yet.
-    """
+    """Fit planes to each sample from `begin` to `end` - 1 and its neighbours: normals (S, 3), not yet oriented, and rms distances (S,)."""
     for s in range(begin, end):
         v, thickness[s] = _plane_at(mean, neighbors, s)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
@@ -52,9 +49,9 @@ def sample_normals(
 def trust_thin_samples(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, steep: float
 ) -> None:
-    """Drop the links of a thick sample to thin ones over whose plane it stands, and fit its normal anew.
+    """Drop the links from a thick sample to thin ones that it stands above, and fit its normal again.
 
-    At the boundary of a sheet the nearest samples may be those of the next sheet; they tilt the plane of the one, not of the other.
+    At the boundary of a sheet, the nearest samples may lie on the next sheet: they tilt the plane there, but not their own.
     """
     for s in range(len(mean)):
         if thickness[s] <= rough:
@@ -79,7 +76,7 @@ def trust_thin_samples(
 def cut_steep_links(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
 ) -> None:
-    """Drop neighbours that stand over a sample from `begin` to `end` - 1 rather than beside it: they lie on another sheet."""
+    """Drop neighbours that lie above or below a sample from `begin` to `end` - 1, not beside it: they are on another sheet."""
     for s in range(begin, end):
         held = 0
         for k in range(neighbors.shape[1]):
@@ -96,9 +93,9 @@ def cut_steep_links(
 
 @kernel
 def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
-    """Cosine between the normal of sample n and that of sample s mirrored at the plane half-way; of either sign.
+    """Absolute cosine between the normal of sample n and that of sample s mirrored in the plane half-way between them.
 
-    It follows a sharply bent surface where plain comparison fails (Koenig and Gumhold 2009).
+    It follows a sharply bent surface where a plain comparison fails (Koenig and Gumhold 2009).
     """
     e = unit(subtract(row(mean, n), row(mean, s)))
     a, b = row(normals, s), row(normals, n)
@@ -109,9 +106,9 @@ def _mirrored(mean: np.ndarray, normals: np.ndarray, s: int, n: int) -> float:
 def mark_uneven(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, least: float, uneven: np.ndarray, begin: int, end: int
 ) -> None:
-    """Mark the samples from `begin` to `end` - 1, (S,) bool, with a link along which the scan is no arc.
+    """Mark the samples from `begin` to `end` - 1, uneven (S,) bool, with a link along which the scan is not an arc.
 
-    There the normals, one mirrored to the other, have a cosine below `least`.
+    Along it the normals, one mirrored to the other, have a cosine below `least`.
     """
     for s in range(begin, end):
         uneven[s] = False
@@ -128,9 +125,9 @@ def mark_uneven(
 def link_weights(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, weights: np.ndarray, begin: int, end: int
 ) -> None:
-    """How much the normals of neighbours disagree when one is mirrored to the other: 254 sqrt(1 - |cosine|), (S, K) uint8; 255 = no link.
+    """Fill in how much the normals of neighbours disagree after mirroring: 254 sqrt(1 - |cosine|), (S, K) uint8; 255 for no link.
 
-    Steps of a third of a degree: links that are as certain are taken in their order, which lie together, not all over the scan.
+    In steps of a third of a degree: equally certain links are then taken in their order, so that memory is read in order too.
     """
     for s in range(begin, end):
         for k in range(neighbors.shape[1]):
@@ -142,7 +139,7 @@ def link_weights(
 
 @kernel
 def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
-    """Root of a sample in the union, and its sign against that root; shortens the path."""
+    """Root of a sample in the union-find tree, and its sign relative to that root; shortens the path."""
     total = 1
     while piece[s] != s:
         parent = piece[s]
@@ -158,9 +155,9 @@ def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
 def orient_normals(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, order: np.ndarray, piece: np.ndarray
 ) -> None:
-    """Turn all normals of a connected piece to the same side, along the spanning tree of the most certain links.
+    """Orient the normals of each connected piece to one side, along the spanning tree of the most certain links.
 
-    order : links as s * K + k, most certain first. piece : (S,) filled with the smallest sample of each connected piece.
+    order : links as s * K + k, most certain first. piece : (S,) int64, filled with the lowest sample of each connected piece.
     """
     k_most = neighbors.shape[1]
     sign, joined = np.ones(len(mean), np.int64), 1
@@ -185,7 +182,7 @@ def orient_normals(
         else:
             piece[root_n] = root_s
             sign[root_n] = sign_s * sign_n * agree
-    for s in range(len(mean)):  # parents have smaller numbers, so they are settled first
+    for s in range(len(mean)):  # parents have lower numbers, so they are done first
         if piece[s] != s:
             sign[s] *= sign[piece[s]]
             piece[s] = piece[piece[s]]
@@ -197,7 +194,7 @@ def orient_normals(
 def smooth_normals(
     normals: np.ndarray, neighbors: np.ndarray, facing: float, smoothed: np.ndarray, begin: int, end: int
 ) -> None:
-    """Mean normal of each sample from `begin` to `end` - 1 and of those neighbours with normals of a cosine over `facing` to it."""
+    """Average the normal of each sample from `begin` to `end` - 1 with those of neighbours whose cosine to it exceeds `facing`."""
     for s in range(begin, end):
         a = row(normals, s)
         x, y, z = 2.0 * a[0], 2.0 * a[1], 2.0 * a[2]
@@ -214,7 +211,7 @@ def smooth_normals(
 def head_on_links(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, smooth: float
 ) -> int:
-    """Number of links between samples thinner than `smooth` that lie side by side and yet face opposite sides."""
+    """Count the links between samples thinner than `smooth` that lie side by side but face opposite ways."""
     count = 0
     for s in range(len(mean)):
         for k in range(neighbors.shape[1]):

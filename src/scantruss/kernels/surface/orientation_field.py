@@ -1,8 +1,8 @@
-"""Rows of the front: a smooth 6-fold direction field of the surface, and the triangular lattice that follows it.
+"""Orientation field and position field: smooth directions with 6-fold symmetry, and a triangular lattice along them.
 
-Both live on samples, places of the scan a part of a member apart, and are smoothed from coarse samples to fine ones: every sample turns its
-direction to the mean of its neighbours' (each up to sixths of a turn), then moves its lattice to the mean of theirs (each up to steps
-of the lattice). After Jakob, Tarini, Panozzo, Sorkine-Hornung: Instant Field-Aligned Meshes (2015), 6-fold, extrinsic.
+Both are stored at samples and smoothed from coarse levels to fine ones: each sample turns its direction to the mean of its
+neighbours' (up to sixths of a turn), then moves its lattice to the mean of theirs (up to steps of the lattice). After Jakob, Tarini,
+Panozzo, Sorkine-Hornung: Instant Field-Aligned Meshes (2015), 6-fold, extrinsic.
 """
 
 from __future__ import annotations
@@ -15,51 +15,49 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
-HALF_ROOT = 0.5 * math.sqrt(3.0)
+SINE_OF_60 = 0.5 * math.sqrt(3.0)
 
 
 class Level(NamedTuple):
-    """Samples of one level and the lattice at each."""
+    """The samples of one level of the hierarchy, and the direction and lattice at each."""
 
     mean: np.ndarray  #: (P, 3)
     normals: np.ndarray  #: (P, 3)
-    neighbors: np.ndarray  #: (P, K) int64 samples beside, -1 at the end
-    direction: np.ndarray  #: (P, 3) unit, of one of the six rows
-    node: np.ndarray  #: (P, 3) the node of the lattice that is nearest to the sample
+    neighbors: np.ndarray  #: (P, K) int64 linked samples, -1 at the end
+    direction: np.ndarray  #: (P, 3) unit vector along one of the six directions of the lattice
+    node: np.ndarray  #: (P, 3) the lattice node nearest to the sample
     mark: np.ndarray  #: (P,) int64 scratch
 
 
 @kernel
-def choose_level(
-    mean: np.ndarray, neighbors: np.ndarray, radius: float, owner: np.ndarray, chosen: np.ndarray, queue: np.ndarray
-) -> int:
-    """Choose samples so that every place has one within `radius` over the links; returns their number.
+def choose_level(mean: np.ndarray, neighbors: np.ndarray, radius: float, owner: np.ndarray, chosen: np.ndarray) -> int:
+    """Choose the samples of a coarser level so that each finer one has one of them within `radius` over the links; returns how many.
 
-    owner : (S,) int64, -1 at the start, filled with the sample of each place
-    chosen : (S,) int64, filled with the place of each sample
-    queue : (2, S) int64 scratch, -1 at the start
+    owner : (S,) int64, -1 at the start, filled with the coarser sample of each finer one
+    chosen : (S,) int64, filled with the finer sample at which each coarser one lies
     """
+    queue, seen_from = np.empty(len(mean), np.int64), np.full(len(mean), -1, np.int64)
     count = 0
     for s in range(len(mean)):
         if owner[s] >= 0:
             continue
         chosen[count] = s
         owner[s] = count
-        queue[0, 0] = s
-        queue[1, s] = s
+        queue[0] = s
+        seen_from[s] = s
         last, at = 1, 0
         while at < last:
-            here = queue[0, at]
+            here = queue[at]
             at += 1
             for k in range(neighbors.shape[1]):
                 n = neighbors[here, k]
                 if n < 0:
                     break
-                if queue[1, n] != s:
-                    queue[1, n] = s
+                if seen_from[n] != s:
+                    seen_from[n] = s
                     d = subtract(row(mean, n), row(mean, s))
                     if dot(d, d) < radius * radius:
-                        queue[0, last] = n
+                        queue[last] = n
                         last += 1
                         if owner[n] < 0:
                             owner[n] = count
@@ -69,7 +67,7 @@ def choose_level(
 
 @kernel
 def link_level(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, level: Level) -> None:
-    """Fill in means, normals and links of samples, all zero at the start: samples are linked whose places are."""
+    """Fill in the means, normals and links of a level, all empty at the start: samples are linked if any of their finer ones are."""
     for s in range(len(mean)):
         p = owner[s]
         level.mark[p] += 1
@@ -97,7 +95,7 @@ def link_level(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, own
 
 @kernel
 def links_away(neighbors: np.ndarray, start: int, away: np.ndarray, queue: np.ndarray) -> int:
-    """Fill in how many links each place is away from one (P,), -1 where none lead there; returns the last one reached.
+    """Fill in how many links away from `start` each sample is (P,), -1 where none lead there; returns the last one reached.
 
     queue : (P,) int64 scratch
     """
@@ -123,15 +121,15 @@ def sixth(direction: Vector, normal: Vector) -> Vector:
     """A direction turned by 60 degrees about a normal."""
     a = cross(normal, direction)
     return (
-        0.5 * direction[0] + HALF_ROOT * a[0],
-        0.5 * direction[1] + HALF_ROOT * a[1],
-        0.5 * direction[2] + HALF_ROOT * a[2],
+        0.5 * direction[0] + SINE_OF_60 * a[0],
+        0.5 * direction[1] + SINE_OF_60 * a[1],
+        0.5 * direction[2] + SINE_OF_60 * a[2],
     )
 
 
 @kernel
 def flat(direction: Vector, normal: Vector) -> Vector:
-    """The unit part of a direction at right angles to a normal."""
+    """A direction projected onto the plane at right angles to a normal, as a unit vector."""
     d = along(direction, -dot(direction, normal), normal)
     size = norm(d)
     if size < 1e-9:
@@ -141,7 +139,7 @@ def flat(direction: Vector, normal: Vector) -> Vector:
 
 @kernel
 def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
-    """Of the six directions of a sample that which is nearest to another direction."""
+    """The one of the six directions of a sample that is nearest to another direction."""
     turned = sixth(direction, normal)
     third = subtract(turned, direction)
     best = direction
@@ -159,7 +157,7 @@ def nearest_turn(direction: Vector, other: Vector, normal: Vector) -> Vector:
 
 @kernel
 def smooth_directions(level: Level, some: np.ndarray) -> None:
-    """Turn the direction of some samples (K,) to the mean of those beside."""
+    """Turn the directions of some samples (K,) to the mean of those of their neighbours."""
     for i in range(len(some)):
         p = some[i]
         normal = row(level.normals, p)
@@ -170,7 +168,7 @@ def smooth_directions(level: Level, some: np.ndarray) -> None:
             if q < 0:
                 break
             other = row(level.normals, q)
-            # the pair of turns that agree best
+            # the two turns, one of each sample, that agree best
             b = row(level.direction, q)
             a = nearest_turn(total, b, normal)
             most, left, right = dot(a, b), a, b
@@ -189,7 +187,7 @@ def smooth_directions(level: Level, some: np.ndarray) -> None:
 
 @kernel
 def lower_corner(node: Vector, u: Vector, v: Vector, place: Vector, length: float) -> Vector:
-    """The node of a lattice of steps u, v at the lower corner of the cell below a place."""
+    """The lower corner of the cell in which a place lies, of the lattice through a node with steps along u and v."""
     d = subtract(place, node)
     du, dv = dot(d, u), dot(d, v)
     i = math.floor((4.0 * du - 2.0 * dv) / (3.0 * length))
@@ -199,7 +197,7 @@ def lower_corner(node: Vector, u: Vector, v: Vector, place: Vector, length: floa
 
 @kernel
 def nearest_node(node: Vector, direction: Vector, normal: Vector, place: Vector, length: float) -> Vector:
-    """The node nearest to a place of the lattice that has a given node and direction."""
+    """The node nearest to a place, of the lattice through a node with a direction."""
     u = direction
     v = sixth(u, normal)
     low = lower_corner(node, u, v, place, length)
@@ -214,7 +212,7 @@ def nearest_node(node: Vector, direction: Vector, normal: Vector, place: Vector,
 
 @kernel
 def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
-    """A place between two samples, on the line where their planes meet (half way where they are parallel)."""
+    """A point between two samples, on the line where their planes meet (half way where they are parallel)."""
     np_, nq, mp, mq, nm = dot(n, p), dot(n, q), dot(m, p), dot(m, q), dot(n, m)
     share = 1.0 / (1.0 - nm * nm + 1e-4)
     s = 2.0 * (nq - np_ - nm * (mp - mq)) * share
@@ -228,7 +226,7 @@ def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
 
 @kernel
 def agree(level: Level, p: int, q: int, node: Vector, length: float) -> tuple[Vector, Vector]:
-    """The nodes of the lattices of two samples that lie nearest to each other between them; node is of the lattice of p."""
+    """Between two samples, the two nodes of their lattices that lie nearest to each other; `node` is one of the lattice of p."""
     n, m = row(level.normals, p), row(level.normals, q)
     middle = between(row(level.mean, p), n, row(level.mean, q), m)
     u, x = row(level.direction, p), row(level.direction, q)
@@ -248,7 +246,7 @@ def agree(level: Level, p: int, q: int, node: Vector, length: float) -> tuple[Ve
 
 @kernel
 def smooth_lattice(level: Level, length: float, some: np.ndarray) -> None:
-    """Move the lattice of some samples (K,) to the mean of those beside."""
+    """Move the lattices of some samples (K,) to the mean of those of their neighbours."""
     for i in range(len(some)):
         p = some[i]
         mean, normal = row(level.mean, p), row(level.normals, p)
@@ -274,7 +272,7 @@ def smooth_lattice(level: Level, length: float, some: np.ndarray) -> None:
 
 @kernel
 def lay_first(level: Level, first: int, direction: Vector, node: Vector, length: float, queue: np.ndarray) -> None:
-    """Lay a direction and a lattice at one sample and carry them on from sample to sample, over all that are linked to it.
+    """Set the direction and the lattice of one sample and carry them from sample to sample over the links.
 
     queue : (P,) int64 scratch
     """
@@ -313,7 +311,7 @@ def lay_first(level: Level, first: int, direction: Vector, node: Vector, length:
 
 @kernel
 def put_lattice(level: Level, p: int, direction: Vector, node: Vector, length: float) -> None:
-    """Give a sample a direction and a lattice that has a node at (or straight above) a place."""
+    """Give a sample a direction and a lattice with a node at a place, or straight above it."""
     mean, normal = row(level.mean, p), row(level.normals, p)
     direction = flat(direction, normal)
     node = along(node, -dot(subtract(node, mean), normal), normal)
@@ -325,49 +323,48 @@ def put_lattice(level: Level, p: int, direction: Vector, node: Vector, length: f
 
 @kernel
 def hand_down(coarse: Level, owner: np.ndarray, fine: Level, length: float) -> None:
-    """Give the samples of a finer level the directions and the lattice of their samples of the coarser level."""
+    """Give the samples of a finer level the directions and lattices of their coarser ones."""
     for p in range(len(fine.mean)):
         q = owner[p]
         put_lattice(fine, p, row(coarse.direction, q), row(coarse.node, q), length)
 
 
 @kernel
-def list_nodes(
-    level: Level, order: np.ndarray, length: float, apart: float, chosen: np.ndarray, scratch: np.ndarray
-) -> int:
-    """Choose samples whose nodes become nodes of the front, none nearer than `apart` to another on the sheet; returns their number.
+def list_nodes(level: Level, order: np.ndarray, length: float, apart: float, chosen: np.ndarray) -> int:
+    """Choose samples whose nodes become candidate nodes, none nearer than `apart` to another on the sheet; returns how many.
 
-    order : (P,) int64 the order in which samples are asked
+    order : (K,) int64 the samples in the order in which they are considered
     chosen : (P,) int64, filled
-    scratch : (3, P) int64: whether chosen (0 at the start); mark (-1 at the start); queue
     """
+    is_chosen, seen_from = np.zeros(len(chosen), np.bool_), np.full(len(chosen), -1, np.int64)
+    queue = np.empty(len(chosen), np.int64)
     count = 0
     reach = 1.2 * length + apart
     for o in range(len(order)):
         p = order[o]
         place = row(level.node, p)
-        scratch[2, 0] = p
-        scratch[1, p] = p
+        queue[0] = p
+        seen_from[p] = p
         last, at = 1, 0
         free = True
         while at < last and free:
-            here = scratch[2, at]
+            here = queue[at]
             at += 1
-            if scratch[0, here] == 1:
+            if is_chosen[here]:
                 d = subtract(row(level.node, here), place)
                 free = dot(d, d) >= apart * apart
             for k in range(level.neighbors.shape[1]):
                 q = level.neighbors[here, k]
                 if q < 0:
                     break
-                if scratch[1, q] != p:
-                    scratch[1, q] = p
+                if seen_from[q] != p:
+                    seen_from[q] = p
                     d = subtract(row(level.mean, q), place)
                     if dot(d, d) < reach * reach:
-                        scratch[2, last] = q
+                        queue[last] = q
                         last += 1
         if free:
-            scratch[0, p] = 1
+            is_chosen[p] = True
             chosen[count] = p
             count += 1
     return count

@@ -1,143 +1,178 @@
-"""The local surface at a single place of a scan: a quadric through the points around it, fitted in the presence of some that are not of it.
-
-A patch is a row of numbers, relative to the place it was fitted at:
-
-    0:3 unit normal   3:6 tangent u (v = normal x u)   6:12 height as coefficients of 1 a b aa ab bb   12 rms distance of the points
-    13 variance of the height at the place itself, in units of that of a point   14 points   15 radius
-"""
+"""Patches: the surface at a place of a scan as a quadric fitted to the points around it, robust against points of something else."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import KDTree, within
-from ..geometry.quadric import fit_heights, normal_equations, project, second_moments, solve
+from ..geometry.quadric import (
+    PLANE_A,
+    PLANE_B,
+    RESIDUAL,
+    SQUARE,
+    TERMS_OF_PLANE,
+    TERMS_OF_QUADRIC,
+    WEIGHT,
+    coefficients_from,
+    fit_heights,
+    height_at,
+    normal_equations,
+    project,
+    second_moments,
+    slopes_at,
+    solve,
+)
 from ..geometry.vectors import Vector, across, along, cross, dot, row, smallest_eigenvector, subtract, unit
 
-PATCH = 16  # columns of a patch
-HEIGHTS = 6  # first of its coefficients
-FULL, FLAT = 10, 5  # points that a quadric needs, and a plane
+POINTS_FOR_QUADRIC, POINTS_FOR_PLANE = 10, 5  # fewest points that either is fitted to
+
+
+class Patches(NamedTuple):
+    """Quadrics over planes through the places they were fitted at; v = normal x tangent."""
+
+    normal: np.ndarray  #: (C, 3) unit normal of the plane, of either sign
+    tangent: np.ndarray  #: (C, 3) unit vector u in the plane
+    heights: np.ndarray  #: (C, 6) height over the plane as coefficients of 1 a b a^2 ab b^2 [scan unit]
+    rms: np.ndarray  #: (C,) rms distance of the points from the patch, inf where there are none [scan unit]
+    points: np.ndarray  #: (C,) int64 points it was fitted to
+    radius: np.ndarray  #: (C,) radius within which they lie [scan unit]
+
+
+@kernel
+def empty_patches(count: int) -> Patches:
+    """Room for some patches."""
+    return Patches(
+        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)), np.zeros(count), np.zeros(count, np.int64),
+        np.zeros(count),
+    )  # fmt: skip
 
 
 @kernel
 def gather(
     tree: KDTree, place: Vector, radius: float, leave: int, stack: np.ndarray, found: np.ndarray, buffer: np.ndarray
 ) -> int:
-    """Points within a radius of a place but one, `leave`, into the buffer; returns their number, at most len(found)."""
+    """Put the points within a radius of a place into the buffer of a fit, except the one `leave`; returns how many.
+
+    At most len(found) of them are found.
+    """
     count = within(tree, place[0], place[1], place[2], radius, stack, found)
     taken = 0
     for i in range(count):
         if found[i] != leave:
             d = subtract(row(tree.points, found[i]), place)
             buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-            buffer[taken, 3] = dot(d, d)
+            buffer[taken, SQUARE] = dot(d, d)
             taken += 1
     return taken
 
 
 @kernel
-def fit(buffer: np.ndarray, taken: int, radius: float, rounds: int, patch: np.ndarray, matrix: np.ndarray) -> None:
-    """Fit a patch to the points in the buffer that lie within a radius; patch[13] stays as it is. matrix (7, 8) is scratch.
+def terms_for(points: int) -> int:
+    """How many coefficients so many points determine: those of a quadric, of a plane, or one height."""
+    if points >= POINTS_FOR_QUADRIC:
+        return TERMS_OF_QUADRIC
+    return TERMS_OF_PLANE if points >= POINTS_FOR_PLANE else 1
 
-    Points weigh (1 - d^2 / R^2)^2, and after the first of the rounds less the farther they lie off the one before.
+
+@kernel
+def fit(
+    buffer: np.ndarray, taken: int, radius: float, rounds: int, patches: Patches, i: int, matrix: np.ndarray
+) -> None:
+    """Fit patch i to the points of the buffer that lie within a radius. matrix (6, 7) is scratch.
+
+    A point at distance d weighs (1 - d^2 / R^2)^2 in the first round; in later rounds less, the farther it lies off the last fit.
     """
     inside = 0
-    for i in range(taken):
-        w = max(1.0 - buffer[i, 3] / (radius * radius), 0.0)
-        buffer[i, 4] = w * w
+    for p in range(taken):
+        w = max(1.0 - buffer[p, SQUARE] / (radius * radius), 0.0)
+        buffer[p, WEIGHT] = w * w
         inside += w > 0.0
-    patch[14], patch[15] = inside, radius
-    size = 6 if inside >= FULL else (3 if inside >= FLAT else 1)
+    patches.points[i], patches.radius[i] = inside, radius
+    size = terms_for(inside)
     for turn in range(rounds):
         if turn < 2:
-            _plane(buffer, taken, radius, patch)
-        size = fit_heights(buffer, taken, radius, size, patch, HEIGHTS, matrix)
+            _fit_plane(buffer, taken, radius, patches, i)
+        size = fit_heights(buffer, taken, radius, size, patches.heights[i], matrix)
         if turn < rounds - 1:
             _weigh_again(buffer, taken, radius)
-    _spread(buffer, taken, size, patch)
+    patches.rms[i] = _rms(buffer, taken, size)
 
 
 @kernel
 def _weigh_again(buffer: np.ndarray, taken: int, radius: float) -> None:
-    """Weigh down what lies off the patch, in mean distances of all points from it."""
+    """Weigh points less, the more mean residuals they lie off the patch."""
     total = mean = 0.0
     for i in range(taken):
-        w = max(1.0 - buffer[i, 3] / (radius * radius), 0.0)
-        total, mean = total + w * w, mean + w * w * abs(buffer[i, 5])
+        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
+        total, mean = total + w * w, mean + w * w * abs(buffer[i, RESIDUAL])
     if mean <= 1e-12 * radius * total:
         return
     for i in range(taken):
-        w = max(1.0 - buffer[i, 3] / (radius * radius), 0.0)
-        r = buffer[i, 5] * total / (2.0 * mean)
+        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
+        r = buffer[i, RESIDUAL] * total / (2.0 * mean)
         r = w / (1.0 + r * r)
-        buffer[i, 4] = r * r
+        buffer[i, WEIGHT] = r * r
 
 
 @kernel
-def _plane(buffer: np.ndarray, taken: int, radius: float, patch: np.ndarray) -> None:
-    """Normal and tangent of the plane of least squares, and where the points lie over it."""
+def _fit_plane(buffer: np.ndarray, taken: int, radius: float, patches: Patches, i: int) -> None:
+    """Fit the plane of patch i by least squares, and project the points onto it."""
     normal = smallest_eigenvector(*second_moments(buffer, taken))
     u = across(normal)
-    patch[0], patch[1], patch[2] = normal
-    patch[3], patch[4], patch[5] = u
+    patches.normal[i, 0], patches.normal[i, 1], patches.normal[i, 2] = normal
+    patches.tangent[i, 0], patches.tangent[i, 1], patches.tangent[i, 2] = u
     project(buffer, taken, radius, normal, u)
 
 
 @kernel
-def _spread(buffer: np.ndarray, taken: int, size: int, patch: np.ndarray) -> None:
-    """Rms distance of the points from the patch, for as many as there are over what the patch has used up."""
+def _rms(buffer: np.ndarray, taken: int, size: int) -> float:
+    """Rms distance of the points from a patch, corrected for the `size` coefficients fitted to them; inf without points."""
     total = squares = weights = 0.0
     for i in range(taken):
-        w = buffer[i, 4]
-        total, weights, squares = total + w, weights + w * w, squares + w * buffer[i, 5] * buffer[i, 5]
-    patch[12] = np.inf
-    if total > 0.0:
-        many = total * total / weights
-        patch[12] = math.sqrt(squares / total * many / max(many - size, 0.25 * many))
+        w = buffer[i, WEIGHT]
+        total, weights = total + w, weights + w * w
+        squares = squares + w * buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
+    if total <= 0.0:
+        return math.inf
+    many = total * total / weights
+    return math.sqrt(squares / total * many / max(many - size, 0.25 * many))
 
 
 @kernel
-def doubt(buffer: np.ndarray, taken: int, size: int, patch: np.ndarray, matrix: np.ndarray) -> None:
-    """Measure how well the points of the last fit tell the height at the place: patch[13], large where they lie to one side."""
-    patch[13] = np.inf
+def height_variance(buffer: np.ndarray, taken: int, size: int, matrix: np.ndarray) -> float:
+    """Variance of the height of the last fit at its place, in variances of a point: large where the points lie to one side."""
     normal_equations(buffer, taken, matrix)
     for r in range(size):
         matrix[r, size] = 1.0 if r == 0 else 0.0
         matrix[r, r] += 1e-9 * matrix[0, 0]
     if not solve(matrix, size):
-        return
+        return math.inf
     variance = 0.0
     for i in range(taken):
-        a, b = buffer[i, 6], buffer[i, 7]
+        a, b = buffer[i, PLANE_A], buffer[i, PLANE_B]
         share = matrix[0, size]
-        if size > 1:
+        if size >= TERMS_OF_PLANE:
             share += a * matrix[1, size] + b * matrix[2, size]
-        if size > 3:
+        if size >= TERMS_OF_QUADRIC:
             share += a * a * matrix[3, size] + a * b * matrix[4, size] + b * b * matrix[5, size]
-        variance += (buffer[i, 4] * share) ** 2
-    patch[13] = variance
+        variance += (buffer[i, WEIGHT] * share) ** 2
+    return variance
 
 
 @kernel
-def height(patch: np.ndarray, a: float, b: float) -> float:
-    """Height of a patch over its plane at (a, b) [scan unit]."""
-    return patch[6] + a * (patch[7] + a * patch[9] + b * patch[10]) + b * (patch[8] + b * patch[11])
-
-
-@kernel
-def foot(patch: np.ndarray, place: Vector) -> tuple[Vector, Vector]:
-    """Foot of a place on a patch, nearly at right angles to it, and the normal there; both places relative to that of the patch."""
-    normal, u = (patch[0], patch[1], patch[2]), (patch[3], patch[4], patch[5])
+def foot(patches: Patches, i: int, place: Vector) -> tuple[Vector, Vector]:
+    """Foot of a place on patch i, nearly at right angles to it, and the normal there; both places relative to that of the patch."""
+    normal, u, heights = row(patches.normal, i), row(patches.tangent, i), coefficients_from(patches.heights[i], 0)
     v = cross(normal, u)
     a, b, h = dot(place, u), dot(place, v), dot(place, normal)
     slope_a = slope_b = 0.0
     for _ in range(3):
-        slope_a = patch[7] + 2.0 * a * patch[9] + b * patch[10]
-        slope_b = patch[8] + 2.0 * b * patch[11] + a * patch[10]
-        t = (h - height(patch, a, b)) / (1.0 + slope_a * slope_a + slope_b * slope_b)
+        slope_a, slope_b = slopes_at(heights, a, b)
+        t = (h - height_at(heights, a, b)) / (1.0 + slope_a * slope_a + slope_b * slope_b)
         a, b, h = a + t * slope_a, b + t * slope_b, h - t
     at = along(along((normal[0] * h, normal[1] * h, normal[2] * h), a, u), b, v)
     return at, unit(along(along(normal, -slope_a, u), -slope_b, v))

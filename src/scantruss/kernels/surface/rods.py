@@ -18,9 +18,9 @@ def spreads_around(
     middle: np.ndarray,
     counts: np.ndarray,
 ) -> None:
-    """Mean products of the coordinates of the living samples within reach of each about their mean, (S, 3, 3).
+    """Fill in the covariance, moments (S, 3, 3), of the samples marked `alive` within reach of each sample.
 
-    middle, counts : (S, 3) and (S,), filled with their mean and their number. A sample itself counts if it lives.
+    middle, counts : (S, 3) and (S,), filled with their mean and their number. A sample counts itself if it is alive.
     """
     for s in range(len(mean)):
         x, y, z = mean[s, 0], mean[s, 1], mean[s, 2]

@@ -1,8 +1,8 @@
-"""Samples: the scan at the scale of a member.
+"""Surface samples (surfels): the scan at the scale of a member.
 
-A sample stands for the points around it: greedy disc thinning in the order of the points, so that the result does not depend on how
-the boxes lie; then each point belongs to the sample nearest to it. Samples know their neighbours on the same sheet of the surface, which
-makes every later look-up safe against a second sheet nearby.
+A sample stands for the points around it. Samples are chosen by greedy disc thinning in the order of the points, so that the result does
+not depend on the search boxes; then each point goes to its nearest sample. Samples are linked to their neighbours on the same sheet, so
+that no later search strays to another sheet close by.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
 from ..geometry.vectors import dot, row, smallest_eigenvector, subtract
 
-TIE_TOLERANCE = 1e-6  # squared distances that differ by less are the same, as a share
+TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances count as equal
 
 
 @kernel
 def _sample_within(
     boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
 ) -> int:
-    """A sample of a search box nearer to x, y, z than the root of `square`; -1 where there is none."""
+    """A sample of a search box whose squared distance from x, y, z is below `square`; -1 if there is none."""
     item = boxes.first[slot_of(boxes, i, j, k)]
     while item >= 0:
         dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
@@ -41,25 +41,25 @@ def choose_samples(
     begin: int,
     count: int,
 ) -> tuple[int, int]:
-    """Choose samples from points[begin:] so that every point has one within `radius`; samples keep that distance.
+    """Choose samples from points[begin:] so that every point has one within `radius` and no two are nearer to each other.
 
     Parameters
     ----------
     points : (N, 3) array
     boxes : SearchBoxes of the samples, about as large as `radius`
     owner : (N,) int64, filled with a sample within the radius of each point
-    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each sample and where it is
-    begin, count : where to go on, and the samples so far
+    chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each sample and its position
+    begin, count : the point to go on from, and the number of samples so far
 
     Returns
     -------
-    begin, count : begin < N where the table of boxes is half full or `chosen` is full
+    begin, count : begin < N if the table of boxes is half full or `chosen` is full
     """
     square = radius * radius
     for p in range(begin, len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         a, b, c = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
-        home = _sample_within(boxes, places, a, b, c, x, y, z, square)  # most have one in their own box
+        home = _sample_within(boxes, places, a, b, c, x, y, z, square)  # most points find one in their own box
         if home < 0:
             i0, i1 = box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius)
             j0, j1 = box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius)
@@ -85,10 +85,10 @@ def choose_samples(
 def settle_points(
     points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, begin: int, end: int
 ) -> None:
-    """Give each point from `begin` to `end` - 1 to the nearest sample: from its own (N,) on over the links, as long as one is nearer.
+    """Give each point from `begin` to `end` - 1 to its nearest sample, by going from its owner (N,) over the links to nearer ones.
 
-    Of samples as near but for rounding, as regular points have many, the first. Then neither the sample that a point had at first makes a
-    difference, nor where the scan lies.
+    Of samples equally near but for rounding, of which regular points have many, the first is taken: the result depends neither on the
+    owner at the start nor on the position of the scan.
     """
     for p in range(begin, end):
         place, sample = row(points, p), owner[p]
@@ -116,7 +116,7 @@ def settle_points(
 def group_points(
     points: np.ndarray, owner: np.ndarray, start: np.ndarray, grouped: np.ndarray, mean: np.ndarray
 ) -> None:
-    """Sort the points by sample (counting sort); start (S + 1,) must be zero, mean (S, 3) gets the mean of each sample's points."""
+    """Sort the points by sample (counting sort), and fill mean (S, 3) with the mean of each sample's points; start (S + 1,) is zero."""
     samples = len(start) - 1
     for p in range(len(points)):
         start[owner[p] + 1] += 1
@@ -141,9 +141,9 @@ def group_points(
 def nearest_samples(
     positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
 ) -> None:
-    """The K nearest samples of each sample from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
+    """Find the K nearest samples of each sample from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
 
-    The search starts with `near`. Where there are not even six, the scan is sparse: the search goes on to twice as far.
+    The search starts with radius `near`. Where it finds fewer than six the scan is sparse, and it goes on to twice `far`.
     """
     k = neighbors.shape[1]
     found = np.empty(4096, np.int64)
@@ -176,7 +176,7 @@ def nearest_samples(
 
 @kernel
 def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
-    """Let dense samples see the sparse ones that have them among their six nearest: the farthest neighbours make room.
+    """Link samples back to much farther ones that have them among their six nearest, in place of their farthest neighbours.
 
     Otherwise a sparse part of the scan, linked one way only, would look like a gap from the dense part beside it.
     """
@@ -203,10 +203,10 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 def settle_samples(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
-    """Move each rough sample (thickness over `rough`) to the plane of the samples linked to it within a wider radius.
+    """Move each rough sample (thickness above `rough`) onto the plane of the samples linked to it within a radius.
 
-    Noise, plants and doubled layers thicker than a sample leave a cloud of samples instead of a sheet; this gives the sheet back.
-    Samples far off the plane weigh less.
+    Noise, plants and doubled layers thicker than a sample leave a cloud of samples; this turns it back into a sheet. Samples far off
+    the plane weigh less.
     """
     count = len(mean)
     stamp = np.full(count, -1, np.int64)

@@ -1,4 +1,4 @@
-"""The length field: the member length that is desired at each sample of the scan, and between the samples."""
+"""The length field: the desired member length at each sample of the scan, and between the samples."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, put, search
+from ..geometry.quadric import coefficients_from
 from ..geometry.vectors import Vector, dot, norm, row, subtract
-from .local_surface import PATCH, Surface, fit_patch, flood, walk
+from .local_surface import HEIGHTS, MEAN_DISTANCE, PATCH, Surface, fit_patch, flood, walk
 
-BLEND_STEPS = 2.2  # samples farther than so many steps do not count at a place
-SPREAD, ASIDE = (
-    14.4,
-    14.0,
-)  # of a curvature: by noise in the middle of a patch, and how it grows towards the boundary of the scan
-NEAREST = 12  # given lengths that count at a place; the next one says how far away a length counts
+BLEND_REACH = 2.2  # distance up to which the lengths of samples count at a place [steps between samples]
+CURVATURE_DEVIATION = 14.4  # standard deviation of a curvature inside the scan [that of a point / R^2 sqrt(points)]
+DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the mean of the points [patch radii]
+RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
+BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
 
 
 @kernel
 def length_at(surface: Surface, sample: int, place: Vector) -> float:
-    """Desired length at a place near a sample: the mean of the sample and its neighbours, the nearer the weightier."""
+    """Desired length at a place near a sample [`length`]: a mean over the nearest sample and its neighbours, weighted by nearness."""
     sample = walk(surface, sample, place)
-    reach = BLEND_STEPS * surface.step
+    reach = BLEND_REACH * surface.step
     total = mean = 0.0
     for k in range(-1, surface.neighbors.shape[1]):
         s = sample if k < 0 else surface.neighbors[sample, k]
@@ -39,7 +39,7 @@ def length_at(surface: Surface, sample: int, place: Vector) -> float:
 
 @kernel
 def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> None:
-    """Desired length (P,) at places (P, 3) each of which lies near the one before; the sample of the first is looked for in all."""
+    """Fill in the desired lengths (P,) at places (P, 3), each near the one before it; the first may lie anywhere."""
     sample, least = 0, np.inf
     for s in range(len(surface.mean)):
         d = subtract(row(surface.mean, s), row(places, 0))
@@ -53,10 +53,9 @@ def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> 
 
 @kernel
 def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: float) -> int:
-    """Shorten lengths (S,) that grow by more than `slope` per way over the links of the samples; returns the sweeps made.
+    """Shorten lengths (S,) until they differ by at most `slope` times the distance over the links; returns the sweeps made.
 
-    What is left is the largest field below the given one of which no place is longer than another by more than the slope times
-    the way between them: the least of all lengths each grown by its way, whatever the order of the sweeps.
+    The result is the largest such field that nowhere exceeds the given one, whatever the order of the sweeps.
     """
     sweeps = 0
     changed = True
@@ -83,17 +82,17 @@ def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: f
 def blend_lengths(
     places: np.ndarray, given: np.ndarray, values: np.ndarray, boxes: SearchBoxes, reach: float, lengths: np.ndarray
 ) -> None:
-    """Blend lengths given at some places (K, 3) into one at each sample (S,), by the inverse square of the distance (Shepard).
+    """Blend values given at some places (K, 3) into one for each sample (S,), weighted by the inverse square of the distance (Shepard).
 
-    Of more than `NEAREST` the nearest count, each less the nearer its distance comes to that of the next one, so that the blend
-    has no steps (Franke and Little). `boxes` is empty, with room for K; `reach` the radius with which the first look-up begins.
+    Only the nearest `BLENDED_LENGTHS` count, each weighing less as its distance approaches that of the next one, so that the blend
+    has no steps (Franke and Little). boxes : empty, with room for K; reach : radius of the first search.
     """
     for n in range(len(given)):
         put(boxes, n, given[n, 0], given[n, 1], given[n, 2])
     found = np.empty(len(given), np.int64)
-    near = np.empty(NEAREST + 1)
-    which = np.empty(NEAREST + 1, np.int64)
-    wanted = min(NEAREST + 1, len(given))
+    near = np.empty(BLENDED_LENGTHS + 1)
+    which = np.empty(BLENDED_LENGTHS + 1, np.int64)
+    wanted = min(BLENDED_LENGTHS + 1, len(given))
     for s in range(len(places)):
         place = row(places, s)
         reach *= 0.7
@@ -112,9 +111,9 @@ def blend_lengths(
                 at -= 1
             near[at], which[at] = away, found[i]
             kept = min(kept + 1, len(near))
-        limit = near[NEAREST] if kept > NEAREST else np.inf
+        limit = near[BLENDED_LENGTHS] if kept > BLENDED_LENGTHS else np.inf
         total = mean = 0.0
-        for i in range(min(kept, NEAREST)):
+        for i in range(min(kept, BLENDED_LENGTHS)):
             away = max(near[i], 1e-9 * reach)
             weight = (1.0 / away - 1.0 / limit) ** 2 if limit > away else 0.0
             total += weight
@@ -123,13 +122,13 @@ def blend_lengths(
 
 
 @kernel
-def _bend(patch: np.ndarray) -> float:
-    """Largest curvature of a patch at its middle, without sign."""
-    p, q = patch[10], patch[11]
+def _largest_curvature(patch: np.ndarray) -> float:
+    """Absolute value of the larger principal curvature of a patch at its centre [1 / scan unit]."""
+    _, p, q, uu, uv, vv = coefficients_from(patch, HEIGHTS)
     grown = 1.0 + p * p + q * q
     root = math.sqrt(grown)
     e, f, g = 1.0 + p * p, p * q, 1.0 + q * q
-    a, b, c = 2.0 * patch[12] / root, patch[13] / root, 2.0 * patch[14] / root
+    a, b, c = 2.0 * uu / root, uv / root, 2.0 * vv / root
     mean = 0.5 * (e * c - 2.0 * f * b + g * a) / grown
     gauss = (a * c - b * b) / grown
     return abs(mean) + math.sqrt(max(mean * mean - gauss, 0.0))
@@ -137,7 +136,7 @@ def _bend(patch: np.ndarray) -> float:
 
 @kernel
 def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
-    """Choose samples (S,) bool no two of which are linked, so that every other one is linked to one of them; returns their number."""
+    """Mark a maximal set of samples, chosen (S,) bool, no two of which are linked; returns how many."""
     count = 0
     for s in range(len(neighbors)):
         free = True
@@ -152,11 +151,13 @@ def choose_apart(neighbors: np.ndarray, chosen: np.ndarray) -> int:
 
 
 @kernel
-def measure_bends(surface: Surface, samples: np.ndarray, found: np.ndarray, begin: int, end: int) -> None:
-    """Measure how much the scan bends at some samples (P,), from `begin` to `end` - 1.
+def measure_curvatures(
+    surface: Surface, samples: np.ndarray, curvatures: np.ndarray, deviations: np.ndarray, begin: int, end: int
+) -> None:
+    """Measure the larger principal curvature of the scan at some samples (P,), from `begin` to `end` - 1.
 
-    found : (P, 2), filled: largest curvature without sign, and its standard deviation by the noise: that of least squares with the
-    weights of a patch, which grows where the scan lies to one side only
+    curvatures, deviations : (P,), filled with its absolute value and with the standard deviation that noise gives it: that of the least
+    squares fit, which grows where the scan lies to one side only [1 / scan unit]
     """
     patch = np.zeros(PATCH)
     for i in range(begin, end):
@@ -168,8 +169,8 @@ def measure_bends(surface: Surface, samples: np.ndarray, found: np.ndarray, begi
             d = subtract(row(surface.mean, surface.queue[k]), place)
             x, y, z = x + d[0], y + d[1], z + d[2]
         aside = norm((x, y, z)) / (max(count, 1) * surface.patch_radius)
-        found[i, 0] = _bend(patch)
-        spread = SPREAD * (1.0 + ASIDE * aside * aside) * 1.25 * patch[17]
-        found[i, 1] = spread / (surface.patch_radius * surface.patch_radius * math.sqrt(max(taken, 1)))
+        curvatures[i] = _largest_curvature(patch)
+        spread = CURVATURE_DEVIATION * (1.0 + DEVIATION_ASIDE * aside * aside) * RMS_OVER_MEAN * patch[MEAN_DISTANCE]
+        deviations[i] = spread / (surface.patch_radius * surface.patch_radius * math.sqrt(max(taken, 1)))
         if taken < 10:
-            found[i, 1] = np.inf
+            deviations[i] = np.inf

@@ -50,7 +50,7 @@ def build_kd_tree(points: np.ndarray) -> kernels.KDTree:
     """Return the tree of points (N, 3), N > 0."""
     tree = kernels.empty_kd_tree(points)
     kernels.divide(tree, 0, 1)
-    if len(tree.ranges) > 1:
+    if len(tree.first) > 1:
         in_parts(
             2, 1, lambda _, begin, end: [kernels.divide(tree, 1 + i, kernels.STACK_LEVELS) for i in range(begin, end)]
         )

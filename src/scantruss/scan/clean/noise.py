@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels.scan import noise as kernels
-from ...kernels.surface.patches import PATCH
+from ...kernels.surface.patches import Patches, empty_patches
 from ...kernels.surface.size_field import choose_apart
 from ...runtime.parallel import in_parts
 from .nearby import NEAREST, Nearby
@@ -28,7 +28,10 @@ class Surfaces(NamedTuple):
 
     number: np.ndarray  #: (N,) int64 patch of each point, -1 for most
     centres: np.ndarray  #: (C,) int64 point of each patch
-    patches: np.ndarray  #: (C, PATCH) as `kernels.surface.patches`
+    patches: Patches
+    flatness: (
+        np.ndarray
+    )  #: (C,) fourth moment of the distances of the points from each patch over the square of the second
 
 
 def fit_surfaces(near: Nearby) -> Surfaces:
@@ -42,20 +45,24 @@ def fit_surfaces(near: Nearby) -> Surfaces:
     known = np.where(near.neighbors >= 0, reach[near.neighbors], np.inf)
     radii = (np.median(known, axis=1) * np.sqrt(NARROW / NEAREST))[centres]
     radii[~np.isfinite(radii)] = np.linalg.norm(np.ptp(near.tree.points, axis=0))
-    patches = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
-    usual = _around(near, number, patches[:, 12])[centres]
-    return Surfaces(number, centres, _fit(near, centres, radii, WIDEST, WORSE * usual))
+    narrow, _ = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
+    usual = _around(near, number, narrow.rms)[centres]
+    return Surfaces(number, centres, *_fit(near, centres, radii, WIDEST, WORSE * usual))
 
 
-def _fit(near: Nearby, centres: np.ndarray, radii: np.ndarray, widest: float, usual: np.ndarray) -> np.ndarray:
-    """Return patches (C, PATCH) of radii up to `widest` that fit as well as usual."""
-    patches = np.empty((len(centres), PATCH))
+def _fit(
+    near: Nearby, centres: np.ndarray, radii: np.ndarray, widest: float, usual: np.ndarray
+) -> tuple[Patches, np.ndarray]:
+    """Return patches of radii up to `widest` that fit as well as usual, and how flat the distances from each are distributed (C,)."""
+    patches, flatness = empty_patches(len(centres)), np.empty(len(centres))
     in_parts(
         len(centres),
         PATCHES_PER_THREAD,
-        lambda _, begin, end: kernels.fit_patches(near.tree, centres, radii, widest, usual, patches, begin, end),
+        lambda _, begin, end: kernels.fit_patches(
+            near.tree, centres, radii, widest, usual, patches, flatness, begin, end
+        ),
     )
-    return patches
+    return patches, flatness
 
 
 def _around(near: Nearby, number: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -111,15 +118,16 @@ def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.nda
 def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:
     """Return patches at the same points, wide enough for two layers."""
     centres = surfaces.centres
-    radii = np.maximum(BROAD * distance, surfaces.patches[:, 15])
-    return surfaces._replace(patches=_fit(near, centres, radii, 1.0, np.full(len(centres), np.inf)))
+    radii = np.maximum(BROAD * distance, surfaces.patches.radius)
+    patches, flatness = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
+    return surfaces._replace(patches=patches, flatness=flatness)
 
 
 def _two(near: Nearby, narrow: Surfaces, surfaces: Surfaces, distance: float) -> np.ndarray:
     """Return which points lie at two distances from the patches around them (N,), rows of the tree; none where only a few do."""
-    thick, flatness = surfaces.patches[:, 12], surfaces.patches[:, 13]
-    apart = (2.0 * thick <= distance) & (narrow.patches[:, 12] >= FOLLOWED * thick)
-    calm = _around(near, surfaces.number, np.where(apart, flatness, 3.0))
+    thick = surfaces.patches.rms
+    apart = (2.0 * thick <= distance) & (narrow.patches.rms >= FOLLOWED * thick)
+    calm = _around(near, surfaces.number, np.where(apart, surfaces.flatness, 3.0))
     own = np.where(near.neighbors >= 0, calm[near.neighbors], 3.0)
     layers = np.median(own, axis=1) < FLATNESS
     return layers if layers.mean() > SOME else np.zeros(len(layers), np.bool_)

@@ -1,38 +1,27 @@
-"""Settings: every number that steers the method, with its symbol, unit, bounds, default and source.
+"""The settings of each stage: every number that steers the method, with its symbol, unit, bounds, default and source.
 
-The options of the command line, the table in the docs and the JSON saved beside every result are made from the fields. Each stage
-has a small record of its own; `Settings` is all of them together.
+The options of the command line, the table in the docs and the JSON saved with each result are made from these fields.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from pathlib import Path
+from dataclasses import dataclass, field, fields
 from typing import Any
 
-from .errors import InputError
-from .selection import FORMS, RETURNS, Selection
+from ..errors import InputError
+from ..selection import FORMS, RETURNS
 
-SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING = (
-    0.2,
-    0.3,
-)  # spacing of the surface samples of any scan, and of a dense and smooth one [member lengths]
+SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
+SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
-CURVATURE = "curvature:"  # a length field that follows the curvature starts with this
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # [metre]
-RENAMED = {"stray_distance": "outlier_distance", "drop_repeated": "drop_duplicates"}  # names in settings files of 0.1.0
-
-
-class Lengths(tuple[tuple[float, float, float, float], ...]):
-    """Rows of a length field that have been checked: x, y, z and the desired length there [scan unit]."""
 
 
 def _setting(
@@ -304,177 +293,3 @@ RECORDS = (
     MemberSettings, ReadingSettings, CleaningSettings, SurfaceSettings, BoundarySettings, ConstraintSettings, FrontSettings,
     SmoothingSettings, CheckSettings,
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings(
-    CheckSettings,
-    SmoothingSettings,
-    FrontSettings,
-    ConstraintSettings,
-    BoundarySettings,
-    SurfaceSettings,
-    CleaningSettings,
-    ReadingSettings,
-    MemberSettings,
-):
-    """All settings of a run; `length` is needed, all else has a default. Impossible values raise `InputError`."""
-
-    def __post_init__(self) -> None:
-        """Check every value and bring positions, lines and lengths into their plainest form."""
-        object.__setattr__(self, "length_field", check_length_field(self.length_field))
-        object.__setattr__(self, "piece", check_piece(self.piece))
-        taken = self.selection
-        for name in ("classes", "returns", "crop"):
-            object.__setattr__(self, name, getattr(taken, name))
-        if self.length_field and self.length == 0:
-            object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
-        if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
-            raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
-        super().__post_init__()
-        object.__setattr__(self, "fixed", _positions(self.fixed))
-        object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
-
-    def __repr__(self) -> str:
-        """Name the settings that are not the default."""
-        own = [spec.name for spec in fields(self) if getattr(self, spec.name) != spec.default]
-        return f"Settings({', '.join(f'{name}={getattr(self, name)!r}' for name in own)})"
-
-    @property
-    def selection(self) -> Selection:
-        """Which points of the scan are taken."""
-        names = [spec.name for spec in fields(Selection)]
-        return Selection(**{name: getattr(self, name) for name in names})
-
-    @property
-    def closed_boundary_length(self) -> float:
-        """Holes with a shorter boundary than this are closed [scan unit]."""
-        return HOLE * self.length if self.fill_holes is None else self.fill_holes
-
-    @property
-    def bridged_boundary_length(self) -> float:
-        """Of these, the front runs over those with a shorter boundary than this; the others are filled [scan unit]."""
-        return min(HOLE * self.length, self.closed_boundary_length)
-
-    def replace(self, **changes: Any) -> Settings:
-        """Return a copy with some values changed."""
-        return replace(self, **changes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values, ready for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Settings:
-        """Return settings from plain values; unknown names are refused."""
-        values = {RENAMED.get(name, name): value for name, value in values.items() if name != "made_by"}
-        names = {spec.name for spec in fields(cls)}
-        if unknown := sorted(set(values) - names):
-            raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
-        if "length" not in values and not values.get("length_field"):
-            raise InputError("settings need a length (the desired member length in the scan's unit)")
-        try:
-            return cls(**values)
-        except TypeError as error:
-            raise InputError(f"settings cannot be read: {error}") from None
-
-    @classmethod
-    def read(cls, path: str | Path) -> Settings:
-        """Return the settings saved beside a result (JSON)."""
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"cannot read settings {path}: {error.strerror}") from None
-        except ValueError:
-            raise InputError(f"{path} is not a settings file (JSON)") from None
-        values = values.get("settings", values) if isinstance(values, dict) else None
-        if not isinstance(values, dict):
-            raise InputError(f"{path} is not a settings file (a JSON object is needed)")
-        return cls.from_dict(values)
-
-
-def check_piece(given: Any) -> str:
-    """Return which pieces are chosen, "auto", "all", "largest" or numbers from 1 with commas between them, or refuse it."""
-    text = str(given).replace(" ", "").lower()
-    if text in ("auto", "all", "largest") or all(word.isdecimal() and int(word) > 0 for word in text.split(",")):
-        return text
-    raise InputError(f"piece must be auto, all, largest or numbers from 1 such as 1 or 1,3, got {given!r}")
-
-
-def _positions(given: Any) -> tuple[tuple[float, ...], ...]:
-    """Return fixed positions as tuples of numbers."""
-    try:
-        found = tuple(tuple(float(c) for c in position) for position in given)
-    except (TypeError, ValueError):
-        raise InputError(f"fixed must be positions of three numbers, got {given!r}") from None
-    for position in found:
-        if len(position) != 3 or not all(map(math.isfinite, position)):
-            raise InputError(f"a fixed node needs three finite coordinates, got {position}")
-    return found
-
-
-def _line(line: Any) -> tuple[tuple[float, ...], ...]:
-    """Return a fixed line as tuples of numbers."""
-    try:
-        points = tuple(tuple(float(c) for c in position) for position in line)
-    except (TypeError, ValueError):
-        raise InputError(f"fixed_lines must be polylines of positions of three numbers, got {line!r}") from None
-    for position in points:
-        if len(position) != 3 or not all(map(math.isfinite, position)):
-            raise InputError(f"a fixed line needs points of three finite coordinates, got {position}")
-    points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
-    if len(points) < 2:
-        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
-    return points
-
-
-def check_length_field(given: Any) -> str | Lengths:
-    """Return a length field as the settings hold it: "" for none, "curvature:MIN:MAX", or rows of x, y, z, length.
-
-    Raises
-    ------
-    InputError
-        It is none of these, a length is not positive, or MIN is larger than MAX.
-    """
-    if given is None or (isinstance(given, str) and not given):
-        return ""
-    if isinstance(given, str):
-        return _check_curvature(given)
-    if isinstance(given, Lengths):
-        return given
-    try:
-        rows = Lengths((float(x), float(y), float(z), float(length)) for x, y, z, length in given)
-    except (TypeError, ValueError):
-        raise InputError("length_field must be rows of four numbers, x y z length, or curvature:MIN:MAX") from None
-    if not rows:
-        raise InputError("length_field has no rows; it needs x, y, z, length at one place at least")
-    for row in rows:
-        if not all(map(math.isfinite, row)):
-            raise InputError(f"length_field must be finite numbers, got {row}")
-        if row[3] <= 0:
-            raise InputError(f"length_field must have positive lengths, got {row[3]:g} at {row[:3]}")
-    return rows
-
-
-def _check_curvature(text: str) -> str:
-    """Return "curvature:MIN:MAX" in its plainest writing, or refuse it."""
-    try:
-        low, high = (float(part) for part in text.removeprefix(CURVATURE).split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not (text.startswith(CURVATURE) and math.isfinite(low) and math.isfinite(high)):
-        raise InputError(f"a length field must be curvature:MIN:MAX with two lengths, got {text!r}")
-    if low <= 0:
-        raise InputError(f"{text}: the shortest length must be positive, got {low:g}")
-    if low > high:
-        raise InputError(f"{text}: the shortest length is above the longest; write {CURVATURE}{high:g}:{low:g}")
-    return f"{CURVATURE}{low!r}:{high!r}"
-
-
-def shortest_and_longest(field: str | Sequence[Sequence[float]]) -> tuple[float, float]:
-    """Return the bounds of a length field as it is given [scan unit]."""
-    if isinstance(field, str):
-        low, high = (float(part) for part in field.removeprefix(CURVATURE).split(":"))
-        return low, high
-    lengths = [row[3] for row in field]
-    return min(lengths), max(lengths)

@@ -1,0 +1,114 @@
+"""All settings of a run as one record, saved as JSON and read again."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..selection import Selection
+from .records import (
+    HOLE,
+    BoundarySettings,
+    CheckSettings,
+    CleaningSettings,
+    ConstraintSettings,
+    FrontSettings,
+    MemberSettings,
+    ReadingSettings,
+    SmoothingSettings,
+    SurfaceSettings,
+)
+from .values import check_length_field, check_line, check_piece, check_positions, shortest_and_longest
+
+RENAMED = {"stray_distance": "outlier_distance", "drop_repeated": "drop_duplicates"}  # names in settings files of 0.1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(
+    CheckSettings,
+    SmoothingSettings,
+    FrontSettings,
+    ConstraintSettings,
+    BoundarySettings,
+    SurfaceSettings,
+    CleaningSettings,
+    ReadingSettings,
+    MemberSettings,
+):
+    """All settings of a run; `length` is needed, all else has a default. Impossible values raise `InputError`."""
+
+    def __post_init__(self) -> None:
+        """Check every value and bring positions, lines and lengths into their plainest form."""
+        object.__setattr__(self, "length_field", check_length_field(self.length_field))
+        object.__setattr__(self, "piece", check_piece(self.piece))
+        taken = self.selection
+        for name in ("classes", "returns", "crop"):
+            object.__setattr__(self, name, getattr(taken, name))
+        if self.length_field and self.length == 0:
+            object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
+        if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
+            raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
+        super().__post_init__()
+        object.__setattr__(self, "fixed", check_positions(self.fixed))
+        object.__setattr__(self, "fixed_lines", tuple(map(check_line, self.fixed_lines)))
+
+    def __repr__(self) -> str:
+        """Name the settings that are not the default."""
+        own = [spec.name for spec in fields(self) if getattr(self, spec.name) != spec.default]
+        return f"Settings({', '.join(f'{name}={getattr(self, name)!r}' for name in own)})"
+
+    @property
+    def selection(self) -> Selection:
+        """Which points of the scan are taken."""
+        names = [spec.name for spec in fields(Selection)]
+        return Selection(**{name: getattr(self, name) for name in names})
+
+    @property
+    def closed_boundary_length(self) -> float:
+        """Holes with a shorter boundary than this are closed [scan unit]."""
+        return HOLE * self.length if self.fill_holes is None else self.fill_holes
+
+    @property
+    def bridged_boundary_length(self) -> float:
+        """Of these, the front runs over those with a shorter boundary than this; the others are filled [scan unit]."""
+        return min(HOLE * self.length, self.closed_boundary_length)
+
+    def replace(self, **changes: Any) -> Settings:
+        """Return a copy with some values changed."""
+        return replace(self, **changes)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Settings:
+        """Return settings from plain values; unknown names are refused."""
+        values = {RENAMED.get(name, name): value for name, value in values.items() if name != "made_by"}
+        names = {spec.name for spec in fields(cls)}
+        if unknown := sorted(set(values) - names):
+            raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
+        if "length" not in values and not values.get("length_field"):
+            raise InputError("settings need a length (the desired member length in the scan's unit)")
+        try:
+            return cls(**values)
+        except TypeError as error:
+            raise InputError(f"settings cannot be read: {error}") from None
+
+    @classmethod
+    def read(cls, path: str | Path) -> Settings:
+        """Return the settings saved beside a result (JSON)."""
+        try:
+            values = json.loads(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"cannot read settings {path}: {error.strerror}") from None
+        except ValueError:
+            raise InputError(f"{path} is not a settings file (JSON)") from None
+        values = values.get("settings", values) if isinstance(values, dict) else None
+        if not isinstance(values, dict):
+            raise InputError(f"{path} is not a settings file (a JSON object is needed)")
+        return cls.from_dict(values)

@@ -1,0 +1,102 @@
+"""Values of settings that are more than a number or a word, checked and brought into their plainest form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import InputError
+
+CURVATURE = "curvature:"  # start of a length field that follows the curvature
+
+
+class Lengths(tuple[tuple[float, float, float, float], ...]):
+    """Rows of a length field that have been checked: x, y, z and the desired length there [scan unit]."""
+
+
+def check_piece(given: Any) -> str:
+    """Return which pieces are chosen, "auto", "all", "largest" or numbers from 1 with commas between them, or refuse it."""
+    text = str(given).replace(" ", "").lower()
+    if text in ("auto", "all", "largest") or all(word.isdecimal() and int(word) > 0 for word in text.split(",")):
+        return text
+    raise InputError(f"piece must be auto, all, largest or numbers from 1 such as 1 or 1,3, got {given!r}")
+
+
+def check_positions(given: Any) -> tuple[tuple[float, ...], ...]:
+    """Return fixed positions as tuples of numbers, or refuse them."""
+    return _coordinates(given, f"fixed must be positions of three numbers, got {given!r}", "a fixed node needs")
+
+
+def check_line(line: Any) -> tuple[tuple[float, ...], ...]:
+    """Return a fixed line as tuples of numbers, no point twice in a row, or refuse it."""
+    refusal = f"fixed_lines must be polylines of positions of three numbers, got {line!r}"
+    points = _coordinates(line, refusal, "a fixed line needs points of")
+    points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
+    if len(points) < 2:
+        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
+    return points
+
+
+def _coordinates(given: Any, refusal: str, needs: str) -> tuple[tuple[float, ...], ...]:
+    """Return positions as tuples of three finite numbers; `refusal` where they are no numbers, `needs` begins the message otherwise."""
+    try:
+        found = tuple(tuple(float(c) for c in position) for position in given)
+    except (TypeError, ValueError):
+        raise InputError(refusal) from None
+    for position in found:
+        if len(position) != 3 or not all(map(math.isfinite, position)):
+            raise InputError(f"{needs} three finite coordinates, got {position}")
+    return found
+
+
+def check_length_field(given: Any) -> str | Lengths:
+    """Return a length field as the settings hold it: "" for none, "curvature:MIN:MAX", or rows of x, y, z, length.
+
+    Raises
+    ------
+    InputError
+        It is none of these, a length is not positive, or MIN is larger than MAX.
+    """
+    if given is None or (isinstance(given, str) and not given):
+        return ""
+    if isinstance(given, str):
+        return _check_curvature(given)
+    if isinstance(given, Lengths):
+        return given
+    try:
+        rows = Lengths((float(x), float(y), float(z), float(length)) for x, y, z, length in given)
+    except (TypeError, ValueError):
+        raise InputError("length_field must be rows of four numbers, x y z length, or curvature:MIN:MAX") from None
+    if not rows:
+        raise InputError("length_field has no rows; it needs x, y, z, length at one place at least")
+    for row in rows:
+        if not all(map(math.isfinite, row)):
+            raise InputError(f"length_field must be finite numbers, got {row}")
+        if row[3] <= 0:
+            raise InputError(f"length_field must have positive lengths, got {row[3]:g} at {row[:3]}")
+    return rows
+
+
+def _check_curvature(text: str) -> str:
+    """Return "curvature:MIN:MAX" in its plainest writing, or refuse it."""
+    try:
+        low, high = (float(part) for part in text.removeprefix(CURVATURE).split(":"))
+    except ValueError:
+        low = high = math.nan
+    if not (text.startswith(CURVATURE) and math.isfinite(low) and math.isfinite(high)):
+        raise InputError(f"a length field must be curvature:MIN:MAX with two lengths, got {text!r}")
+    if low <= 0:
+        raise InputError(f"{text}: the shortest length must be positive, got {low:g}")
+    if low > high:
+        raise InputError(f"{text}: the shortest length is above the longest; write {CURVATURE}{high:g}:{low:g}")
+    return f"{CURVATURE}{low!r}:{high!r}"
+
+
+def shortest_and_longest(field: str | Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Return the bounds of a length field as it is given [scan unit]."""
+    if isinstance(field, str):
+        low, high = (float(part) for part in field.removeprefix(CURVATURE).split(":"))
+        return low, high
+    lengths = [row[3] for row in field]
+    return min(lengths), max(lengths)
