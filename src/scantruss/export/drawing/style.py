@@ -18,7 +18,7 @@ class PictureStyle:
     Raises
     ------
     InputError
-        A value is none of those that are possible.
+        A value is not one of those allowed.
     """
 
     views: tuple[str, ...] = ("auto",)  #: side by side: names of `VIEWS`, or "AZIMUTH,ELEVATION" [degree]

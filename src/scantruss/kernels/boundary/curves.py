@@ -10,7 +10,7 @@ from ...runtime.jit import kernel
 
 
 class Curves(NamedTuple):
-    """Polylines: closed ones, one a boundary loop, the last point of each joins its first; and those of lines, which may be open.
+    """Polylines: one closed one for each boundary loop, whose last point joins its first; and those of lines, which may be open.
 
     An open one is as long as the arc length of its last point.
     """
@@ -55,7 +55,7 @@ def is_open(curves: Curves, curve: int) -> bool:
 
 @kernel
 def segment_at(curves: Curves, curve: int, arc: float) -> int:
-    """Segment of a curve in which an arc length (0 to total) lies, by halving."""
+    """Segment of a curve in which an arc length (0 to total) lies, by bisection."""
     low, high = curves.start[curve], curves.start[curve + 1]
     while high - low > 1:
         middle = (low + high) // 2

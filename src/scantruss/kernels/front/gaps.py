@@ -33,7 +33,7 @@ def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
 
 @kernel
 def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
-    """How bad a triangle is for the grid: shape, size, and whether it faces as the surface does at its nodes."""
+    """Cost of a triangle: shape, size, and whether it faces the same side as the surface at its nodes."""
     pa, pb, pc = row(front.nodes, a), row(front.nodes, b), row(front.nodes, c)
     face = unit(cross(subtract(pb, pa), subtract(pc, pa)))
     worst = min(dot(face, row(front.normals, a)), dot(face, row(front.normals, b)), dot(face, row(front.normals, c)))

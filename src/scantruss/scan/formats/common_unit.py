@@ -1,4 +1,4 @@
-"""One unit for all coordinates of a scan, whatever its files say."""
+"""One unit for all coordinates of a scan, whatever the units of its files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .content import Content
 def to_common_unit(
     path: Path, content: Content, unit: str, z_unit: str, common: str
 ) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """Return points brought to the unit that other files have, where their own is known; see `to_one_unit`.
+    """Return points converted to the unit of the other files, if their own is known; see `to_one_unit`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a reader returns and what a writer is given."""
+"""What a reader returns and what a writer takes."""
 
 from __future__ import annotations
 
@@ -47,5 +47,5 @@ class Cloud(NamedTuple):
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:
-    """Return a note on a file with more points than it promises."""
+    """Return a note on a file with more points than its header promises."""
     return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

@@ -42,7 +42,7 @@ def read_npy(path: Path, wanted: Sequence[str] = ()) -> Content:
             array = np.load(file, allow_pickle=False)
     except FormatError:
         raise
-    except Exception as error:  # a damaged header ends in many ways
+    except Exception as error:  # a damaged header raises many kinds of errors
         raise unreadable(path, "NPY", error) from None
     content = _content(array, wanted)
     if content is None:
@@ -72,9 +72,9 @@ def check_claim(path: Path, file: IO[bytes], size: int) -> None:
 
 
 def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the points of an NPZ file: those of an array whose name says so, or of the only one that fits.
+    """Return the points of an NPZ file: the array with a fitting name, or the only one with a fitting shape.
 
-    An array `unit` says the unit.
+    An array `unit` gives the unit.
     """
     head = read_head(path)
     if not head.startswith(b"PK"):
@@ -88,12 +88,12 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
             return replace(content, metres=_metres(arrays, path), notes=notes)
     except FormatError:
         raise
-    except Exception as error:  # a damaged archive ends in many ways
+    except Exception as error:  # a damaged archive raises many kinds of errors
         raise unreadable(path, "NPZ", error) from None
 
 
 def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return which array of an archive holds the points, and notes; by names and headers, as all may be large."""
+    """Return the name of the array that holds the points, and notes; only names and headers are read, as arrays may be large."""
     fitting, held = [], []
     for name in arrays.files:
         shape, kind = _shape_of(arrays, name, path)
@@ -135,7 +135,7 @@ def metres_of_npz(path: Path) -> float | None:
     """Return the metres of the unit that an NPZ file names, without reading its points; None where it names none."""
     with suppress(Exception), path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return _metres(arrays, path)
-    return None  # damaged in some way: reading its points says in which
+    return None  # damaged: reading its points reports how
 
 
 def _member(arrays: Any, name: str, path: Path) -> np.ndarray | None:
