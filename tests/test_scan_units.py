@@ -118,7 +118,7 @@ def test_the_user_goes_before_the_file(tmp_path: Path) -> None:
     (tmp_path / "a.xyz").write_bytes(text(P))
     cloud = read_points(tmp_path / "a.xyz", unit="m", selection=Selection(z_unit="foot"))
     assert np.allclose(cloud.points + cloud.origin, P * [1, 1, 0.3048], atol=1e-9)
-    with pytest.raises(InputError, match="does not say the unit of x and y"):
+    with pytest.raises(InputError, match="does not state the unit of x and y"):
         read_points(tmp_path / "a.xyz", selection=Selection(z_unit="foot"))
 
 

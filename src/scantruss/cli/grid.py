@@ -176,7 +176,7 @@ def make_grid(
 
 
 def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:
-    """Return the settings with the length that `info` suggests, and say so."""
+    """Return the settings with the length that `info` suggests, with a note."""
     from ..report.advice import Advice
 
     with note_compiling(bars):

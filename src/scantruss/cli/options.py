@@ -74,7 +74,7 @@ def add_outs(parser: Parser, help: str, positional: str = "") -> None:
         parser.add_argument("outs", metavar="OUT", nargs=positional, default=[], help=help)
     parser.add_argument(
         "-o", "--out", dest="more_outs", metavar="OUT", action="append", default=[],
-        help="the same as an option; repeatable" if positional else f"{help}; repeatable",
+        help="OUT as an option; repeatable" if positional else f"{help}; repeatable",
     )  # fmt: skip
     add_force(parser)
 
@@ -270,7 +270,7 @@ def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
         _add_options(parser.add_argument_group("the scan"), (spec for spec in specs if spec.name in names))
         return
     by_name = {spec.name: spec for spec in specs}
-    _add_options(parser.add_argument_group("EVERY DAY"), (by_name[name] for name in EVERY_DAY))
+    _add_options(parser.add_argument_group("EVERYDAY"), (by_name[name] for name in EVERY_DAY))
     for record in RECORDS:
         title = f"EXPERT: {(record.__doc__ or '').rstrip('.').lower()}"
         own = [spec for spec in specs if spec in fields(record) and spec.name not in EVERY_DAY + PAPER_ONLY]

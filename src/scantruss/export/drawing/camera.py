@@ -10,8 +10,8 @@ import numpy as np
 from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
-OPEN = 0.5  # mean normal by area from which on a shell is open: it faces one way on the whole
-FACING = 0.08  # ... from which on it tells which way is up where no flat face does
+OPEN = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
+FACING = 0.08  # ... above which it tells which way is up if no flat face does
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
@@ -66,7 +66,7 @@ def choose_camera(
 ) -> Camera:
     """Return a camera that looks at a grid from a side.
 
-    "auto" looks from above and aside: the more an open shell faces upwards, the more from above. The other views are those of a
+    "auto" looks obliquely from above: the more an open shell faces upwards, the more from above. The other views are those of a
     drawing: the front is where one looks along y, or against z where y is up.
 
     Parameters
@@ -171,7 +171,7 @@ def _sides(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _front(nodes: np.ndarray, ground: np.ndarray, facing: np.ndarray, openness: float) -> np.ndarray:
-    """Return a horizontal direction to the eye: a little aside of the front; across the longer side of what lies."""
+    """Return a horizontal direction to the eye: slightly off the front, or across the longer side of a lying object."""
     first, second = _sides(ground)
     level = facing - (facing @ ground) * ground
     turn = math.radians(28)

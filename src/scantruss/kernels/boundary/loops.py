@@ -364,7 +364,7 @@ def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
             away = norm(subtract(row(curve, (i + k) % count), row(curve, i)))
             if away < room[i]:
                 room[i] = away
-            k += max(1, int((away - room[i]) / longest))  # so many steps on it may be nearer
+            k += max(1, int((away - room[i]) / longest))  # the next place that may be nearer
 
 
 @kernel

@@ -25,7 +25,7 @@ TOO_FAR = 1.1  # reach above which points are too far apart for a grid [member l
 LONELY = (
     0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 )
-DENSE = 4  # ... the reach of the densest but so many around it
+DENSE = 4  # ... with the reach of the fifth densest point around it
 PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
 THIN = 0.01  # least expected distance, in radii of that surface

@@ -68,7 +68,7 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
         name, scale = "m", metres
         notes.append(f"the unit of {path.name}, {metres:g} m, has no name here; its points are brought to m")
     if z_unit and not name:
-        raise InputError(f"{path} does not say the unit of x and y; --unit says it, besides --z-unit {z_unit}")
+        raise InputError(f"{path} does not state the unit of x and y; give it with --unit, besides --z-unit {z_unit}")
     z_metres = UNITS[z_unit] or z_metres
     size = UNITS[name]
     if not size or not z_metres or math.isclose(z_metres, size * scale, rel_tol=SAME_UNIT):

@@ -14,8 +14,8 @@ class Content:
 
     points: np.ndarray  #: (N, 3) numbers, in the unit and frame of the file
     attributes: dict[str, np.ndarray] = field(default_factory=dict)  #: class, return_number ... (N,) each
-    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
-    z_metres: float | None = None  #: metres a unit of z
+    metres: float | None = None  #: metres per unit of x and y; None if the file does not state it
+    z_metres: float | None = None  #: metres per unit of z
     system: str = ""  #: reference system, "EPSG:32642" or its name
     degrees: bool = False  #: x and y are longitude and latitude
     notes: tuple[str, ...] = ()  #: what a user should know

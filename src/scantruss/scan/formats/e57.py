@@ -158,7 +158,7 @@ def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> lis
 
 
 def _streams(packet: np.ndarray, count: int) -> list[np.ndarray] | None:
-    """Return the bytes of each field in a data packet; None where it does not hold so many fields."""
+    """Return the bytes of each field in a data packet; None if it holds another number of fields."""
     stated, begin = int(packet[4]) + 256 * int(packet[5]), 6 + 2 * count
     if stated != count or begin > len(packet):
         return None

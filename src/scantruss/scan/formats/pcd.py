@@ -66,7 +66,7 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     if len(table) > header.points:
         notes.append(surplus_note(path.name, len(table), header.points))
     if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
-        notes.append(f"{path.name} goes on for {more:,} bytes behind the points that it promises; they are left aside")
+        notes.append(f"{path.name} goes on for {more:,} bytes after the points that it promises; they are ignored")
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
 

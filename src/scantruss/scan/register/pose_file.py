@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import FormatError
 from .poses import make_pose, quaternion_of
 
-SKEW = 1e-3  # how far a rotation may be from one before the file is refused
+SKEW = 1e-3  # deviation from a rotation above which the file is refused
 
 
 def read_poses(path: str | Path) -> dict[str, np.ndarray]:
