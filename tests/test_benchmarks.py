@@ -172,7 +172,7 @@ def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong():
         runs.Row(other, "gone", "missing", "", {}, {}),
     ]
     assert tables.findings(rows)[0] == (
-        "Right topology: ScanTruss normal on **2 of 2** clouds; of 2 other ways that are here 1 wherever it is, as far as they apply."
+        "Right topology: ScanTruss normal on **2 of 2** clouds; of 2 other programs 1 on every cloud to which it applies."
     )
 
 

@@ -287,7 +287,7 @@ def test_files_of_different_units_are_brought_to_that_of_the_first(tmp_path: Pat
     assert "b.ply is in mm and is brought to m, the unit of the first file" in cloud.notes
     part = read_points(f"{tmp_path}/*.ply", selection=Selection(crop=("box:0,0,20,30",)))
     assert len(part.points) == 2 * (P[:, 0] <= 20).sum()  # what is cropped is in the unit of the result
-    assert any(note.startswith("c.xyz does not say its unit") for note in cloud.notes)
+    assert any(note.startswith("c.xyz does not state its unit") for note in cloud.notes)
 
 
 def test_files_of_different_reference_systems_are_refused(tmp_path: Path) -> None:

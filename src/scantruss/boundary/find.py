@@ -44,9 +44,7 @@ class Loop:
     external: bool  #: the outer boundary of its piece; False: a hole
     length: float  #: [scan unit]
     piece: int  #: number of the piece of the cloud it bounds
-    desired: np.ndarray | None = (
-        None  #: (M,) desired length at each point, in lengths; None where it is the same for all
-    )
+    desired: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None if it is the same for all
     line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
 
     @property
@@ -287,7 +285,7 @@ def _onwards(touched: np.ndarray) -> list[int]:
 
 
 def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface) -> Loop | None:
-    """Make a loop of a closed curve of equal steps through boundary points; None where it is too short to keep."""
+    """Make a loop of a closed curve of equal steps through boundary points; None if it is too short to keep."""
     smoothed, corner_at = offset_curve(curve, bias, settings, surface)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
@@ -297,7 +295,7 @@ def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Set
 
 
 def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
-    """Return the desired length at each point of a curve (M, 3), in lengths; None where it is the same for all."""
+    """Return the desired length at each point of a curve (M, 3), in lengths; None if it is the same for all."""
     if not is_graded(surface):
         return None
     field = np.empty(len(curve))

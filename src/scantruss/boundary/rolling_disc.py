@@ -57,7 +57,7 @@ class _RollingDisc:
         self.banned = np.zeros(count, np.bool_)
 
     def loop_at(self, sample: int, direction: float, radius: float) -> np.ndarray:
-        """Samples of the loop that comes back to its start, empty where there is none.
+        """Samples of the loop that comes back to its start, empty if there is none.
 
         A disc that crosses from sheet to sheet may be caught in another loop. Rolled the other way round it seldom crosses at the
         same place, so that way is tried next; then the samples that caught it are left out.
@@ -80,7 +80,7 @@ class _RollingDisc:
         return np.zeros(0, np.int64)
 
     def _roll(self, surface: Surface, sample: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
-        """Samples of the loop that the disc ends up in; empty where it falls off or meets an earlier loop."""
+        """Samples of the loop that the disc ends up in; empty if it falls off or meets an earlier loop."""
         first, last = kernels.roll_disc(surface, sample, centre, self.radii, self.path, seen, self.visit, self.banned)
         return self.path[first:last].copy()
 

@@ -188,7 +188,7 @@ def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings
 
 
 def note_nearby(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Name the nearest length at which a grid passes, tried by quick runs; nothing where lengths vary over the scan."""
+    """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
 
     if settings.length_field:

@@ -57,7 +57,7 @@ class Solid:
 
     vertices: np.ndarray  #: (N, 3) float64 [printed unit], relative to the grid's origin
     triangles: np.ndarray  #: (M, 3) int64, anticlockwise seen from outside
-    unit: str  #: unit of the grid, "" where it is not known
+    unit: str  #: unit of the grid, "" if it is not known
     volume: float  #: [printed unit cubed]
     components: int  #: bodies that do not touch
     genus: int  #: openings one could pull a thread through, of all components together

@@ -59,7 +59,7 @@ class Field(NamedTuple):
     """The candidate nodes of one front, and how they were laid out."""
 
     start: FieldStart
-    nodes: CandidateNodes | None  #: on the lattice; None where the front makes all of its nodes itself
+    nodes: CandidateNodes | None  #: on the lattice; None if the front makes all of its nodes itself
 
 
 class Hierarchy(NamedTuple):

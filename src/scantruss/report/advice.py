@@ -35,7 +35,7 @@ class Trial:
     """The result of trying a member length."""
 
     length: float  #: [scan unit]
-    grid: Grid | None  #: with its certificate; None where there is none
+    grid: Grid | None  #: with its certificate; None if there is none
     fault: FrontError | None = None
 
     @property
@@ -113,7 +113,7 @@ class Advice:
         return usual if first is None or first.passed else some
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not; None where none of those tried does."""
+        """Return the nearest length that passes in place of one that does not; None if none of those tried does."""
         for share in NEARBY:
             trial = self.try_length(_two_digits(share * length))
             if trial is not None and trial.passed:

@@ -151,7 +151,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
 
 def warning_lines(certificate: Certificate) -> list[str]:
     """Return a line for each warning, with its place."""
-    return [f"look there: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
+    return [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
 
 
 def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:

@@ -93,7 +93,7 @@ def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[s
 
 
 def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said: str) -> np.ndarray | None:
-    """Return which points lie too far away to belong to the scan, (N,) bool; None where all belong to it.
+    """Return which points lie too far away to belong to the scan, (N,) bool; None if all belong to it.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def invalid_values_note(points: np.ndarray) -> str:
 
 
 def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None where none has.
+    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None if none has.
 
     Then many points share exactly the least or the greatest height, and a cliff divides them from their neighbours; a lake has a shore.
     """

@@ -33,7 +33,7 @@ class PointCloud:
 
     points: np.ndarray  #: (N, 3) float64 [scan unit], relative to `origin`
     origin: np.ndarray  #: (3,) float64 [scan unit], so that national-grid coordinates lose nothing
-    unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    unit: str = ""  #: mm, cm, m, inch, foot, or "" if it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
     left_out: tuple[tuple[str, int], ...] = ()  #: why other points of the file were not taken, and how many
     name: str = ""  #: file the points came from
@@ -81,7 +81,7 @@ class PointCloud:
             Points with a coordinate that is NaN or infinite are dropped and counted; so are a few a million times farther away
             than the others, with a note in `notes`.
         unit : str
-            Unit of the coordinates: mm, cm, m, inch, foot, or "" where it is not known.
+            Unit of the coordinates: mm, cm, m, inch, foot, or "" if it is not known.
         name : str
             File the points came from; messages start with it.
 
@@ -152,7 +152,7 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
 
 
 def bounds_of(array: np.ndarray) -> Bounds:
-    """Return the smallest and largest coordinates, (3,) each; NaN where one is NaN or infinite."""
+    """Return the smallest and largest coordinates, (3,) each; NaN if one is NaN or infinite."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
     from ..kernels.geometry.bounds import widen_bounds
@@ -276,7 +276,7 @@ def measure_gap(points: np.ndarray) -> float:
 
 
 def _nearest_of(rows: np.ndarray, others: np.ndarray, same: float) -> np.ndarray:
-    """Return the distance of each row to the nearest of the others that does not coincide, inf where none."""
+    """Return the distance of each row to the nearest of the others that does not coincide, inf if none."""
     squared = np.zeros((len(rows), len(others)))
     for axis in range(3):
         squared += (rows[:, axis, None] - others[:, axis]) ** 2
@@ -315,7 +315,7 @@ def _refine(
 
 
 def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
-    """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
+    """Return the distance of each point of the sample to the nearest point within `size`, inf if there is none."""
     from ..kernels.geometry.boxes import new_boxes
     from ..kernels.scan import nearby
 

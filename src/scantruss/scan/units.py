@@ -34,13 +34,13 @@ def metres_of(word: str) -> float | None:
 
 
 def metres_of_comments(lines: Iterable[str]) -> float | None:
-    """Return the metres of a unit that a comment of a text file names; None where there is none."""
+    """Return the metres of a unit that a comment of a text file names; None if there is none."""
     found = (re.match(rf"\s*(?:#|//).*?\b{PATTERN}", line, re.IGNORECASE) for line in lines)
     return next((metres_of(match[1]) for match in found if match), None)
 
 
 def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, float | None]:
-    """Return the metres per unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None where they do not.
+    """Return the metres per unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None if they do not.
 
     Parameters
     ----------

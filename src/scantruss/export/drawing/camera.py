@@ -201,7 +201,7 @@ def map_depth(corners: np.ndarray, near: np.ndarray, shape: tuple[int, int]) -> 
     Returns
     -------
     nearest : np.ndarray
-        (rows, columns) nearness of what is in front, -inf where nothing is [scan unit].
+        (rows, columns) nearness of what is in front, -inf if nothing is [scan unit].
     triangle : np.ndarray
         (rows, columns) int64 triangle in front, -1 where none is.
     """

@@ -39,7 +39,7 @@ class PictureStyle:
 
 
 def angles_of(view: str) -> tuple[float, float] | None:
-    """Return azimuth (from the front, anticlockwise seen from above) and elevation of a view [degree]; None where it names none."""
+    """Return azimuth (from the front, anticlockwise seen from above) and elevation of a view [degree]; None if it names none."""
     number = r"[+-]?\d+\.?\d*"
     found = re.fullmatch(rf"({number}),({number})", view)
     if found is None or abs(float(found[2])) > 90.0:

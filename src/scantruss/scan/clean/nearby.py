@@ -20,7 +20,7 @@ class Nearby:
 
     tree: kernels.KDTree
     neighbors: np.ndarray  #: (N, NEAREST) int64, nearest first, -1 where there are fewer
-    squares: np.ndarray  #: (N, NEAREST) squared distances, inf where there are fewer [scan unit^2]
+    squares: np.ndarray  #: (N, NEAREST) squared distances, inf if there are fewer [scan unit^2]
 
     @classmethod
     def of(cls, points: np.ndarray) -> Nearby:
@@ -36,7 +36,7 @@ class Nearby:
 
     @property
     def reach(self) -> np.ndarray:
-        """Distance of each point to its eighth neighbour (N,) [scan unit]; inf where there is none."""
+        """Distance of each point to its eighth neighbour (N,) [scan unit]; inf if there is none."""
         return np.sqrt(self.squares[:, REACH_TO - 1])
 
     def in_order(self, values: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ def clean_name(name: str) -> str:
 
 
 def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:
-    """Return the columns named x, y, z (or easting, northing, height); None where a name is missing."""
+    """Return the columns named x, y, z (or easting, northing, height); None if a name is missing."""
     clean = [clean_name(name) for name in names]
     for family in _FAMILIES:
         found = [next((i for i, name in enumerate(clean) if axis.fullmatch(name)), -1) for axis in family]
@@ -56,7 +56,7 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
 
 
 def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[int, int, int] | None:
-    """Return the columns of x, y, z for rows of a given width; None where the names do not fit the rows.
+    """Return the columns of x, y, z for rows of a given width; None if the names do not fit the rows.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ def to_common_unit(
     path, content, unit, z_unit
         As for `to_one_unit`.
     common : str
-        Unit of the files before; "" where none has one.
+        Unit of the files before; "" if none has one.
     """
     points, own, notes = to_one_unit(path, content, unit, z_unit)
     feet = (content.feet,) if content.feet and own != "foot" and not z_unit else ()

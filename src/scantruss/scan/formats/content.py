@@ -21,11 +21,11 @@ class Content:
     notes: tuple[str, ...] = ()  #: what a user should know
     left_out: dict[str, int] = field(
         default_factory=dict
-    )  #: points that the file itself says are none, by words for them
+    )  #: points that the file itself marks as none, by words for them
     unread: dict[str, int] = field(
         default_factory=dict
-    )  #: points that a reader passed over as they lie outside a part of the selection, by words for them
-    feet: str = ""  #: ... unless heights are in feet, or their unit is said
+    )  #: points that a reader skipped because they lie outside a part of the selection, by words for them
+    feet: str = ""  #: note that heights look like feet, used unless their unit is known
 
 
 class Cloud(NamedTuple):

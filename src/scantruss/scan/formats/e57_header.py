@@ -48,7 +48,7 @@ class Scan:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The fields that hold the coordinates; () where there are none."""
+        """The fields that hold the coordinates; () if there are none."""
         names = [field.name for field in self.fields]
         return next((axes for axes in (CARTESIAN, SPHERICAL) if set(axes) <= set(names)), ())
 

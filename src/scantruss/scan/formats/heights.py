@@ -16,7 +16,7 @@ PLACES = 100  # boxes of either kind that are needed to decide
 
 
 def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
-    """Return a note where heights look like feet, else "".
+    """Return a note if heights look like feet, else "".
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def check_count(path: Path, promised: int, got: int) -> None:
 
 
 def note_on_heights(path: Path) -> str:
-    """Return a note where the heights of a LAS or LAZ file look like feet, by its first points; "" where it says their unit."""
+    """Return a note if the heights of a LAS or LAZ file look like feet, by its first points; "" if it states their unit."""
     import laspy
 
     try:
@@ -94,7 +94,7 @@ def note_on_heights(path: Path) -> str:
 
 
 def fields_for(names: Sequence[str]) -> Any:
-    """Return what must be unpacked for points and some attributes, as laspy says it."""
+    """Return what must be unpacked for points and some attributes, in laspy's terms."""
     from laspy import DecompressionSelection as Fields
 
     fields = Fields.base() | Fields.Z | Fields.FLAGS

@@ -122,7 +122,7 @@ def _plain(name: str) -> str:
 
 
 def _shape_of(arrays: Any, name: str, path: Path) -> tuple[tuple[int, ...] | None, np.dtype[Any] | None]:
-    """Return shape and type of an array of an archive by its header; None where it is no array."""
+    """Return shape and type of an array of an archive by its header; None if it is no array."""
     if (inside := f"{name}.npy") not in arrays.zip.namelist():
         return None, None
     with arrays.zip.open(inside) as file:
@@ -132,14 +132,14 @@ def _shape_of(arrays: Any, name: str, path: Path) -> tuple[tuple[int, ...] | Non
 
 
 def metres_of_npz(path: Path) -> float | None:
-    """Return the metres of the unit that an NPZ file names, without reading its points; None where it names none."""
+    """Return the metres of the unit that an NPZ file names, without reading its points; None if it names none."""
     with suppress(Exception), path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return _metres(arrays, path)
     return None  # damaged: reading its points reports how
 
 
 def _member(arrays: Any, name: str, path: Path) -> np.ndarray | None:
-    """Return an array of an archive; None where it holds Python objects or is no array."""
+    """Return an array of an archive; None if it holds Python objects or is no array."""
     if (inside := f"{name}.npy") in arrays.zip.namelist():
         with arrays.zip.open(inside) as file:
             check_claim(path, file, arrays.zip.getinfo(inside).file_size)
@@ -172,7 +172,7 @@ def is_turned(shape: tuple[int, ...]) -> bool:
 
 
 def _content(array: np.ndarray | None, wanted: Sequence[str]) -> Content | None:
-    """Return x, y, z of an array with columns or with fields of these names; None where it has neither."""
+    """Return x, y, z of an array with columns or with fields of these names; None if it has neither."""
     if array is None or not holds_points(array.shape, array.dtype):
         return None
     if not (names := array.dtype.names):

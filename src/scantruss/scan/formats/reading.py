@@ -31,7 +31,7 @@ class Part:
 
     points: np.ndarray  #: (N, 3) [unit]
     unit: str
-    system: str  #: reference system, "" where the file does not say it
+    system: str  #: reference system, "" if the file does not say it
     count: int  #: points in the file
     left_out: dict[str, int]  #: points that the file marks as none, and points that each part of the selection left out
     held: str  #: what could have been selected, if nothing was
@@ -152,13 +152,13 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
 def joint_notes(
     files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of all files of a scan, "" where none says one, and the notes on them, each once."""
+    """Return the unit of all files of a scan, "" if none says one, and the notes on them, each once."""
     unit = next((unit for unit in units if unit), "")
     said: dict[str, None] = {}
     for file, own, words in zip(files, units, notes, strict=True):
         said.update(dict.fromkeys(words))
         if unit and not own:
-            said[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
+            said[f"{file.name} does not state its unit and is taken to be in {unit} like the others"] = None
     return unit, tuple(said)
 
 

@@ -61,7 +61,7 @@ def from_wkt(text: str) -> System:
 
 
 def _root(text: str) -> Node | None:
-    """Return the outermost keyword of a WKT text with what its brackets hold; None where there is none."""
+    """Return the outermost keyword of a WKT text with what its brackets hold; None if there is none."""
     stack: list[Node] = [("", [])]
     for token in _TOKEN.findall(text):
         held = stack[-1][1]

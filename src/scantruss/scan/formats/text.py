@@ -144,7 +144,7 @@ def is_plain(block: bytes, layout: Layout) -> bool:
 
 
 def _read_by_pyarrow(block: bytes, layout: Layout, columns: Sequence[int]) -> np.ndarray | None:
-    """Return some columns of lines with the same fields, (N, len(columns)); None where a line has others."""
+    """Return some columns of lines with the same fields, (N, len(columns)); None if a line has others."""
     if b"#" in block:
         return None
     import pyarrow

@@ -58,7 +58,7 @@ def align(
     Parameters
     ----------
     pose : (4, 4) from the frame of the first scan to that of the second
-    turn : 1, or -1 where the normals of the two views face opposite sides
+    turn : 1, or -1 if the normals of the two views face opposite sides
     reaches : distances within which places are paired, one after the other [scan unit]
     few : places of a scan that suffice
     rounds : most steps with one reach

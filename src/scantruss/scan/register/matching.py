@@ -31,7 +31,7 @@ class Candidate:
     """A pose that may bring a scan onto another."""
 
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
-    turn: float  #: 1, or -1 where the normals of the two views face opposite sides
+    turn: float  #: 1, or -1 if the normals of the two views face opposite sides
     support: int  #: pairs of similar places that agree with it
 
 
@@ -42,7 +42,7 @@ def find_candidates(
 
     Parameters
     ----------
-    turn : 1, or -1 where the normals of the two views are taken to face opposite sides
+    turn : 1, or -1 if the normals of the two views are taken to face opposite sides
     """
     features = first_features if turn > 0 else flip(first_features)
     pairs = _alike(features, second_features)

@@ -40,7 +40,7 @@ class Pair:
     first: int
     second: int
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
-    turn: float  #: 1, or -1 where the normals of the two face opposite sides
+    turn: float  #: 1, or -1 if the normals of the two face opposite sides
     fit: Fit
 
 

@@ -71,5 +71,5 @@ def pose_values(pose: np.ndarray) -> dict[str, Any]:
 
 
 def poses_for(names: Sequence[str], poses: dict[str, np.ndarray]) -> list[np.ndarray | None]:
-    """Return the pose of each scan, found by the name given or by its last part; None where there is none."""
+    """Return the pose of each scan, found by the name given or by its last part; None if there is none."""
     return [poses.get(name, poses.get(Path(name).name)) for name in names]

@@ -40,7 +40,7 @@ class PairFit:
     second: str
     overlap: float  #: share of the places of one scan that lie on the other, the larger of the two
     agreement: float  #: share of the places over the other scan that lie on it
-    residual: float | None  #: root of the mean squared distance of what agrees [scan unit]; None where nothing does
+    residual: float | None  #: root of the mean squared distance of what agrees [scan unit]; None if nothing does
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,7 @@ class Thinned:
     read: int  #: points that were taken
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
     boundary: int  #: points that stand for the boundary, the last of `points`
-    unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
+    unit: str = ""  #: of the coordinates; "" if neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
 
 
