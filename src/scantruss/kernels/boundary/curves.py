@@ -120,7 +120,7 @@ def slide(
 
 @kernel
 def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int, float, float]:
-    """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 where there is no curve."""
+    """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 if there is no curve."""
     best, curve, arc = np.inf, -1, 0.0
     for c in range(len(curves.total)):
         i, last = curves.start[c], curves.start[c + 1]

@@ -37,7 +37,7 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 @kernel
 def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
-    """Whether the directions to the neighbours of a sample leave a gap wider than `widest` [rad]; False where there are none.
+    """Whether the directions to the neighbours of a sample leave a gap wider than `widest` [rad]; False if there are none.
 
     widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the sample, each with a number that
     grows as its angle does.
@@ -104,7 +104,7 @@ def _block(
 
 @kernel
 def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
-    """For each sample from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
+    """For each sample from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 if there is none.
 
     Samples whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
     the middle of the widest free range, counted from `across(normal)`, less than a turn.
@@ -151,7 +151,7 @@ def sample_disc(surface: Surface, sample: int, direction: float, radius: float) 
 
 @kernel
 def _nearest_clear(cover: np.ndarray) -> int:
-    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS where there is none.
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS if there is none.
 
     cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
     """
@@ -334,7 +334,7 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
 
     Returns
     -------
-    at, gap : the first place and the steps to the second; gap 0 where there are none
+    at, gap : the first place and the steps to the second; gap 0 if there are none
     """
     count, longest = len(curve), _longest_step(curve)
     at, gap = 0, 0

@@ -55,7 +55,7 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
 
 @kernel
 def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
-    """Propose a node at the projection of a place onto the surface; False where the scan has no points there."""
+    """Propose a node at the projection of a place onto the surface; False if the scan has no points there."""
     sample = front.sample[front.tail[s]]
     if fit_patch(surface, patch, sample, place) < 3:
         return False
@@ -139,7 +139,7 @@ def has_room(front: Front) -> bool:
 
 @kernel
 def take_segment(front: Front) -> int:
-    """Next active segment of the queue, -1 where it is empty."""
+    """Next active segment of the queue, -1 if it is empty."""
     while front.count[FIRST] < front.count[LAST]:
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1

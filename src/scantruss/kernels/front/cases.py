@@ -247,7 +247,7 @@ def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, nea
 
 @kernel
 def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
-    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False where there is none.
+    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False if there is none.
 
     The search covers the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
     unmeshed side (Eq. 7). A region without points is doubled once; then the segment waits for a later round.
@@ -365,7 +365,7 @@ def new_node(
 
 @kernel
 def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
-    """Advance a segment by the six cases of Table 1; False where the case's triangle does not fit."""
+    """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
     near = near_nodes(surface, front, s, SEEN * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
     if case == TRIANGLE:

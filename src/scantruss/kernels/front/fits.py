@@ -86,7 +86,7 @@ def right_angle(front: Front, s: int) -> float:
 
 @kernel
 def _sector(front: Front, leaving: int, q: int) -> float:
-    """Angle at the tail of a segment, from it to node q; 9 where q is outside the unmeshed area there, less than `margin` is 0."""
+    """Angle at the tail of a segment, from it to node q; 9 if q is outside the unmeshed area there, less than `margin` is 0."""
     p = front.tail[leaving]
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
@@ -99,7 +99,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
 
 @kernel
 def passage_of(front: Front, s: int, p: int) -> int:
-    """Segment that leaves node p where the triangle of s and p meets the front there; -1 where they do not meet properly."""
+    """Segment that leaves node p where the triangle of s and p meets the front there; -1 if they do not meet properly."""
     a, b = front.tail[s], front.head[s]
     at = front.out[p]
     while at >= 0:
@@ -114,7 +114,7 @@ def passage_of(front: Front, s: int, p: int) -> int:
 def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: float, strict: float) -> tuple[bool, int]:
     """Whether the triangle of segment s and node p may be attached; and where it meets the front at p (see `attach`).
 
-    It must lie on the unmeshed side (Eq. 7), face as the surface does, stay within the sectors of the front at its three nodes,
+    It must lie on the unmeshed side (Eq. 7), face the same side as the surface, stay within the sectors of the front at its three nodes,
     repeat no edge, cross no segment of the front (Eqs. 8, 9) and hold no node of it. With `strict` 1 it must also keep clear of
     the front, with 0 it only has to be valid.
     """

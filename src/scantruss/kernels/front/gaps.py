@@ -43,7 +43,7 @@ def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
 
 @kernel
 def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
-    """Fill a closed loop of front segments with triangles of least total cost; returns their number, 0 where none fit.
+    """Fill a closed loop of front segments with triangles of least total cost; returns their number, 0 if none fit.
 
     New edges must not exist yet, so the grid stays manifold.
     """

@@ -31,7 +31,7 @@ def own_places(
     own: np.ndarray,
     deep: np.ndarray,
 ) -> None:
-    """The place of its own scan nearest to each point, -1 where there is none, and how deep inside the scan that is."""
+    """The place of its own scan nearest to each point, -1 if there is none, and how deep inside the scan that is."""
     for p in range(len(points)):
         own[p] = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)
         deep[p] = depth[own[p]] if own[p] >= 0 else 0.0
@@ -63,7 +63,7 @@ def add_layer(
     places to depth : of the other scan. back : (4, 4) from the frame of the points to that of the other scan.
     first : 1 if the other scan wins ties in depth. beside, off : largest distance of the nearest place along and across the
     surface. full : depth beyond which a scan has full weight. shift (N, 3), weight (N,) : sums, added to, in the frame of
-    the points. kept (N,) : 0 where the other scan sees that spot better.
+    the points. kept (N,) : 0 if the other scan sees that spot better.
     """
     for p in range(len(points)):
         if own[p] < 0:

@@ -105,7 +105,7 @@ def nearest_places(
     begin: int,
     end: int,
 ) -> None:
-    """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 where there is none; boxes : of the places."""
+    """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 if there is none; boxes : of the places."""
     for p in range(begin, end):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         number[p] = nearest(boxes, places, x, y, z, 0.5 * reach)  # most points have one

@@ -128,7 +128,7 @@ def find_sheets(
     ----------
     like : (N,) bool, points that the sheet may consist of
     reach : (N,) distance of each point to its eighth neighbour [scan unit]
-    company : (P, COMPANY) int64, filled with the points of the sheet, -1 where there are none
+    company : (P, COMPANY) int64, filled with the points of the sheet, -1 if there are none
     at_edge : (P,) bool, filled: on one side of that sheet no living point lies beyond the point
     """
     stack, found, away = (

@@ -13,7 +13,7 @@ from ..geometry.vectors import Vector, cross, dot, row, subtract
 
 @kernel
 def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
-    """The first of the places (S, 3) within reach of each point (N, 3), -1 where there is none; boxes : of the places."""
+    """The first of the places (S, 3) within reach of each point (N, 3), -1 if there is none; boxes : of the places."""
     found = np.empty(256, np.int64)
     for p in range(len(points)):
         owner[p] = -1
