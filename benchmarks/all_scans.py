@@ -116,7 +116,7 @@ def page_section(command: str, data: Path | None) -> Section | None:
     finding = f"**{wrong}** of {len(rows)} rows are wrong, {len(bad) - wrong} refused."
     lost = tuple(" ".join(row.strip("| ").split("|")) for row in bad if "right: refused" not in row)
     text = "\n\n".join([NOTE, "\n".join([HEADER, *bad, *(row for row in rows if row not in bad)])])
-    return Section("All twins and real scans", command, finding, text, lost)
+    return Section("Simulated and real scans", command, finding, text, lost)
 
 
 def main() -> int:

@@ -17,7 +17,7 @@ ORDER = (
     "Speed",
     "Table 2: the examples of the paper",
     "Table 3: by way of a surface",
-    "All twins and real scans",
+    "Simulated and real scans",
     "Random surfaces",
 )
 HEAD = """\
@@ -60,7 +60,7 @@ def with_section(page: str, section: Section) -> str:
     sections.pop("", None)
     lost = _parts(sections.get(LOST, ""), "###")
     lost.pop("", None)
-    lost[section.title] = "\n".join(f"- {loss}" for loss in section.losses) or "Nothing of what is measured there."
+    lost[section.title] = "\n".join(f"- {loss}" for loss in section.losses) or "Nothing."
     sections[LOST] = "\n\n".join(f"### {title}\n\n{lost[title]}" for title in _in_order(lost))
     sections[section.title] = section.body()
     return "\n\n".join([HEAD, *(f"## {title}\n\n{sections[title]}" for title in _in_order(sections))]) + "\n"

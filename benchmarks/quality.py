@@ -19,8 +19,8 @@ PAPER = {  # mean G, std G, std L / mean L
 }
 NOTE = """\
 Mean and standard deviation of G, std L / mean L, mean length in desired lengths, share of inner nodes with six members,
-largest distance of the true rim from the grid's rim in members, mean distance of the nodes from the true surface in
-standard deviations of the noise. The paper's shells are not public: the clouds are made alike."""
+largest distance of the true boundary from that of the grid in members, mean distance of the nodes from the true surface in
+standard deviations of the noise. The paper's shells are not public, so the clouds are similar ones."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def examples() -> list[Example]:
 
 def table(rows: list[Example]) -> str:
     """Return the table, the paper's own figures beside ours."""
-    head = "| example | by | mean G | std G | CV | length | six | rim | distance | nodes |"
+    head = "| example | by | mean G | std G | CV | length | six | boundary | distance | nodes |"
     lines = [head, "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"]
     for name, (mean, spread, variation) in PAPER.items():
         lines.append(f"| {name} | the paper, its own shell | {mean} | {spread} | {variation} | | | | | |")

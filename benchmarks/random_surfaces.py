@@ -72,14 +72,14 @@ def try_seeds(seeds: Iterable[int], method: str, effort: str) -> Iterator[Outcom
 
 HEADER = (
     "| by | seeds | right | wrong | refused | mean G: mean, least | min G: least | CV: mean, most | angles | six |"
-    " length | distance | rim |\n" + "| --- |" + " ---: |" * 12
+    " length | distance | boundary |\n" + "| --- |" + " ---: |" * 12
 )
 NOTE = """\
-Smooth random heights over random outlines with concave rims, 0 to 4 holes, necks and gaps of three members or more,
+Smooth random heights over random areas with concave boundaries, 0 to 4 holes, necks and gaps of three members or more,
 20 to 120 points a member squared and up to four times denser at one end, noise up to a tenth of a member, any pose and unit.
 Right: the topology of the surface, and the certificate passed. Length: mean length in desired lengths, least and most.
-Distance: mean distance of the nodes from the true surface in standard deviations of the noise, the mean and the most of
-all seeds with noise. Rim: largest distance of the true rim from the grid's rim, in members."""
+Distance: mean distance of the nodes from the true surface in standard deviations of the noise, mean and largest of all seeds with
+noise. Boundary: largest distance of the true boundary from that of the grid, in members."""
 
 
 def row(name: str, outcomes: list[Outcome]) -> str:

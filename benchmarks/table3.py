@@ -128,9 +128,9 @@ ratios are of its own fitting code; a library of today fits far faster."""
 def section(command: str) -> Section:
     """Return the section of docs/numbers.md."""
     rows = table3()
-    finding = f"By way of a surface the same takes **{statistics.median(row.ratio for row in rows):.1f} times** as long (median of four)."
+    finding = f"Through a surface the same takes **{statistics.median(row.ratio for row in rows):.1f} times** as long (median of four)."
     lost = tuple(
-        f"By way of a B-spline surface, {row.name}: {row.ratio:.2f} of our time." for row in rows if row.ratio < 1
+        f"Through a B-spline surface, {row.name}: {row.ratio:.2f} of our time." for row in rows if row.ratio < 1
     )
     text = NOTE + "\n\n" + "\n".join([HEADER, *(row.row() for row in rows)])
     return Section("Table 3: by way of a surface", command, finding, text, lost)

@@ -15,7 +15,7 @@ def main(folder: Path = Path()) -> st.Grid:
     surface = st.sample_surface(cloud, settings)  # samples with normals
     surface, boundary = st.find_boundary(surface, settings)  # one loop; the corners of the ears become nodes
     boundary, constraints = st.find_constraints(surface, boundary, settings)  # no fixed nodes, no lines
-    fields = st.orientation_fields(surface, boundary, settings)  # rows for the front to come to
+    fields = st.orientation_fields(surface, boundary, settings)  # candidate nodes for the front
     fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
     grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)  # the best, with its certificate
     print(f"before {grid.before}")

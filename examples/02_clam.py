@@ -1,4 +1,4 @@
-"""Example 2 of the paper: a deep clam valve with a steep margin, by the paper to the letter and by default."""
+"""Example 2 of the paper: a deep clam valve with a steep margin, by the paper to the letter and by the default method."""
 
 from pathlib import Path
 

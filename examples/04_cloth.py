@@ -9,7 +9,7 @@ import scantruss as st
 
 
 def main(folder: Path = Path()) -> st.Grid:
-    """Make the grid and tell how far its nodes are from the four corners and from the true surface."""
+    """Make the grid and print how far its nodes are from the four corners and from the true surface."""
     plaster = make("cloth")
     grid = st.grid_from_points(plaster.points, st.Settings(length=2.75, unit="mm"))
     nodes = grid.nodes + grid.origin

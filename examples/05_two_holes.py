@@ -1,4 +1,4 @@
-"""Example 5 of the paper: the valve with two holes; from the outer rim or from all rims (Fig. 5)."""
+"""Example 5 of the paper: the valve with two holes; from the external boundary or from all boundaries (Fig. 5)."""
 
 from pathlib import Path
 

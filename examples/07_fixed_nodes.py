@@ -1,4 +1,4 @@
-"""Example 7 of the paper: three fixed nodes for supports, the first of them close to the rim."""
+"""Example 7 of the paper: three fixed nodes for supports, the first of them close to the boundary."""
 
 from pathlib import Path
 

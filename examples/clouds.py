@@ -1,4 +1,4 @@
-"""Scans for the examples, made here: shells like those of the paper, given by an outline in plan and a height over it [mm]."""
+"""Scans for the examples, generated: shells like those of the paper, given by a polygon in plan and a height above it [mm]."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NOISE = 0.02  # standard deviation of each coordinate [mm]
 
 @dataclass(frozen=True)
 class Shell:
-    """A shell: where it is in plan, how high it is there, and the places that matter."""
+    """A shell: its polygon in plan, its height, and the places that matter."""
 
     outline: Array  #: (K, 2) corners of its polygon in plan, anticlockwise
     height: Callable[[Array, Array], Array]
@@ -26,7 +26,7 @@ class Shell:
 
 
 def make(name: str, count: int = 120_000, seed: int = 0) -> Shell:
-    """Return a shell with its scan: points at random, as many for each square millimetre of the surface."""
+    """Return a shell with its scan: random points with a constant density per area of the surface."""
     shell = SHELLS[name]()
     rng = np.random.default_rng(seed)
     low, high = shell.outline.min(axis=0), shell.outline.max(axis=0)

@@ -65,7 +65,7 @@ def test_grid_without_a_length_takes_the_one_that_info_suggests_and_says_so(plac
     row = next(line for line in said.splitlines() if line.split()[:1] == [wished])
     assert row.rstrip().endswith(("passes", "passes with warnings"))
     assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick"]) == 0
-    assert f"no --length is given; {wished} is taken, as scantruss info suggests" in capsys.readouterr().err
+    assert f"no --length is given; using {wished}, as scantruss info suggests" in capsys.readouterr().err
     assert st.read_grid("a.json").settings.length == float(wished)
 
 

@@ -172,7 +172,7 @@ def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong():
         runs.Row(other, "gone", "missing", "", {}, {}),
     ]
     assert tables.findings(rows)[0] == (
-        "Right topology: ScanTruss normal on **2 of 2** clouds; of 2 other ways that are here 1 wherever it is, as far as they apply."
+        "Right topology: ScanTruss normal on **2 of 2** clouds; of 2 other programs 1 on every cloud to which it applies."
     )
 
 
@@ -188,7 +188,7 @@ def test_losses_name_the_way_that_is_better_and_only_where_it_is_right():
         text.startswith("time in neighbour searches: fast is better than ScanTruss quick on 1 of 1") for text in lost
     )
     assert not any("wrong" in text.split(":")[1] for text in lost) and not any(
-        "rim" in text.split(":")[0] for text in lost
+        "boundary" in text.split(":")[0] for text in lost
     )
     assert "| ScanTruss normal | 1 of 1 | 1.0 |" in tables.summary(
         rows
@@ -216,7 +216,7 @@ def test_a_section_is_written_anew_and_the_others_stay():
 def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
     def measured(options, command):
         assert options.data == str(tmp_path)
-        return page.Section("All twins and real scans", command, "**1**", "rows", ())
+        return page.Section("Simulated and real scans", command, "**1**", "rows", ())
 
     monkeypatch.setitem(benchmarks_main.MAKERS, "scans", measured)
     file = tmp_path / "page.md"

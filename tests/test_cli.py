@@ -449,8 +449,8 @@ def test_print_makes_a_watertight_solid_of_a_saved_grid(ready, capsys):
     ("unit", "name", "words"),
     [
         ("", "a.3mf", "the unit of the grid is not known, so the model says mm"),
-        ("", "a.stl", "STL holds no unit and printers take it for mm; its numbers are of a unit that is not known"),
-        ("m", "a.stl", "STL holds no unit and printers take it for mm; its numbers are m"),
+        ("", "a.stl", "STL holds no unit and printers assume mm; its numbers are of a unit that is not known"),
+        ("m", "a.stl", "STL holds no unit and printers assume mm; its numbers are m"),
         ("m", "a.3mf", ""),
         ("mm", "a.stl", ""),
     ],

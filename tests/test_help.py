@@ -16,14 +16,14 @@ def test_the_options_of_a_grid_come_in_three_parts_each_once(capsys):
     assert main(["grid", "--help"]) == 0
     said = capsys.readouterr().out
     parts = {
-        "every day": said[said.index("EVERY DAY:") : said.index("EXPERT:")],
+        "everyday": said[said.index("EVERYDAY:") : said.index("EXPERT:")],
         "expert": said[said.index("EXPERT:") : said.index("PAPER:")],
         "paper": said[said.index("PAPER:") :],
     }
     for spec in fields(st.Settings):
         if spec.name == "length_field":
             continue
-        where = "every day" if spec.name in EVERY_DAY else "paper" if spec.name in PAPER_ONLY else "expert"
+        where = "everyday" if spec.name in EVERY_DAY else "paper" if spec.name in PAPER_ONLY else "expert"
         option = f"  {option_of(spec.name)}"
         assert [name for name, text in parts.items() if f"\n{option} " in text or f"\n{option}," in text] == [where]
 

@@ -282,7 +282,7 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
     ("words", "line"),
     [
         (("--length", "5,x"), "needs a number"),
-        (("--length", ","), "several with commas"),
+        (("--length", ","), "several, separated by commas"),
         (("--length", "5,5"), "named twice"),
         (("--length", "5", "--effort", "quick,hard"), "effort must be one of"),
         (("--effort", "quick"), "--length is missing"),

@@ -118,7 +118,7 @@ def test_the_user_goes_before_the_file(tmp_path: Path) -> None:
     (tmp_path / "a.xyz").write_bytes(text(P))
     cloud = read_points(tmp_path / "a.xyz", unit="m", selection=Selection(z_unit="foot"))
     assert np.allclose(cloud.points + cloud.origin, P * [1, 1, 0.3048], atol=1e-9)
-    with pytest.raises(InputError, match="does not say the unit of x and y"):
+    with pytest.raises(InputError, match="does not state the unit of x and y"):
         read_points(tmp_path / "a.xyz", selection=Selection(z_unit="foot"))
 
 
@@ -287,7 +287,7 @@ def test_files_of_different_units_are_brought_to_that_of_the_first(tmp_path: Pat
     assert "b.ply is in mm and is brought to m, the unit of the first file" in cloud.notes
     part = read_points(f"{tmp_path}/*.ply", selection=Selection(crop=("box:0,0,20,30",)))
     assert len(part.points) == 2 * (P[:, 0] <= 20).sum()  # what is cropped is in the unit of the result
-    assert any(note.startswith("c.xyz does not say its unit") for note in cloud.notes)
+    assert any(note.startswith("c.xyz does not state its unit") for note in cloud.notes)
 
 
 def test_files_of_different_reference_systems_are_refused(tmp_path: Path) -> None:

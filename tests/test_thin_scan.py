@@ -139,7 +139,7 @@ def test_what_has_no_lengths_or_no_common_system_is_refused_before_it_is_read(mo
     with pytest.raises(InputError, match="unit must be one of"):
         thin_scan("a.las", S, unit="ell")
     Path("a.xyz").write_bytes(text(P))
-    with pytest.raises(InputError, match="does not say the unit of x and y"):
+    with pytest.raises(InputError, match="does not state the unit of x and y"):
         thin_scan("a.xyz", S, selection=Selection(z_unit="foot"))
 
 

@@ -18,28 +18,27 @@ QUICK_LIMIT, QUICK_REPEATS = 30.0, 1
 QUICK_CLOUDS = (Cloud("scallop", 100_000, 1_000, 0.3), Cloud("great_court", 100_000, 1_000, 0.0))
 QUICK_WAYS = tuple(way for way in WAYS if way.name != "ScanTruss best")
 NOTE = """\
-Each run is a process of its own with a time limit, on points in memory. The clock runs inside, without imports and reading;
-a first call under 5 s is repeated thrice (by --quick once) and the median of these counts, ours and theirs alike; ours is
-always repeated, so that no first call that compiles counts (the first run ever is in the section Speed). Conversions into
-the types of a package are its own time, as are thinning and normals. Memory: what the work and the points added to the
-process at its peak (/proc), in MB, the programs themselves not counted. Searches: seconds over those of the neighbour
-search (scipy cKDTree, 16 neighbours, two threads) in the same process just after; times are compared by these, as rows may
-be kept from a run under another load. To ours: searches over those of ScanTruss normal, median of the clouds. Length: mean
-member in desired ones. Angle: the smallest. Six: share of inner nodes with six members. Off: mean distance of the nodes
-from the true surface, in members. Rim: the largest distance between the rim of the grid and the true one, either way, in
-members. Bare: share of the scan farther than half a member from the grid. Right: manifold, orientable, with the loops,
-pieces and Euler number of the truth. Noise is the standard deviation of each coordinate, in medians of the distance to the
-nearest neighbour. Out of time or not run (out of time already on an easier cloud of the same surface): the limit was not
-enough. No peer is shipped with ScanTruss or imported by it; they are only run, here. On Linux Open3D needs libusb-1.0 of
-the system; without it all ways by Open3D are missing."""
+Each run is a separate process with a time limit, on points in memory. Only the work is timed, without imports and reading. A
+first call under 5 s is repeated three times (with --quick once) and the median counts, for every program. Ours is always
+repeated, so that no call that compiles counts (the first run ever is in the section Speed). Conversions into the types of a
+package count as its time, as do thinning and normals. Memory: what the work and the points add to the process at its peak
+(/proc), in MB, without the program itself. Searches: seconds over those of a neighbour search (scipy cKDTree, 16 neighbours, two
+threads) in the same process just after; times are compared by these, as rows may come from runs under different load. To ours:
+searches over those of ScanTruss normal, median of the clouds. Length: mean member length over the desired one. Angle: the
+smallest. Six: share of inner nodes with six members. Off: mean distance of the nodes from the true surface, in members. Boundary:
+largest distance between the boundary of the grid and the true one, either way, in members. Bare: share of the scan farther than
+half a member from the grid. Right: manifold, orientable, with the loops, pieces and Euler number of the true surface. Noise is
+the standard deviation of each coordinate, over the median distance to the nearest neighbour. Out of time or not run (out of time
+already on an easier cloud of the same surface): the limit was not enough. The other programs are only run here; ScanTruss neither
+ships nor imports them. On Linux Open3D needs libusb-1.0 of the system; without it all its rows are missing."""
 
 
 def section(rows: Sequence[Row], command: str, folder: Path = FILE.parent) -> Section:
     """Return the section of some rows; the complete tables and the plots are written beside the page."""
     names = draw(rows, folder)
     whole = [f"### {group[0].cloud.title}\n\n{tables.full_table(group)}" for group in tables.by_cloud(rows)]
-    told = f"## What each was told\n\n{tables.ways_table()}"
-    intro = "# Against everyone, cloud by cloud\n\nWhat the columns mean stands in [numbers.md](numbers.md)."
+    told = f"## Parameters of each program\n\n{tables.ways_table()}"
+    intro = "# Against everyone, cloud by cloud\n\nThe columns are explained in [numbers.md](numbers.md)."
     (folder / "peers.md").write_text(
         "\n\n".join([intro, told, "## Every run", *whole]) + "\n", encoding="utf-8", newline="\n"
     )
@@ -60,8 +59,8 @@ def section(rows: Sequence[Row], command: str, folder: Path = FILE.parent) -> Se
             "Aims:\n\n" + "\n".join(met),
             NOTE,
             clouds,
-            "Every run, what each way was told, and licences: [peers.md](peers.md).",
-            f"![seconds and CV of all grids]({names[0]})\n\n![rim and CV of all grids]({names[1]})",
+            "Every run, the parameters of each program, and licences: [peers.md](peers.md).",
+            f"![seconds and CV of all grids]({names[0]})\n\n![boundary and CV of all grids]({names[1]})",
             *parts,
         )
         if part

@@ -42,7 +42,7 @@ MEASURES = (
     Measure("angle_min", "smallest angle", NORMAL, True, ".0f", 1.0),
     Measure("valence6", "share of inner nodes with six members", NORMAL, True, ".2f", 1e-2),
     Measure("deviation", "mean distance of the nodes from the true surface, members", NORMAL, False, ".4f", 1e-4),
-    Measure("rim", "rim off the true one, members", NORMAL, False, ".2f", 1e-2),
+    Measure("rim", "boundary off the true one, members", NORMAL, False, ".2f", 1e-2),
     Measure("uncovered", "share of the scan not covered", NORMAL, False, ".4f", 1e-4),
 )
 
@@ -126,12 +126,12 @@ def _five_times(group: list[Row]) -> bool | None:
 
 
 AIMS = (
-    ("`quick` no slower than the fastest way that is right, at better CV, G and rim", _quick_first),
+    ("`quick` no slower than the fastest way that is right, at better CV, G and boundary", _quick_first),
     (
-        "`normal` at most half the time of Instant Meshes on the points, the rim at most a tenth as far off",
+        "`normal` at most half the time of Instant Meshes on the points, the boundary at most a tenth as far off",
         _half_of_instant,
     ),
-    ("`normal` 5 x faster than any way that keeps the rim within 0.1 member and reaches our G", _five_times),
+    ("`normal` 5 x faster than any way that keeps the boundary within 0.1 member and reaches our G", _five_times),
 )
 
 
@@ -162,8 +162,8 @@ def findings(rows: Sequence[Row]) -> list[str]:
     if any(row.way == NORMAL for row in rows):
         right = sum(row.right for row in rows if row.way == NORMAL)
         found.append(
-            f"Right topology: {NORMAL} on **{right} of {len(groups)}** clouds; of {len(rights)} other ways that are here"
-            f" {sum(rights)} wherever it is, as far as they apply."
+            f"Right topology: {NORMAL} on **{right} of {len(groups)}** clouds; of {len(rights)} other programs"
+            f" {sum(rights)} on every cloud to which it applies."
         )
     for measure in MEASURES:
         pairs = []
@@ -195,7 +195,7 @@ COLUMNS = (
     ("angle_min", "angle", ".0f"),
     ("valence6", "six", ".2f"),
     ("deviation", "off", ".4f"),
-    ("rim", "rim", ".2f"),
+    ("rim", "boundary", ".2f"),
     ("uncovered", "bare", ".4f"),
 )
 
@@ -260,7 +260,7 @@ def _median(values: Iterable[float], show: str) -> str:
 
 def ways_table() -> str:
     """Return what each way was told, and its licence."""
-    lines = ["| way | licence | told |", "| --- | --- | --- |"]
+    lines = ["| way | licence | parameters |", "| --- | --- | --- |"]
     return "\n".join([*lines, *(f"| {w.name} | {w.licence} | {w.told} |" for w in WAYS)])
 
 

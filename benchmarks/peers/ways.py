@@ -122,7 +122,7 @@ WAYS = (
     ),
     Way(
         "gmsh", ("gmsh", "pymeshlab"), ("gmsh", "pymeshlab"), "GPL-2; GPL-3",
-        f"{MENDED}; classifySurfaces with the rim cut at 45 degrees, createGeometry, Frontal-Delaunay, size the member",
+        f"{MENDED}; classifySurfaces with the boundary cut at 45 degrees, createGeometry, Frontal-Delaunay, size the member",
         partial(chain, surfaces.meshlab, remeshers.gmsh_frontal),
     ),
     Way(
@@ -132,12 +132,12 @@ WAYS = (
     ),
     Way(
         "Instant Meshes on a mesh", ("pyinstantmeshes", "pymeshlab"), ("pyinstantmeshes", "pymeshlab"), "BSD-3; GPL-3",
-        f"{MENDED}; triangles, intrinsic, aligned to the rim, no smoothing steps",
+        f"{MENDED}; triangles, intrinsic, aligned to the boundary, no smoothing steps",
         partial(chain, surfaces.meshlab, remeshers.instant_on_mesh),
     ),
     Way(
         "MeshLib", ("meshlib",), ("meshlib.mrmeshpy", "meshlib.mrmeshnumpy"), "its own, not for commerce",
-        "grid sampling of a cell, triangulatePointCloud by default; remesh to the member, projected, 5 relaxations, rim shift 1/20",
+        "grid sampling of a cell, triangulatePointCloud by default; remesh to the member, projected, 5 relaxations, boundary shift 1/20",
         alone.meshlib,
     ),
     Way(

@@ -9,7 +9,7 @@ import numpy as np
 from ..settings import Settings
 
 CURVE_STEP = 0.05  # distance between the points of a boundary curve [member lengths]
-# the scan rounds off what is nearer to a corner than this; it says nothing about where the corner is [member lengths]
+# points nearer to a corner than this are rounded off and do not help to locate it [member lengths]
 ROUNDED_OFF = 0.15
 CUT = 0.4  # the same distance where the disc has cut off a sharp re-entrant corner [member lengths]
 CORNER_REACH = 2.0  # length of the curve on each side from which the place of a corner is found [member lengths]
@@ -17,8 +17,8 @@ SHORTEST = 0.6  # shortest such length, where another corner is near [member len
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT = (0.1, 0.8)
 CORNER_SPACING = 0.5  # corners closer together than this are one [member lengths]
-STRAIGHT = 6.0  # a side counts as curved if a curve leaves this many times less error than a line
-BENT = 1.3  # largest ratio between the turn of a corner as seen and the turn between quadratics fitted to its sides
+STRAIGHT = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
+BENT = 1.3  # largest ratio of the angle of a corner to the angle between quadratics fitted to its sides
 SHARPER = 1.7  # a corner turns at least this many times more than the median of its loop
 WOBBLY = 1.8  # a corner turns at least this many times more than the upper quartile of its loop
 SHARP = 70.0  # a turn this large is a corner in any case [degree]
@@ -27,9 +27,9 @@ SHARP = 70.0  # a turn this large is a corner in any case [degree]
 def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return where a closed curve has corners and their exact places.
 
-    A corner may be where lines fitted to the curve before and after a place differ most in direction. It is one if quadratics do so
-    too: they tell a corner from a bend, lines are not misled by a ragged boundary. On a loop that turns everywhere, as a ragged one
-    does, a corner must turn more than the rest. Its place is where the two sides meet.
+    A corner is sought where lines fitted to the curve before and after a point differ most in direction. Quadratics must confirm
+    it: they tell a corner from a bend, while lines are not misled by a ragged boundary. On a ragged loop, which turns everywhere,
+    a corner must turn more than the rest. It lies where its two sides meet.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     settings : Settings
         `corner_angle`, `length`.
     coarser : float
-        How many times larger parts of the curve to look at: more where few points tell its course.
+        Factor on the lengths of curve that are examined; larger where points are sparse.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
 
 
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
-    """Places (P,) of a closed curve that turn most within `CORNER_SPACING` to both sides, and by more than enough."""
+    """Points (P,) of a closed curve that turn most within `CORNER_SPACING` to both sides, and by more than `enough`."""
     half = round(CORNER_SPACING / CURVE_STEP)
     around = np.concatenate([turn[-half:], turn, turn[:half]])
     highest = np.lib.stride_tricks.sliding_window_view(around, 2 * half + 1).max(axis=1)
@@ -71,7 +71,7 @@ def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
 
 
 def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]]:
-    """Steps of the curve before and after each peak that tell its place: up to the next one."""
+    """Steps of the curve before and after each peak that help to locate the corner: up to the next peak."""
     reaches = []
     for k in range(len(peaks)):
         rooms = (peaks[k] - peaks[k - 1], peaks[(k + 1) % len(peaks)] - peaks[k])
@@ -81,12 +81,12 @@ def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]
 
 
 def _reach(room: int, count: int, step: float) -> int:
-    """Steps of one side with so much room to the next corner, on a curve of so many steps."""
+    """Steps to fit on one side, given the room to the next corner and the number of steps of the curve."""
     return min(max(room - round(ROUNDED_OFF / step), round(SHORTEST / step)), round(CORNER_REACH / step), count // 2)
 
 
 def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of corners (angle, point of the curve, place) nearer to each other than a distance the sharpest, in order."""
+    """The sharpest of corners (angle, point of the curve, place) that lie closer together than a distance, in order."""
     kept: list[tuple[int, np.ndarray]] = []
     for _, i, place in sorted(found, key=lambda corner: (-corner[0], corner[1])):
         if all(np.linalg.norm(place - other) > distance for _, other in kept):
@@ -112,7 +112,7 @@ def _turns(curve: np.ndarray, step: float) -> np.ndarray:
 def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) -> tuple[np.ndarray, float]:
     """Place where the two sides meet near a point of the curve, and the angle between them there [degree].
 
-    Both come from lines where a side is straight; the angle is at most `BENT` times that between quadratics, which tell a bend.
+    Straight sides are fitted by lines. The angle is at most `BENT` times that between quadratics, so that a bend is no corner.
     """
     half = round(CORNER_SPACING / CURVE_STEP)
     centre = at
@@ -124,7 +124,7 @@ def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) 
         place = _meeting(sides[0][0], sides[1][0])
         window = np.arange(at - half, at + half + 1) % len(curve)
         away = ((curve[window] - place) ** 2).sum(axis=1)
-        nearest = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # of two alike the first
+        nearest = int(window[np.flatnonzero(away <= away.min() * (1 + 1e-6))[0]])  # the first of equals
         if nearest == centre:
             break
         centre = nearest
@@ -139,7 +139,7 @@ def _cosine(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _side(curve: np.ndarray, at: int, offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """The curve at some steps before or after a place: the better of line and quadratic, and the quadratic.
+    """Fits to the curve at some steps before or after a point: the better of line and quadratic, and the quadratic.
 
     Returns
     -------
@@ -155,7 +155,7 @@ def _side(curve: np.ndarray, at: int, offsets: tuple[int, ...]) -> tuple[np.ndar
 
 @lru_cache(maxsize=256)
 def _fits(offsets: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Least-squares fits at some steps (K,): the steps, terms (K, 3), and what takes places to the coefficients, (3, K) each."""
+    """Least-squares fits at some steps (K,): the steps, terms (K, 3), and the matrices from points to coefficients, (3, K) each."""
     steps = np.array(offsets)
     terms = np.vander(steps.astype(float), 3, increasing=True)
     to_line = np.zeros((3, len(steps)))
@@ -173,7 +173,7 @@ def _meeting(before: np.ndarray, after: np.ndarray) -> np.ndarray:
         room = aa * bb - ab * ab
         if room > 1e-12 * aa * bb:
             change = (bb * ag - ab * bg) / room, (aa * bg - ab * ag) / room
-        else:  # parallel: half the way each
+        else:  # parallel: each goes half the way
             change = 0.5 * ag / max(aa, 1e-300), 0.5 * bg / max(bb, 1e-300)
         s, t = (min(max(p + c, -0.6 / CURVE_STEP), 0.6 / CURVE_STEP) for p, c in zip((s, t), change, strict=True))
         if max(map(abs, change)) < 1e-9:

@@ -21,7 +21,7 @@ def length_around(turns: np.ndarray) -> float:
 
 
 def smooth_turns(turns: np.ndarray) -> np.ndarray:
-    """A closed polyline with half its zigzag."""
+    """A closed polyline with its zigzag halved."""
     return 0.5 * turns + 0.25 * (np.roll(turns, 1, axis=0) + np.roll(turns, -1, axis=0))
 
 
@@ -48,7 +48,7 @@ def outward(surface: Surface, curve: np.ndarray) -> np.ndarray:
 def room_across(curve: np.ndarray, reach: float, step: float) -> np.ndarray:
     """Distance (M,) from each place of a closed curve (M, 3) of steps `step` to another part of it, at most `reach`.
 
-    Another part is one more than three times `reach` away along the curve: nearer ones are bends, or were cut off as spikes.
+    Parts within three times `reach` along the curve do not count: they are bends, or spikes already cut off.
     """
     room = np.full(len(curve), reach)
     kernels.room_across(curve, round(3.0 * reach / step), room)
@@ -126,7 +126,7 @@ def _smooth_inside(part: np.ndarray, half: int) -> np.ndarray:
 
 
 def _filtered(places: np.ndarray, half: int) -> np.ndarray:
-    """Local quadratics at each place (M, 3) that has `half` others before and behind it."""
+    """Local quadratics at each place (M, 3) that has `half` others before and after it."""
     filter_ = _quadratic(half)
     return np.stack([np.convolve(places[:, c], filter_, "valid") for c in range(3)], axis=1)
 
@@ -142,7 +142,7 @@ def _quadratic(half: int) -> np.ndarray:
 
 
 def _drop_backsteps(part: np.ndarray) -> np.ndarray:
-    """Leave out places next to the ends that the exact corner has overtaken."""
+    """Drop points next to the ends that lie beyond the exact corner."""
     keep = np.ones(len(part), bool)
     for end, order in ((0, range(1, len(part) - 1)), (len(part) - 1, range(len(part) - 2, 0, -1))):
         for i in order:

@@ -32,7 +32,7 @@ OPEN = 0.6  # share of a loop that must have room for a disc outside
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
 BACK = 16  # a boundary point touched again within this many steps was never left
-PLACES_PER_THREAD = 500  # fewest places of a loop worth a thread of their own
+PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,7 @@ class Loop:
     external: bool  #: the outer boundary of its piece; False: a hole
     length: float  #: [scan unit]
     piece: int  #: number of the piece of the cloud it bounds
-    desired: np.ndarray | None = (
-        None  #: (M,) desired length at each point, in lengths; None where it is the same for all
-    )
+    desired: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None if it is the same for all
     line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
 
     @property
@@ -110,7 +108,7 @@ def find_boundary(
 ) -> tuple[SurfaceSamples, Boundary]:
     """Return the ordered boundary loops of a scan (Sec. 3.3), and its samples with small holes closed (Sec. 3.6).
 
-    What was found last is kept as long as the samples live.
+    The last result is cached for as long as the samples exist.
 
     Parameters
     ----------
@@ -124,7 +122,7 @@ def find_boundary(
     Returns
     -------
     samples : SurfaceSamples
-        Those given, with made-up ones over the holes that are closed.
+        Those given, with generated ones over the holes that are closed.
     boundary : Boundary
         External loops first, each piece's longest loop being external; empty for a closed surface.
 
@@ -145,7 +143,7 @@ def find_boundary(
             settings,
             filled if filled is not samples else None,
             boundary,
-        )  # a key must not hold itself
+        )  # the value must not keep its key alive
     if progress:
         progress("boundary", 1.0)
     return kept[1] or samples, kept[2]
@@ -163,7 +161,7 @@ def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSa
 
 
 def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
-    """All loops but those of small holes, none of them external yet."""
+    """All loops except those of small gaps; none is marked external yet."""
     length = settings.length
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
     found: list[tuple[np.ndarray, int, SamplingBias]] = []
@@ -188,13 +186,13 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
 
 
 def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
-    """Whether a loop bounds a hole: any but the outer boundary of a piece, and that too where the piece is nearly closed."""
+    """Whether a loop bounds a hole: any internal loop, or the external loop of a nearly closed piece."""
     share = float((samples.piece == loop.piece).mean())
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
 
 def _over_filling(loop: Loop, samples: SurfaceSamples) -> bool:
-    """Whether a loop runs over what has been made up."""
+    """Whether a loop runs mostly over generated samples."""
     surface, over = samples.surface, 0
     sample = nearest_sample(surface, *loop.points[0].tolist())
     for place in loop.points:
@@ -204,7 +202,7 @@ def _over_filling(loop: Loop, samples: SurfaceSamples) -> bool:
 
 
 def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
-    """Return a loop with places (K, 3) on it, the ends of lines, among its points."""
+    """Return a loop with the ends of lines (K, 3) inserted among its points."""
     points, corner_at, line_at, desired = loop.points, loop.corner_at, loop.line_at, loop.desired
     for place in places:
         ahead = np.roll(points, -1, axis=0) - points
@@ -227,7 +225,7 @@ def boundary_points(
 ) -> list[np.ndarray]:
     """Return the boundary points (M, 3) along each loop of samples: what a disc slid from outside touches, in order.
 
-    Where the surface has only some of the points, the disc slides once more, against all points beside what it touched at first.
+    If the surface was thinned, the disc slides once more, against all points near those that it touched first.
     """
     along = [_places_along(surface, loop, step) for loop in loops]
     if samples.smooth:
@@ -246,7 +244,7 @@ def boundary_points(
 
 
 def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (M, 3) so far apart along a loop of samples, and the sample near each (M,)."""
+    """Return places (M, 3) one step apart along a loop of samples, and the sample near each (M,)."""
     turns = smooth_turns(surface.mean[loop])
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
     places = resample(turns, step)
@@ -255,14 +253,14 @@ def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.n
 
 
 def _in_order(touched: np.ndarray, step: float) -> np.ndarray:
-    """Return the points that go on along a loop, those that are hardly farther than the one before left out."""
+    """Return the points that advance along a loop, without those hardly beyond the one before."""
     touched = touched[_onwards(touched)]
     forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
     return touched[forward]
 
 
 def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius: float, reach: int) -> np.ndarray:
-    """Return what a disc touches at each place of a loop (M, 3), which runs from the places so many before to those after."""
+    """Return the points (M, 3) that a disc touches along a loop; its direction is taken from `reach` places before to `reach` after."""
     touched, ahead = np.empty_like(places), np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
 
     def touch(part: int, begin: int, end: int) -> None:
@@ -274,7 +272,7 @@ def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius
 
 
 def _onwards(touched: np.ndarray) -> list[int]:
-    """Which of the touched points (M, 3) go on along the loop: where a point is touched again soon after, not what is between."""
+    """Which touched points (M, 3) advance along the loop; where one is touched again soon after, those between do not."""
     ahead = np.zeros(len(touched), np.int64)
     x, y, z = touched.T.copy()
     for k in range(1, BACK + 1):
@@ -287,7 +285,7 @@ def _onwards(touched: np.ndarray) -> list[int]:
 
 
 def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface) -> Loop | None:
-    """Make a loop of a closed curve of equal steps through boundary points; None where it is too short to keep."""
+    """Make a loop of a closed curve of equal steps through boundary points; None if it is too short to keep."""
     smoothed, corner_at = offset_curve(curve, bias, settings, surface)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
@@ -297,7 +295,7 @@ def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Set
 
 
 def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
-    """Return the desired length at each point of a curve (M, 3), in lengths; None where it is the same for all."""
+    """Return the desired length at each point of a curve (M, 3), in lengths; None if it is the same for all."""
     if not is_graded(surface):
         return None
     field = np.empty(len(curve))
@@ -326,9 +324,9 @@ def _external_first(loops: list[Loop]) -> tuple[Loop, ...]:
 
 
 def characteristic_points(loop: Loop, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the characteristic points of a loop (Sec. 3.3): about `length` apart, equally between corners, corners among them.
+    """Return the characteristic points of a loop (Sec. 3.3): about `length` apart, evenly spaced between corners, corners included.
 
-    With a length field they are equally far apart in desired lengths: in the integral of ds / l. The ends of lines are nodes too.
+    With a length field they are evenly spaced in desired lengths: in the integral of ds / l. The ends of lines are nodes too.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Made-up points over holes that are closed: the surface goes on as a thin plate that is bent as little as possible."""
+"""Points generated over closed holes: the surface continues as a thin plate of least bending."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.samples import SurfaceSamples
 
-FILLING_SPACING = 0.1  # distance between the points made up over a hole [member lengths]
-PLACES_AROUND_HOLE = 60  # places along the boundary of a hole from which its surroundings are looked at
-LOOK_STEP = 0.3  # step of a look away from the hole [member lengths]
-SIGHT = (1.5, 0.25)  # how far a look goes, in member lengths and in diameters of the hole; the larger counts
-LOST = 0.6  # distance from the nearest sample at which a look has left the scan [member lengths]
+FILLING_SPACING = 0.1  # distance between the points generated over a hole [member lengths]
+PLACES_AROUND_HOLE = 60  # places along the boundary of a hole from which its surroundings are sampled
+LOOK_STEP = 0.3  # step of a ray away from the hole [member lengths]
+SIGHT = (1.5, 0.25)  # how far a ray goes: in member lengths, in diameters of the hole; the larger counts
+LOST = 0.6  # distance from the nearest sample at which a ray has left the scan [member lengths]
 # cosine of the angle between the surroundings and the plane of the hole below which that plane is not used
 STEEP = 0.35
 FEWEST_PLACES_FOR_PLATE = 12  # fewest places around a hole through which a plate is fitted
@@ -33,10 +33,9 @@ def fill_holes(samples: SurfaceSamples, curves: list[np.ndarray]) -> np.ndarray:
 
 
 def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
-    """Made-up points (F, 3) over one hole.
+    """Points (F, 3) generated over one hole.
 
-    All happens in a flat picture of the hole: what is seen around it is laid out there, and a thin plate for each coordinate passes
-    through it.
+    The surroundings of the hole are mapped to a plane, and a thin plate for each coordinate is fitted to them there.
     """
     length = surface.length
     around = float(np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1).sum())
@@ -49,7 +48,7 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
         frame = _frame(axis)
         flat, hole_boundary = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
         fine = min(1.0, 1.5 * least)
-    else:  # the hole reaches around a bend: its boundary is drawn as a circle, what surrounds it as rings
+    else:  # the hole reaches around a bend: its boundary is mapped to a circle, its surroundings to rings
         radius, turn = around / (2 * np.pi), -2 * np.pi * np.arange(len(curve)) / len(curve)
         hole_boundary = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
         flat = hole_boundary[start] * (1 + away / radius)[:, None]
@@ -61,12 +60,12 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
 def _look_around(
     surface: Surface, curve: np.ndarray, sight: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Go out over the scan from places along a boundary, at right angles to it, and note what is there.
+    """Sample the scan along rays that leave a boundary at right angles.
 
     Returns
     -------
-    start : (K,) int64 point of the curve that each look began at
-    away : (K,) way from there [scan unit]
+    start : (K,) int64 point of the curve where each ray began
+    away : (K,) distance from there [scan unit]
     places, normals : (K, 3) on the scanned surface
     """
     length, patch = surface.length, np.zeros(PATCH)
@@ -93,7 +92,7 @@ def _look_around(
 
 
 def _axis(curve: np.ndarray) -> np.ndarray:
-    """Unit normal (3,) of the plane in which a closed curve encloses most; the side from which the surface to its left is seen."""
+    """Unit normal (3,) of the plane in which a closed curve encloses the largest area, the surface to its left seen from above."""
     arms = curve - curve.mean(axis=0)
     area = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
     axis: np.ndarray = -area / max(float(np.linalg.norm(area)), 1e-300)

@@ -1,4 +1,4 @@
-"""The edge of the surface: a smooth curve with corners, a little beyond the boundary points, which lie at random (Sec. 3.3)."""
+"""The edge of the surface: a smooth curve with corners, slightly beyond the randomly sampled boundary points (Sec. 3.3)."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ WINDOW = 0.5  # half width of the window in which the curve is always smoothed [
 WIDER = (1.0, 2.0, 3.0)
 CURVE_PARTS = 6  # a window is never wider than the curve over this number
 MOVED = 2.0  # a wider window may move the curve inwards by this many times the sampling bias
-# a wider window may close a bay in which this many points would be expected; up to 1.5 times as many by half as much
+# a wider window may close a bay in which this many points are expected; with up to 1.5 times as many, half of it
 BAY = 4.0
 ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
 SIDE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
-EMPTY = 6.0  # a corner in a bay in which no more points than this would be expected is none
+EMPTY = 6.0  # a corner in a bay where no more points than this are expected does not count
 BAY_REACH = 1.5  # a bay is measured under a chord that starts and ends this far from its middle [member lengths]
-FLAT = 0.7  # least cosine between the way into a bay and the surface
+FLAT = 0.7  # least cosine between the direction into a bay and the surface
 BEYOND = 0.44  # mean distance of the surface edge beyond the outermost random points, in the unit of `sampling_bias_of`
 EXACT = 0.1  # roughness of a boundary below which its points lie exactly on the edge [sampling biases]
-RANDOM_POINTS = 0.4  # roughness of a boundary above which its points lie at random [sampling biases]
+RANDOM_POINTS = 0.4  # roughness of a boundary above which its points are random [sampling biases]
 OUT = 0.6  # share of the sampling bias by which the curve is moved outwards; more would put nodes off the surface
 # sampling bias up to which corners are found at full resolution; beyond it they are looked for more coarsely [member lengths]
 CORNERS_SHOW_TO = 0.07
@@ -35,21 +35,21 @@ COARSEST = 2.0  # corners are looked for at most this many times more coarsely
 
 @dataclass(frozen=True)
 class SamplingBias:
-    """How unevenly the points near the edge lie."""
+    """How far random sampling keeps points from the edge of the surface."""
 
-    beyond: float  #: how far the surface goes on beyond the boundary points in the mean [scan unit]
-    density: float  #: points to an area
+    beyond: float  #: mean distance from the boundary points to the edge of the surface [scan unit]
+    density: float  #: points per area [1 / scan unit^2]
 
 
 NO_BIAS = SamplingBias(0.0, np.inf)
 
 
 def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:
-    """Return how far the surface goes on beyond its boundary points (M, 3), those that a disc slid from outside touches.
+    """Return how far the surface extends beyond its boundary points (M, 3), which a disc slid from outside touches.
 
-    Where points lie at random, rho to an area, it is `BEYOND` rho^(-2/3) r^(-1/3) in the mean: the disc comes in until there is about
-    one point in the segment that it has entered, and that has an area of (4/3) (2 r)^(1/2) h^(3/2). Points that were put on the edge,
-    as those of a mesh are, lie on one curve, hardly over the lines through their neighbours: then it is 0.
+    For random points of density rho the mean is `BEYOND` rho^(-2/3) r^(-1/3): the disc of radius r enters to the depth h at which
+    the segment inside the surface, of area (4/3) (2 r)^(1/2) h^(3/2), holds about one point. Points placed on the edge itself, as
+    in a mesh, hardly rise above the lines through their neighbours: then there is no bias.
     """
     of_random_points = BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
     uneven = float(np.median(np.abs(heights_along(surface, points)))) / of_random_points
@@ -61,8 +61,8 @@ def offset_curve(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a closed curve (M, 3) of equal steps through boundary points, the surface to its left, as the surface ends there.
 
-    It is moved out by most of what the surface goes on beyond it, its corners are found, and it is smoothed between them, more where
-    chance explains what that takes away.
+    The curve is moved out by most of the sampling bias, its corners are found, and it is smoothed between them, more strongly
+    where random sampling explains what that takes away.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def offset_curve(
 def _corners(
     curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a curve along points that lie at random has corners, and their places; those in bays that chance explains are none."""
+    """Return where a curve along random points has corners, and their places; not those in bays that random sampling explains."""
     coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST)
     at, places = find_corners(curve, settings, coarser)
     if len(at) == 0:
@@ -101,8 +101,8 @@ def _corners(
 def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
     """Return the areas (C,) of the bays that a closed curve (M, 3) of equal steps makes around some of its places (C,).
 
-    They lie between the curve and the straight line over `BAY_REACH` to both sides; infinite where that is no bay: where the line is not
-    outside of the curve but inside, or over it. out : (M, 3) directions outwards.
+    A bay lies between the curve and the chord that reaches `BAY_REACH` to both sides. The area is infinite where there is no bay:
+    where the chord lies inside the curve, or above the surface. out : (M, 3) directions outwards.
     """
     half = round(BAY_REACH / CURVE_STEP)
     around = (at[:, None] + np.arange(-half, half + 1)) % len(curve)
@@ -117,10 +117,10 @@ def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
 
 
 def explained(step: np.ndarray, out: np.ndarray, room: np.ndarray, density: float, inwards: float) -> np.ndarray:
-    """Return the share (M,), 0 to 1, of each step (M, 3) of the places of a closed curve that chance explains.
+    """Return the share (M,), 0 to 1, of each step (M, 3) of a closed curve that random sampling explains.
 
-    Steps inwards cut off tongues, in which points were found: at random they are no longer than `inwards`. Steps outwards
-    fill bays without points: they are there at random where few points would lie in them.
+    Steps inwards cut off tongues, which hold points: random ones are no longer than `inwards`. Steps outwards fill bays, which
+    hold none: those are random where few points are expected in them.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
         loop = rolling.loop_at(sample, free[sample], radius)
         if len(loop) < 3 or length_around(surface.mean[loop]) <= least:
             continue  # a small gap is closed over
-        loop = np.roll(loop, -int(loop.argmin()))  # wherever the disc began
+        loop = np.roll(loop, -int(loop.argmin()))  # the same wherever the disc began
         fresh = rolling.following[loop] < 0
         rolling.following[loop], rolling.preceding[loop] = np.roll(loop, -1), np.roll(loop, 1)
         if fresh.mean() > 0.5:
@@ -57,10 +57,10 @@ class _RollingDisc:
         self.banned = np.zeros(count, np.bool_)
 
     def loop_at(self, sample: int, direction: float, radius: float) -> np.ndarray:
-        """Samples of the loop that comes back to its start, empty where there is none.
+        """Samples of the loop that comes back to its start, empty if there is none.
 
         A disc that crosses from sheet to sheet may be caught in another loop. Rolled the other way round it seldom crosses at the
-        same place, so that way is tried next; then the samples that have caught it are left out.
+        same place, so that way is tried next; then the samples that caught it are left out.
         """
         centre = kernels.sample_disc(self.surface, sample, direction, self.radii[sample])
         means = self.surface.mean
@@ -80,7 +80,7 @@ class _RollingDisc:
         return np.zeros(0, np.int64)
 
     def _roll(self, surface: Surface, sample: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
-        """Samples of the loop that the disc comes into, empty where it falls off or comes to an earlier loop."""
+        """Samples of the loop that the disc ends up in; empty if it falls off or meets an earlier loop."""
         first, last = kernels.roll_disc(surface, sample, centre, self.radii, self.path, seen, self.visit, self.banned)
         return self.path[first:last].copy()
 

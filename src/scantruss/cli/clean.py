@@ -25,7 +25,7 @@ SHARES = {  # option, step that it steers, metavar, default, what it is
     "loose-pieces": (
         "SHARE",
         0.005,
-        "remove detached pieces with fewer than this share of all points, and narrow clouds of any size; 0: none",
+        "remove detached pieces with less than this share of all points, and narrow clouds of any size; 0: none",
     ),
     "layer-distance": ("NUMBER", 2.0, "merge two layers up to this many spacings apart"),
 }
@@ -56,7 +56,7 @@ def clean_parser() -> Parser:
         )
         keep, said = KEEP[name]
         steps.add_argument(f"--{keep}", action="store_true", help=said)
-    steps.add_argument("--no-smooth", action="store_true", help="keep points where they are: remove no noise")
+    steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: remove no noise")
     steps.add_argument(
         "--spacing",
         metavar="NUMBER",

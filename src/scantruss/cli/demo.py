@@ -18,10 +18,12 @@ def demo_parser() -> Parser:
     from .options import Parser, add_force
 
     parser = Parser(
-        "demo", "[FOLDER]", "Make grid, report, picture and printable model of a bundled scan, the bust of Nefertiti."
+        "demo",
+        "[FOLDER]",
+        "Make the grid, report, picture and printable model of the bundled scan, the bust of Nefertiti.",
     )
     parser.add_argument("outs", metavar="FOLDER", nargs="?", help="default ./scantruss-demo")
-    parser.add_argument("-o", "--out", dest="out", metavar="FOLDER", help="the same as an option")
+    parser.add_argument("-o", "--out", dest="out", metavar="FOLDER", help="FOLDER as an option")
     add_force(parser)
     return parser
 

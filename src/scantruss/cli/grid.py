@@ -40,20 +40,20 @@ def grid_parser() -> Parser:
         "grid",
         "SCAN OUT [OUT ...] [--length L] [options]",
         "Turn a scan into a triangular grid truss of a desired member length.\n"
-        "The options come in three parts: every day, expert, and for the method of the paper only.",
+        "The options come in three parts: everyday, expert, and for the method of the paper only.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
     add_outs(parser, "results; the suffix names the format", "*")
     files = parser.add_argument_group("files")
     files.add_argument(
-        "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here win"
+        "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here take precedence"
     )
-    files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes, one X,Y,Z per line")
     files.add_argument("--report", metavar="FILE.json", help="save all figures of the run")
     files.add_argument(
         "--keep-failed",
         action="store_true",
-        help="write a grid that fails its certificate too; the exit status is 3 either way",
+        help="also write a grid that fails its certificate; the exit status is 3 either way",
     )
     add_memory(parser)
     styles = parser.add_argument_group("pictures and tables")
@@ -76,7 +76,7 @@ def grid_parser() -> Parser:
 
 
 def style_of(values: Namespace) -> FileStyle:
-    """Return how the command line asks files to be written."""
+    """Return the styles of the files, as the options say."""
     views = tuple(values.views or ("auto",))
     return FileStyle(views=views, size=values.size, obj=values.obj, decimal_comma=values.decimal_comma)
 
@@ -124,7 +124,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
 
     taken = inputs_of(values)
     if not values.force:
-        for out in outs:  # before its suffix is: several scans may be named by a pattern without quotes
+        for out in outs:  # before its suffix is: a pattern without quotes may name several scans
             if out.resolve() not in taken:
                 check_ours(out, "result")
     for out in outs:
@@ -143,7 +143,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
 def make_grid(
     cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
 ) -> Grid:
-    """Run the chain, and say so where kernels must be compiled."""
+    """Run the chain, with a note if kernels must be compiled."""
     from ..pipeline import grid_from_cloud
     from ..scan.member_length import check_length
 
@@ -165,10 +165,10 @@ def make_grid(
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:
         bars.note(
-            f"the first look at this scan gives no grid that passes, so it is made as with --box-size {grid.settings.box_size:g}"
+            f"no grid passes with the usual sample spacing, so it is made as with --box-size {grid.settings.box_size:g}"
         )
     if grid.settings is not None and grid.settings.method != settings.method:
-        bars.note("no grid of the default method passes its certificate here, so it is made by that of the paper")
+        bars.note("no grid of the default method passes its certificate here, so it is made by the method of the paper")
     note_outliers(bars, cloud, grid.settings or settings)
     note_layers(bars, cloud, grid.settings or settings)
     note_pieces(bars, cloud, grid.settings or settings)
@@ -176,19 +176,19 @@ def make_grid(
 
 
 def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:
-    """Return the settings with the length that `info` suggests, and say so."""
+    """Return the settings with the length that `info` suggests, with a note."""
     from ..report.advice import Advice
 
     with note_compiling(bars):
         length = Advice(cloud, settings, bars).suggest()
     bars.note(
-        f"no --length is given; {length:g}{f' {cloud.unit}' if cloud.unit else ''} is taken, as scantruss info suggests"
+        f"no --length is given; using {length:g}{f' {cloud.unit}' if cloud.unit else ''}, as scantruss info suggests"
     )
     return settings.replace(length=length)
 
 
 def note_nearby(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Name the nearest length at which a grid passes, tried by quick runs; nothing where lengths vary over the scan."""
+    """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
 
     if settings.length_field:

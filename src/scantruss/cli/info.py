@@ -1,4 +1,4 @@
-"""The command ``scantruss info``: what a scan holds, and which lengths of members it carries."""
+"""The command ``scantruss info``: what a scan holds, and which member lengths suit it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def info_parser() -> Parser:
     parser = Parser(
         "info",
         "SCAN [options]",
-        "Points, extent, spacing, noise and boundaries of a scan, and what comes of three member lengths.",
+        "Points, extent, spacing, noise and boundaries of a scan, and the results of three member lengths.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
     add_memory(parser)

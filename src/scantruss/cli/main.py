@@ -1,4 +1,4 @@
-"""The command line: the front that reads words, and the only place that says what went wrong and leaves.
+"""The command line: it reads the arguments, and is the only place that reports errors and exits.
 
 A refusal is one line on stderr and an exit status of `HELP`; nothing is written then. Heavy imports wait for a command.
 """
@@ -17,7 +17,7 @@ from .. import __version__
 from ..errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
 
 HELP = f"""\
-scantruss {__version__}: from a 3D scan straight to a grid truss with members of one length
+scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equal members
 
   scantruss info  SCAN                     points, extent, spacing, boundaries and a suitable --length
   scantruss clean SCAN OUT                 remove duplicates, outliers, loose pieces, doubled layers and noise
@@ -76,9 +76,9 @@ def run(words: Sequence[str]) -> None:
 
 
 def import_numba_without_blas() -> None:
-    """Import numba without scipy.linalg, which it looks for where scipy is installed: a seventh of a short command.
+    """Import numba without scipy.linalg, which numba imports if scipy is installed: that takes a seventh of a short command.
 
-    Only products of matrices in kernels need it, of which a process of ours has none.
+    Only matrix products in kernels need it, and there are none.
     """
     if (name := "scipy.linalg.cython_blas") not in sys.modules:
         sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try_signal(signal.SIGTERM, _stop)
         run(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
-    except BrokenPipeError:  # the reader of our output has left, as in `scantruss info scan.ply | head -1`
+    except BrokenPipeError:  # the reader of the output has gone, as in `scantruss info scan.ply | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     except _Stopped:
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return refuse("not enough memory; use fewer points or a larger --length")
     except Exception as error:
-        if _Stopped.asked:  # whoever was interrupted, such as the compiler, has made another error of it
+        if _Stopped.asked:  # the interrupted code, such as the compiler, may have turned it into another error
             return refuse(STOPPED, 143)
         if os.environ.get("SCANTRUSS_TRACEBACK"):
             raise
@@ -131,13 +131,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def refuse(message: str, status: int = 2) -> int:
-    """Say why in one line and return the exit status."""
+    """Print the reason in one line and return the exit status."""
     print("scantruss:", " ".join(message.split()), file=sys.stderr)
     return status
 
 
 class _Stopped(BaseException):
-    """The process was asked to end (SIGTERM); what is half-written is removed."""
+    """The process was asked to end (SIGTERM); half-written files are removed."""
 
     asked = False
 

@@ -1,4 +1,4 @@
-"""Where results go: asked before anything is read, so that no run ends in vain and no input is written over."""
+"""Where results go: checked before anything is read, so that no run is wasted and no input overwritten."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def inputs_of(values: Namespace) -> Taken:
 
 
 def _lengths(given: object) -> list[str]:
-    """Return the words of ``--length`` that are no numbers: its value, or several values each with its word."""
+    """Return the values of ``--length`` that are not numbers."""
     values = [value for _, value in given] if isinstance(given, list) else [given]
     return [value for value in values if isinstance(value, str)]
 

@@ -24,7 +24,7 @@ def print_parser() -> Parser:
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
     parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
-    parser.add_argument("--keep-failed", action="store_true", help="print a grid that failed its certificate too")
+    parser.add_argument("--keep-failed", action="store_true", help="also print a grid that failed its certificate")
     return parser
 
 
@@ -60,11 +60,9 @@ def print_solid(values: Namespace) -> None:
 
 
 def model_note(out: Path, unit: str) -> list[str]:
-    """What to say of the unit that a printer will take a model for."""
+    """Note on the unit that a printer will assume."""
     if out.suffix.lower() == ".stl" and unit != "mm":
-        return [
-            f"STL holds no unit and printers take it for mm; its numbers are {unit or 'of a unit that is not known'}"
-        ]
+        return [f"STL holds no unit and printers assume mm; its numbers are {unit or 'of a unit that is not known'}"]
     if not unit:
-        return ["the unit of the grid is not known, so the model says mm; scantruss grid --unit says it"]
+        return ["the unit of the grid is not known, so the model says mm; give it with scantruss grid --unit"]
     return []

@@ -1,4 +1,4 @@
-"""What several commands do alike: read a scan, thin it to fit, and say what a user should know of it."""
+"""What several commands share: read a scan, thin it to fit, and report what a user should know about it."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def add_memory(parser: Parser) -> None:
         "--memory",
         metavar="SIZE",
         type=size_of_memory,
-        help="a larger scan is thinned, as 4GB (default: half of what is free)",
+        help="memory that a scan may take, e.g. 4GB; a larger one is thinned (default: half of what is free)",
     )
 
 
 def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan, and say so where points were left out."""
+    """Read a scan, and report points that are left out."""
     from ..scan.formats.reading import read_points
 
     bars("read", 0.0)
@@ -46,7 +46,7 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 
 def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
-    """Say what was left out of a cloud or converted in it, with its name where it is one of several."""
+    """Report what was left out or converted, with the name of the cloud if it is one of several."""
     said = list(cloud.notes)
     if cloud.dropped:
         said.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
@@ -55,13 +55,13 @@ def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> Non
 
 
 def cloud_file_notes(out: Path, *, selects: bool = True) -> list[str]:
-    """What to say of a cloud that is written: what its format has places for and is not kept.
+    """Notes on a cloud that is written: what its format could hold but is not kept.
 
     `selects`: the command has options for taking points by class and return.
     """
     suffix = out.suffix.lower()
     if suffix in (".las", ".laz"):
-        more = "; --class and --returns choose before" if selects else ""
+        more = "; choose points by --class and --returns" if selects else ""
         return [f"classes, returns, colours and reference system are not kept{more}"]
     return []
 
@@ -94,14 +94,14 @@ def settings_to_read(values: Namespace, settings: Settings, bars: Bars) -> Setti
 
 
 def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
-    """Read a scan that is thinned while it is read, and say so."""
+    """Read a scan while thinning it, and report that."""
     from ..scan.stream.fit import read_thinned
 
     with note_compiling(bars):
         cloud, read = read_thinned(path, settings, bars)
     unit = f" {cloud.unit}" if cloud.unit else ""
     bars.note(
-        f"thinned while it was read, from {read:,} points to {len(cloud.points):,} in boxes of {settings.thin_spacing:g}{unit};"
+        f"thinned while it was read, from {read:,} points to {len(cloud.points):,}, in boxes of {settings.thin_spacing:g}{unit};"
         " --thin-spacing 0 takes all"
     )
     return cloud
@@ -126,7 +126,7 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
 
 
 def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Say that the scan has two layers closer than half a member, where it has, and what to do."""
+    """Report two layers of the scan closer than half a member, and what to do."""
     from ..surface.samples import sample_surface
 
     distance, share = sample_surface(cloud, settings).layers
@@ -139,7 +139,7 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
 
 
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Name the pieces of a scan with their sizes, and how to take one alone; nothing where there is one."""
+    """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one."""
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
@@ -162,7 +162,7 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
 
 @contextmanager
 def note_compiling(bars: Bars) -> Iterator[None]:
-    """Say so, once a run, when kernels are compiled, which takes long."""
+    """Report, once a run, that kernels are being compiled, which takes long."""
     from ..runtime.jit import FOLDER, report_compiling
 
     words = "compiling kernels, once on this machine" if FOLDER else "compiling kernels"

@@ -31,12 +31,12 @@ def splice_parser() -> Parser:
     parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns such as 'scans/*.ply'")
     add_outs(parser, "merged cloud; the suffix names the format")
     parser.add_argument(
-        "--poses", metavar="FILE", help="poses to start from, for all scans or some: .poses.json of an earlier run"
+        "--poses", metavar="FILE", help="poses to start from, for all scans or some, e.g. .poses.json of an earlier run"
     )
     parser.add_argument(
         "--use-poses", action="store_true", help="take the poses as they are: no alignment, only residuals and merging"
     )
-    parser.add_argument("--all", action="store_true", help="refuse the whole run where one scan fits nowhere")
+    parser.add_argument("--all", action="store_true", help="refuse the whole run if any scan fits nowhere")
     parser.add_argument("--unit", choices=[unit for unit in UNITS if unit], default="", help="unit of all scans")
     return parser
 
@@ -66,7 +66,7 @@ def splice(values: Namespace) -> None:
 
 
 def scan_files(words: list[str]) -> list[Path]:
-    """Return the files that names and patterns stand for, in their order."""
+    """Return the files that names and patterns match, in order."""
     from ..scan.formats.paths import files_of
 
     files = [file for word in words for file in files_of(word)]
@@ -81,7 +81,7 @@ def scan_files(words: list[str]) -> list[Path]:
 
 
 def names_of(files: list[Path]) -> list[str]:
-    """Return the names of the scans: those of the files, with their folders where they would be the same."""
+    """Return the names of the scans: those of the files, with their folders where names repeat."""
     names = [file.name for file in files]
     return names if len(set(names)) == len(names) else [file.as_posix() for file in files]
 
@@ -101,7 +101,7 @@ def check_outputs(values: Namespace, outs: list[Path], poses_file: Path) -> None
 
 
 def splice_files(values: Namespace, files: list[Path], names: list[str], bars: Bars) -> Splice:
-    """Read the scans and splice them; say what is left out."""
+    """Read the scans and splice them; report what is left out."""
     from ..scan.formats.reading import read_points
     from ..scan.register import splice_scans
     from ..scan.register.pose_file import read_poses
@@ -125,7 +125,7 @@ def splice_files(values: Namespace, files: list[Path], names: list[str], bars: B
     if reasons and values.all:
         raise InputError(f"{'; '.join(reasons)}; leave it out, or give its pose with --poses")
     for reason in reasons:
-        bars.note(f"{reason} among the others and is left out; --poses can say where it lies")
+        bars.note(f"{reason} among the others and is left out; give its pose with --poses to keep it")
     for pair in result.contradicting:
         bars.note(
             f"{pair.first} and {pair.second} contradict each other in the poses given: of what lies over the other"

@@ -1,4 +1,4 @@
-"""Where the program begins: little is imported before Ctrl-C is listened to."""
+"""The entry point: little is imported before Ctrl-C is handled."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 
 def start() -> int:
-    """Run the command line; an interruption while its modules are imported is one line too."""
+    """Run the command line; an interruption during imports is one line too."""
     try:
         from .main import main
     except KeyboardInterrupt:

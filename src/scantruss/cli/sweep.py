@@ -29,12 +29,12 @@ def sweep_parser() -> Parser:
         "sweep",
         "SCAN --length 3,4,5 [--effort quick,normal ...] -o FOLDER [options]",
         "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
-        "Every setting takes one value, or several with commas between them; the scan is read once, in one way.",
+        "Every setting takes one value or several, separated by commas; the scan is read once.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
     parser.add_argument("--settings", metavar="FILE", help="settings saved beside an earlier result")
-    parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes: X,Y,Z a line")
+    parser.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes, one X,Y,Z per line")
     add_force(parser)
     add_memory(parser)
     add_workers(parser)
@@ -55,23 +55,23 @@ ONE = (
     "returns",
     "confidence",
     "thin_spacing",
-)  # no several values
+)  # one value only
 
 
 def _several(kind: Any) -> Callable[[str], list[Any]]:
-    """Return a reader of values with commas between them, each kept with its word."""
+    """Return a parser of values separated by commas, each kept with its text."""
 
     def read(text: str) -> list[Any]:
         words = [word.strip() for word in text.split(",") if word.strip()]
         if not words:
-            raise argparse.ArgumentTypeError(f"needs a value, or several with commas between them, got {text!r}")
+            raise argparse.ArgumentTypeError(f"needs one value or several, separated by commas, got {text!r}")
         return [(word, kind(word)) for word in words]
 
     return read
 
 
 def sweep(values: Namespace) -> None:
-    """Make many grids and tell of them."""
+    """Make many grids and report them."""
     from ..report.choosing import head_of, rows_of
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
@@ -97,7 +97,7 @@ def sweep(values: Namespace) -> None:
 
 
 def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) -> None:
-    """Refuse a folder in which a result cannot be written, or would be where something else is."""
+    """Refuse a folder where a result cannot be written, or would replace something else."""
     from ..runtime.files import check_place
     from ..runtime.ours import check_ours
 
@@ -177,6 +177,6 @@ def _save(
         for name, content in zip(TABLES, tables, strict=True):
             save.beside(folder / name).write_bytes(content)
     for trial, outcome in zip(trials, outcomes, strict=True):
-        if not outcome.grid:  # of an earlier sweep, which this table would say has none
+        if not outcome.grid:  # left by an earlier sweep; this table says there is no grid
             for end in (".json", ".png"):
                 (folder / f"{trial.name}{end}").unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""The commands for what outgrows memory or a machine: thin a scan of any size, sweep over settings."""
+"""``scantruss thin``: thin a scan of any size; and the options for workers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def thin_parser() -> Parser:
     parser.add_argument(
         "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
     )
-    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points along the boundary")
+    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points at the boundary")
     add_workers(parser)
     add_reading(parser)
     return parser
@@ -84,7 +84,7 @@ def thin(values: Namespace) -> None:
 
 
 def workers_of(values: Namespace, bars: Bars, count: int | None) -> Workers:
-    """Return the workers of the command line, and say who they are where they are several."""
+    """Return the workers of the command line, with a note if there are several."""
     from ..runtime.cluster import open_workers
 
     workers = open_workers(count if values.workers is None else values.workers, values.scheduler)

@@ -31,7 +31,7 @@ SOLID_SUFFIXES = (".3mf", ".stl")
 
 
 def check_output(path: str | Path) -> Path:
-    """Return the path if a grid can be written there; for the command line to call before the long work.
+    """Return the path if a grid can be written there; called before the long work starts.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from ..runtime.files import check_place, write_files
 from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
-SLENDEREST = 2_000  #: length of a member in its diameters that nobody prints
+SLENDEREST = 2_000  #: largest length of a member, in diameters, that can be printed
 PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
 
 
@@ -111,7 +111,7 @@ def build_solid(
 
 
 def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, scale: float, sides: int) -> None:
-    """Refuse numbers from which no solid can be made that looks like the grid."""
+    """Refuse diameters and scales for which no solid looks like the grid."""
     for name, value in (("member diameter", member_diameter), ("node diameter", node_diameter), ("scale", scale)):
         if not (isinstance(value, int | float | np.number) and math.isfinite(value) and value > 0):
             raise InputError(f"the {name} must be a positive number, got {value}")
@@ -156,7 +156,7 @@ def _parts(nodes: np.ndarray, edges: np.ndarray, member_radius: float, node_radi
 
 
 def _frames(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return (E, 3, 4) what turns, stretches and moves a bar of length 1 along z onto each member."""
+    """Return (E, 3, 4) transforms that turn, stretch and move a cylinder of length 1 along z onto each member."""
     axis = nodes[edges[:, 1]] - nodes[edges[:, 0]]
     along = axis / np.linalg.norm(axis, axis=1, keepdims=True)
     helper = np.eye(3)[np.argmin(np.abs(along), axis=1)]
@@ -222,7 +222,7 @@ def _checked(solid: Solid) -> Solid:
     euler = len(np.unique(solid.triangles)) - len(solid.triangles) * 3 // 2 + len(solid.triangles)
     if not (solid.volume > 0 and solid.components >= 1 and is_watertight(solid.triangles)):
         raise InputError(
-            f"no watertight solid came of the grid (volume {solid.volume:.4g}, {solid.components} bodies); "
+            f"the grid gives no watertight solid (volume {solid.volume:.4g}, {solid.components} bodies); "
             f"check the grid and try slightly different diameters"
         )
     return replace(solid, genus=solid.components - euler // 2)

@@ -1,9 +1,9 @@
 """Files for 3D printers: 3MF, which carries the unit, and binary STL.
 
 Readers of these files keep coordinates as float32, and those of STL know which vertices are one only by equal
-coordinates. Vertices of a union lie so near to each other at places that rounding would weld them and tear the surface
-open. All vertices are therefore put on a lattice that float32 holds exactly, and those that fall together are moved
-apart by a step or two of it.
+coordinates. Some vertices of a union lie so near to each other that rounding would weld them and tear the surface open. All
+vertices are therefore put on a lattice that float32 holds exactly, and those that coincide are moved apart by a step or two of
+it.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A closed surface around the members and nodes of a grid."""
+    """The closed surface around the members and nodes of a grid."""
 
     vertices: np.ndarray  #: (N, 3) float64 [printed unit], relative to the grid's origin
     triangles: np.ndarray  #: (M, 3) int64, anticlockwise seen from outside
-    unit: str  #: unit of the grid, "" where it is not known
+    unit: str  #: unit of the grid, "" if it is not known
     volume: float  #: [printed unit cubed]
     components: int  #: bodies that do not touch
     genus: int  #: openings one could pull a thread through, of all components together
@@ -66,7 +66,7 @@ class Solid:
 
     @property
     def notes(self) -> list[str]:
-        """What a user should know of it, in words; empty where the solid has every opening of the grid."""
+        """What a user should know about it; empty if the solid keeps every opening of the grid."""
         lines = []
         if self.components < self.expected_components:
             lines.append(f"pieces of the grid touch: {self.expected_components} pieces became {self.components} bodies")
@@ -93,14 +93,14 @@ def put_on_lattice(solid: Solid, rounds: int = MOST_ROUNDS) -> tuple[np.ndarray,
     solid : Solid
         What to write.
     rounds : int
-        How often those that fall together are moved apart.
+        How often those that coincide are moved apart.
 
     Returns
     -------
     vertices : np.ndarray
         (N, 3) float32 [printed unit].
     together : int
-        Vertices at the place of another one; 0 if the cure worked.
+        Vertices that still coincide with another one; 0 if it worked.
     """
     step = lattice_step(solid.vertices)
     cell = np.rint(solid.vertices / step).astype(np.int64)

@@ -1,4 +1,4 @@
-"""How files of a grid are written where their formats leave a choice."""
+"""How a grid is written where its format leaves a choice."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class FileStyle(PictureStyle):
     Raises
     ------
     InputError
-        A value is none of those that are possible.
+        A value is not one of those allowed.
     """
 
     obj: str = "faces"  #: what an OBJ file holds: faces for the triangles, lines for the members, or both

@@ -49,7 +49,7 @@ GAP = 60  # most segments of a gap that is filled; larger gaps stay open
 CLEAR = 0.6  # least distance of a candidate node from the initial front [member lengths]
 NEARER = 0.33  # the same distance for the position of a fixed node [member lengths]
 BESIDE = 0.6  # how far the sides of a ridge are looked at [member lengths]
-BOX = 2.4  # size of the search boxes of the nodes: as far as one step of the front looks [member lengths]
+BOX = 2.4  # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 BUDGET = 500  # segments advanced between two reports of progress
 
 
@@ -73,7 +73,7 @@ def advance_front(
         Fixed nodes, fixed lines and ridges. Method "paper" makes the fixed nodes later.
     settings : Settings
     candidates : CandidateNodes, optional
-        Nodes of rows for the front to come to; left out, it makes all nodes itself.
+        Nodes of the position field that the front may attach; without them it makes all nodes itself.
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
@@ -122,9 +122,9 @@ def advance_front(
 
 
 def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) -> None:
-    """Fill what the front has left open; what cannot be filled is a boundary of the grid from now on.
+    """Fill the gaps that the front left open; those that cannot be filled become boundaries of the grid.
 
-    Loops of the boundary of which the front has reached no segment are left out. Each turn takes the segments of one loop off the
+    Boundary loops that the front never reached are left out. Each turn takes the segments of one loop off the
     front, at least one, so it ends after no more turns than there are segments.
     """
     loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
@@ -158,7 +158,7 @@ def _blank(room: int, boxes: boxing.SearchBoxes) -> lists.Front:
 
 
 def grown(front: lists.Front) -> lists.Front:
-    """Return the same front with room for twice as much."""
+    """Return the same front with arrays twice as large."""
     old = front.boxes
     room = 2 * len(front.nodes)
     boxes = new_boxes(old.lower, old.lower + old.size * (old.counts - 1), float(old.size.max()), room, room)
@@ -184,7 +184,7 @@ def start_front(
     settings: Settings,
     candidates: CandidateNodes | None = None,
 ) -> lists.Front:
-    """Put the initial front into the lists: boundary loops, lines, nodes that it may come to, a seed triangle on closed pieces."""
+    """Fill the lists with the initial front: boundary loops, lines, candidate nodes, a seed triangle on closed pieces."""
     surface = samples.surface
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
@@ -209,7 +209,7 @@ def start_front(
 
 
 def add_candidates(front: lists.Front, surface: Surface, nodes: CandidateNodes, clear: float) -> lists.Front:
-    """Offer nodes to a front, which grows until there is room for them."""
+    """Add candidate nodes to a front, which grows until there is room for them."""
     while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
         front = grown(front)
     add_candidate_nodes(front, surface, nodes, clear)
@@ -255,7 +255,7 @@ def face_both_sides(front: lists.Front, surface: Surface, nodes: list[int], leng
 
 
 def add_nodes(front: lists.Front, surface: Surface, nodes: np.ndarray) -> list[int]:
-    """Add nodes (K, 3) that stay in place: of the boundary or of lines, each near the one before; returns their numbers."""
+    """Add fixed nodes (K, 3) of the boundary or of lines, each near the one before; returns their numbers."""
     first = add_still_nodes(front, surface, np.ascontiguousarray(nodes))
     return list(range(first, first + len(nodes)))
 
@@ -267,7 +267,7 @@ def add_seed(front: lists.Front, ids: list[int]) -> None:
 
 
 def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
-    """Return three nodes of the rows near a sample that make a good triangle; none where the rows do not offer them."""
+    """Return three candidate nodes near a sample that make a good triangle; none where there are no such three."""
     count = int(front.count[lists.NODES])
     free = np.flatnonzero(front.out[:count] < 0)
     away = np.linalg.norm(front.nodes[free] - surface.mean[sample], axis=1)

@@ -1,4 +1,4 @@
-"""Rows for the front to advance in: nodes of a lattice that follows a smooth direction field of the surface."""
+"""Orientation field and position field of the surface: candidate nodes on a lattice for the front (Jakob et al. 2015)."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ LINKS_OF_A_SAMPLE = 12  # most links of a sample to its neighbours
 PASSES = 3  # passes of smoothing on each level
 SAMPLES_FOR_THREADS = 5000  # fewest samples of a level that two threads smooth at once
 WITHIN = 0.7  # candidate nodes farther from their sample than this are dropped [member lengths]
-# length of the rows on a closed surface, where the search adds nodes and never removes any [member lengths]
+# lattice spacing on a closed surface, where the search adds nodes and never removes any [member lengths]
 CLOSED = 1.02
 CANDIDATE_DISTANCE = 0.6  # least distance between candidate nodes [member lengths]
 
 
 @dataclass(frozen=True)
 class FieldStart:
-    """How the nodes of one front are laid out."""
+    """How the candidate nodes of one front are laid out."""
 
-    turn: float = 0.0  #: angle of the rows to the longest side of the boundary, where they start [degree]
-    scale: float = 1.0  #: length of their members, in desired lengths
-    laid: bool = True  #: False: no rows are laid, the front makes all of its nodes itself
+    turn: float = 0.0  #: angle of the lattice to the longest side of the boundary, where it starts [degree]
+    scale: float = 1.0  #: spacing of the lattice, in desired lengths
+    laid: bool = True  #: False: no lattice, the front makes all of its nodes itself
 
 
-TURNS = {  # directions of the rows of several fronts
+TURNS = {  # lattice directions of the fronts, by effort
     "quick": (FieldStart(),),
     "normal": tuple(FieldStart(10.0 * turn) for turn in range(6)),
     "best": tuple(FieldStart(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
-SCALES = {  # lengths of the fronts instead, where the desired length differs from place to place: no rows can be laid
+SCALES = {  # lengths of the fronts instead, where the desired length varies over the scan and no lattice fits
     "quick": (1.0,),
     "normal": (1.0, 0.97, 1.03),
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
@@ -56,10 +56,10 @@ SMALL = 600.0
 
 
 class Field(NamedTuple):
-    """What one front comes to."""
+    """The candidate nodes of one front, and how they were laid out."""
 
     start: FieldStart
-    nodes: CandidateNodes | None  #: of its rows; None where the front makes all of its nodes itself
+    nodes: CandidateNodes | None  #: on the lattice; None if the front makes all of its nodes itself
 
 
 class Hierarchy(NamedTuple):
@@ -70,13 +70,13 @@ class Hierarchy(NamedTuple):
     independent_sets: list[tuple[np.ndarray, ...]]  #: samples of each level that are smoothed at once
 
     def copy(self) -> Hierarchy:
-        """Return it with directions and lattices of its own."""
+        """Return a copy whose directions and lattices can be changed."""
         own = [p._replace(direction=p.direction.copy(), node=p.node.copy(), mark=p.mark.copy()) for p in self.levels]
         return self._replace(levels=own)
 
 
 def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStart, ...]:
-    """Return how the fronts are laid out that the effort allows."""
+    """Return the layouts of the fronts, as many as the effort allows."""
     if settings.method == "paper":
         return (FieldStart(laid=False),)
     if samples.graded:
@@ -88,9 +88,9 @@ def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStar
 def orientation_fields(
     samples: SurfaceSamples, boundary: Boundary, settings: Settings, starts: Sequence[FieldStart] | None = None
 ) -> list[Field]:
-    """Return for each front the nodes of rows that it may come to: an orientation and a position field (Jakob et al. 2015).
+    """Return the candidate nodes of each front, from an orientation field and a position field (Jakob et al. 2015).
 
-    Both are smoothed over a hierarchy of levels from coarse to fine, from a start at the boundary on.
+    Both fields are smoothed over a hierarchy of levels from coarse to fine, starting at the boundary.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def orientation_fields(
     settings : Settings
         `length`; `effort` decides how many fields there are.
     starts : sequence of FieldStart, optional
-        How they are laid out; left out, as the effort allows.
+        How they are laid out; by default as the effort allows.
     """
     starts = usual_starts(samples, settings) if starts is None else starts
     closed = 1.0 if boundary.loops else CLOSED
@@ -119,7 +119,7 @@ def orientation_fields(
 def orientation_field(
     hierarchy: Hierarchy, samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
 ) -> CandidateNodes:
-    """Return the nodes of rows of a length [scan unit] that start at an angle [degree] to the longest side of the boundary."""
+    """Return the nodes of a lattice of a spacing [scan unit], turned by an angle [degree] from the longest side of the boundary."""
     levels, owners, independent_sets = hierarchy
     start, direction, node = lattice_start(samples, boundary, length, turn)
     for owner in owners:
@@ -139,7 +139,7 @@ def _smooth_directions(level: Level, _: float, some: np.ndarray) -> None:
 
 
 def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
-    """Nodes of the finest samples, each once: those nearest to their samples first."""
+    """Lattice nodes of the finest samples, each once, those nearest to their samples first."""
     away = ((level.node - level.mean) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")
     order = order[away[order] < (WITHIN * length) ** 2]
@@ -173,12 +173,12 @@ def make_levels(surface: Surface, length: float) -> Hierarchy:
 
 
 def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
-    """Samples that two threads may smooth at once, and those between, which depend on both; few samples are not divided."""
+    """Two sets of samples that threads may smooth at once, and those between, which depend on both; few are not divided."""
     count = len(level.mean)
     if count < SAMPLES_FOR_THREADS:
         return (np.arange(count),)
     away, queue = np.empty((2, count), np.int64), np.empty(count, np.int64)
-    end = kernels.links_away(level.neighbors, 0, away[0], queue)  # of the links, not of where the scan lies
+    end = kernels.links_away(level.neighbors, 0, away[0], queue)  # by the links, not by how the scan is placed
     kernels.links_away(level.neighbors, kernels.links_away(level.neighbors, end, away[0], queue), away[1], queue)
     ahead = away[0] - away[1]
     late = ahead > np.median(ahead)
@@ -191,9 +191,9 @@ def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
 def lattice_start(
     samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
 ) -> tuple[int, Vector, Vector]:
-    """Return the sample, the direction and the node where the rows start: in the middle of the longest side of the boundary.
+    """Return the sample, the direction and the node where the lattice starts: in the middle of the longest side of the boundary.
 
-    On a closed surface they start anywhere.
+    On a closed surface it starts anywhere.
     """
     surface = samples.surface
     if not boundary.loops:
@@ -230,7 +230,7 @@ def longest_side(loops: tuple[Loop, ...]) -> tuple[Loop, int]:
 
 
 def nodes_at(positions: np.ndarray, surface: Surface, length: float) -> CandidateNodes:
-    """Return nodes at fixed positions (K, 3) [scan unit] for a front to come to; those far from the scan are left out."""
+    """Return candidate nodes at fixed positions (K, 3) [scan unit]; those far from the scan are left out."""
     samples = np.array([((surface.mean - place) ** 2).sum(axis=1).argmin() for place in positions], np.int64)
     near = np.linalg.norm(surface.mean[samples] - positions, axis=1) < length
     return CandidateNodes(np.ascontiguousarray(positions[near]), surface.normals[samples[near]], samples[near], length)

@@ -1,1 +1,1 @@
-"""What a run tells its user: figures, the terminal, and files that appear all together or not at all."""
+"""What a run tells its user: figures, advice on lengths, the terminal, and the pages of a sweep."""

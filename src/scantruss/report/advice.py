@@ -1,4 +1,4 @@
-"""Which member length to take: lengths are tried by quick runs, and the first that passes here and above is suggested."""
+"""Which member length to take: quick runs try lengths; the first that passes, as the next longer one does, is suggested."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-LADDER = (1.0, 1.4, 1 / 1.4, 2.0, 0.5)  # lengths that are tried, in the usual one, until one is found
+LADDER = (1.0, 1.4, 1 / 1.4, 2.0, 0.5)  # lengths to try until one is found, as multiples of the usual one
 NEXT = 1.4  # a length is suggested if that many times it passes too
-NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5)  # lengths that are tried in place of one that failed
+NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5)  # lengths to try in place of one that failed
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
-ENOUGH_TIME = 20.0  # after so long no further length is tried [s]
-MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
-CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
+ENOUGH_TIME = 20.0  # time after which no further length is tried [s]
+MOST_MEMBERS = 60_000  # most members of a grid made to try a length
+CLOSE_BEND = 0.95  # share of the scan with a larger radius of curvature than the one reported
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What came of a member length."""
+    """The result of trying a member length."""
 
     length: float  #: [scan unit]
-    grid: Grid | None  #: with its certificate; None where none came out
+    grid: Grid | None  #: with its certificate; None if there is none
     fault: FrontError | None = None
 
     @property
     def passed(self) -> bool:
-        """Whether a grid came out that passes."""
+        """Whether there is a grid, and it passes."""
         return self.grid is not None
 
     @property
@@ -70,7 +70,7 @@ class Advice:
         self._since = perf_counter()
 
     def try_length(self, length: float) -> Trial | None:
-        """Return what comes of a length; None where that was not tried: it is out of range, takes too many members or no time is left."""
+        """Try a length; None if it was not tried: it is out of range, needs too many members, or no time is left."""
         if length in self._found:
             return self._found[length]
         low, high = exact_range(self._cloud)
@@ -92,11 +92,11 @@ class Advice:
 
     @property
     def settings(self) -> Settings:
-        """The settings with what the lengths tried needed to pass."""
+        """The settings, with whatever the lengths tried so far needed to pass."""
         return self._settings
 
     def suggest(self) -> float:
-        """Return the length to take: the first of a ladder that passes with what is next above it, else the first that passes."""
+        """Return the length to take: the first of a ladder that passes together with the next longer one, else the first that passes."""
         usual = suggest_length(self._cloud)
         low, high = length_range(self._cloud)
         lengths = list(dict.fromkeys(min(max(_two_digits(share * usual), low), high) for share in LADDER))
@@ -113,7 +113,7 @@ class Advice:
         return usual if first is None or first.passed else some
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not; None where none of those tried does."""
+        """Return the nearest length that passes in place of one that does not; None if none of those tried does."""
         for share in NEARBY:
             trial = self.try_length(_two_digits(share * length))
             if trial is not None and trial.passed:
@@ -121,11 +121,11 @@ class Advice:
         return None
 
     def next_above(self, length: float) -> float:
-        """Return the next longer length that is looked at."""
+        """Return the next longer length to look at."""
         return min(_two_digits(NEXT * length), max(length, length_range(self._cloud)[1]))
 
     def next_below(self, length: float) -> float:
-        """Return the next shorter length that is looked at."""
+        """Return the next shorter length to look at."""
         return max(_two_digits(length / NEXT), min(length, length_range(self._cloud)[0]))
 
     def members(self, length: float) -> int:
@@ -134,7 +134,7 @@ class Advice:
         return round(2.0 * np.sqrt(3.0) * area / length**2)
 
     def radius(self) -> float:
-        """Return the radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
+        """Return the radius of curvature that nearly all of the scan exceeds [scan unit]; inf if it is flat."""
         samples = sample_surface(self._cloud, self._settings.replace(length=suggest_length(self._cloud)))
         bend = float(np.quantile(measured_bends(samples.surface, 1.0), CLOSE_BEND))
         return 1.0 / bend if bend > 0.0 else np.inf

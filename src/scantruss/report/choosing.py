@@ -78,7 +78,7 @@ def encode_page(
 
 
 def title_of(trial: Trial, outcome: Outcome) -> str:
-    """Return two lines over a picture: what is varied, and the figures that tell most."""
+    """Return two lines above a picture: what is varied, and the main figures."""
     figures = dict(zip(FIGURES, outcome.figures, strict=True))
     line = f"{figures['members']} members, std/mean {figures['length std/mean']}, shape {figures['shape']}"
     return f"{trial.title}\n{line}"

@@ -110,7 +110,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
 
 
 def first_line(certificate: Certificate) -> list[str]:
-    """Return what a user must know first: that ScanTruss left out much of the scan by its own judgement; nothing where it did not."""
+    """Return what a user must know first: that ScanTruss, by its own judgement, left out much of the scan; else nothing."""
     if certificate.judged_out <= WARN_LEFT_OUT:
         return []
     own = [part for part in certificate.left_out if not part.asked and part.kind != "duplicates"]
@@ -141,7 +141,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
     """Return what the grid does not follow, with counts, places and sizes."""
     unit, lines = f" {certificate.unit}" if certificate.unit else "", []
     for part in certificate.left_out:
-        if part.kind == "far" and part.where is not None:  # a warning tells of it
+        if part.kind == "far" and part.where is not None:  # a warning reports it
             continue
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {part.size:.3g}{unit} across"
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
@@ -151,7 +151,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
 
 def warning_lines(certificate: Certificate) -> list[str]:
     """Return a line for each warning, with its place."""
-    return [f"look there: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
+    return [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
 
 
 def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
@@ -192,12 +192,12 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
         + (f" ({cloud.dropped} more left out: NaN or infinite)" if cloud.dropped else ""),
         f"extent   {extent}{unit}, from {' '.join(lowest)}",
         f"spacing  {cloud.spacing:.4g}{unit}",
-        f"unit     {cloud.unit or 'not known; --unit mm|cm|m|inch|foot says it'}",
+        f"unit     {cloud.unit or 'not known; give it with --unit mm|cm|m|inch|foot'}",
     ]
     if low > high:
         lines.append(
-            f"no length: members must be {low:g}{unit} long or more for points so far apart, and {high:g} or less for a scan so"
-            " small; scan it more densely"
+            f"no length fits: the points need members of at least {low:g}{unit}, and the scan is too small for more than {high:g}"
+            "; scan it more densely"
         )
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
@@ -205,7 +205,7 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
 
 
 def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of a table: what comes of a member length, of the next below and the next above."""
+    """Return head and rows of a table: the results of a member length, the next shorter one and the next longer one."""
     radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
     rows: list[tuple[str, ...]] = []
     for each in dict.fromkeys((advice.next_below(length), length, advice.next_above(length))):
@@ -224,7 +224,7 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
 
 
 def result_of(trial: Trial | None) -> str:
-    """Return in a few words what came of a length."""
+    """Return the result of a length in a few words."""
     if trial is None:
         return "not tried"
     if trial.grid is None or trial.grid.certificate is None:
@@ -238,9 +238,13 @@ def result_of(trial: Trial | None) -> str:
 
 
 def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
-    """Return how noisy and how bent the scan is, and which length to take."""
+    """Return how noisy and how curved the scan is, and which length to take."""
     unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
-    bent = f"R = {radius:.3g}{unit}: 95 % of the scan is bent less" if np.isfinite(radius) else "the scan is flat"
+    bent = (
+        f"R = {radius:.3g}{unit}: radius of curvature that 95 % of the scan exceeds"
+        if np.isfinite(radius)
+        else "the scan is flat"
+    )
     lines = [bent]
     if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
         noise = trial.grid.certificate.noise

@@ -1,4 +1,4 @@
-"""The terminal: a progress bar a stage, and tables; rich is imported only when there is something to draw."""
+"""The terminal: a progress bar for each stage, and tables; rich is imported only when there is something to draw."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ quiet = False  #: print nothing: neither bars nor notes nor results
 
 
 class Bars(AbstractContextManager["Bars"]):
-    """A progress bar a stage on stderr, none where stderr is not a terminal; notes on stderr.
+    """A progress bar for each stage on stderr, if that is a terminal, and notes on stderr.
 
     An object is a ``progress(stage, share)`` for the functions of the library.
     """
@@ -29,7 +29,7 @@ class Bars(AbstractContextManager["Bars"]):
         self._said: set[str] = set()
 
     def __enter__(self) -> Bars:
-        """Start drawing, if there is somebody to look."""
+        """Start drawing, if stderr is a terminal."""
         if sys.stderr.isatty() and not quiet:
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -42,7 +42,7 @@ class Bars(AbstractContextManager["Bars"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Take the bars away."""
+        """Remove the bars."""
         if self._rich is not None:
             self._rich.stop()
 
@@ -59,7 +59,7 @@ class Bars(AbstractContextManager["Bars"]):
         self._rich.update(self._tasks[stage], completed=min(max(share, 0.0), 1.0))
 
     def note(self, line: str) -> None:
-        """Say one line, above the bars where there are any."""
+        """Print one line, above the bars if there are any."""
         if quiet:
             return
         if self._rich is not None:
@@ -68,7 +68,7 @@ class Bars(AbstractContextManager["Bars"]):
             print(line, file=sys.stderr, flush=True)
 
     def note_once(self, line: str) -> None:
-        """Say one line, unless it was said in this way before."""
+        """Print one line, unless it has been printed in this way before."""
         if line not in self._said:
             self._said.add(line)
             self.note(line)

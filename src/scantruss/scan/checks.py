@@ -14,29 +14,29 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from .cloud import PointCloud
 
-POINTS_OF_EXTENT = 10_000  # points that show where a file lies
-BULK = 100_000  # points that show where most of them lie
+POINTS_OF_EXTENT = 10_000  # points from which the place of a file is told
+BULK = 100_000  # points from which the place of most of a scan is told
 FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is an outlier
 BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which the bulk lies
-POINTS_OF_MIDDLE = 2_000  # points that show where the middle half lies
+POINTS_OF_MIDDLE = 2_000  # points from which the place of the middle half is told
 FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
-RASTER = 4.0  # different x of a raster, in square roots of its points, at most
+RASTER = 4.0  # most different x of a raster, in square roots of its number of points
 NO_DATA, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points that may have a value for no data
-CLIFF = 0.1  # gap to the other heights, in their range, that no terrain has
-STEEP_CLIFF = 10.0  # steepness towards the nearest others, in the usual one, that no shore has
+CLIFF = 0.1  # gap to the other heights, as a share of their range, that no terrain has
+STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
-EXTENTS = (1e-30, 1e30)  # of a scan in any unit; swapped bytes make less of a whole number, and more of others
+EXTENTS = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
 CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
 WIDEST = 1.0  # degrees that a scan spans at most
 STEEP = 50.0  # heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
 
 
 def extent_of(points: np.ndarray) -> np.ndarray:
-    """Return about the lowest and highest coordinates of points (N, 3), (2, 3); inf and -inf where there are none."""
+    """Return about the lowest and highest coordinates of points (N, 3), (2, 3); inf and -inf if there are none."""
     some = points[:: max(len(points) // POINTS_OF_EXTENT, 1)]
-    some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # whole numbers have no inf
+    some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # integers have no inf
     return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
 
 
@@ -65,7 +65,7 @@ def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[str, ...]:
     """Return a note on files that lie apart, by the extent (2, 3) of each.
 
-    Two lie together where the gap between them is no longer than the longer of them, or where others lead from one to the other.
+    Two files lie together if the gap between them is no longer than the longer of them, or if others bridge it.
     """
     held = [number for number, extent in enumerate(extents) if np.isfinite(extent).all()]
     if len(held) < 2:
@@ -93,7 +93,7 @@ def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[s
 
 
 def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said: str) -> np.ndarray | None:
-    """Return which points lie too far away to belong to the scan, (N,) bool; None where all belong to it.
+    """Return which points lie too far away to belong to the scan, (N,) bool; None if all belong to it.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
         Finite.
     lower, upper : their smallest and largest coordinates
     said : str
-        What a message starts with.
+        Start of the message.
 
     Raises
     ------
@@ -136,10 +136,9 @@ def invalid_values_note(points: np.ndarray) -> str:
 
 
 def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None where none has.
+    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None if none has.
 
-    Many points then share exactly the least or the greatest height, and there is a cliff between them and their neighbours: a lake
-    has a shore.
+    Then many points share exactly the least or the greatest height, and a cliff divides them from their neighbours; a lake has a shore.
     """
     z = points[:, 2]
     if len(points) < FEWEST_POINTS or len(np.unique(points[:, 0])) > RASTER * math.sqrt(len(points)):
@@ -156,7 +155,7 @@ def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 
 
 def _has_cliff(level: np.ndarray, rest: np.ndarray) -> bool:
-    """Whether the nearest points of the rest (M, 3) lie far more steeply above or below level points (K, 3) than points of the rest do."""
+    """Whether the slope from level points (K, 3) to the nearest of the rest (M, 3) is far steeper than slopes within the rest."""
     rest = rest[:: len(rest) // SOME_OF_RASTER + 1]
 
     def steepness(some: np.ndarray, itself: bool) -> float:

@@ -1,4 +1,4 @@
-"""PointCloud: measured points relative to a local origin; and how far apart they lie."""
+"""PointCloud: measured points relative to a local origin, and their spacing."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ NO_DATA = "with a height that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
 SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # ... and those of these files
-COPIES = 5  # times that a place may be repeated in a scan that is stored so often
+COPIES = 5  # times that a scan may be stored with every point repeated
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
-ROUGHLY = 60  # of them at which it is guessed first
+ROUGHLY = 60  # points among them for a first estimate
 POINTS_FOR_GAP = 200  # points at which the gap is measured
-POINTS_PER_THREAD = 50_000  # fewest points for a thread of their own
+POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,14 @@ class PointCloud:
 
     points: np.ndarray  #: (N, 3) float64 [scan unit], relative to `origin`
     origin: np.ndarray  #: (3,) float64 [scan unit], so that national-grid coordinates lose nothing
-    unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    unit: str = ""  #: mm, cm, m, inch, foot, or "" if it is not known
     dropped: int = 0  #: points left out because a coordinate was NaN or infinite
     left_out: tuple[tuple[str, int], ...] = ()  #: why other points of the file were not taken, and how many
     name: str = ""  #: file the points came from
-    notes: tuple[str, ...] = ()  #: what a user should know of how it was read
+    notes: tuple[str, ...] = ()  #: what a user should know about how it was read
 
     def __repr__(self) -> str:
-        """Say how many points there are and how far they reach."""
+        """Give the number of points and the extent."""
         sides = " x ".join(f"{side:.4g}" for side in self.bounds[1] - self.bounds[0])
         unit = f" {self.unit}" if self.unit else ""
         name = f"{self.name}: " if self.name else ""
@@ -53,7 +53,7 @@ class PointCloud:
 
     @property
     def z_is_up(self) -> bool:
-        """Whether z certainly points upwards: in surveys of buildings and terrain, as their unit or their file tells."""
+        """Whether z certainly points upwards: in surveys of buildings and terrain, told by their unit or file."""
         return self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES)
 
     @property
@@ -78,10 +78,10 @@ class PointCloud:
         Parameters
         ----------
         points : (N, 3) array of numbers [scan unit]
-            Points with a coordinate that is NaN or infinite are dropped and counted; a few that lie a million times farther
-            away than others too, in `notes`.
+            Points with a coordinate that is NaN or infinite are dropped and counted; so are a few a million times farther away
+            than the others, with a note in `notes`.
         unit : str
-            Unit of the coordinates: mm, cm, m, inch, foot, or "" where it is not known.
+            Unit of the coordinates: mm, cm, m, inch, foot, or "" if it is not known.
         name : str
             File the points came from; messages start with it.
 
@@ -93,7 +93,7 @@ class PointCloud:
         Raises
         ------
         InputError
-            Wrong shape, no numbers, too few points, all of them on a line, or values that no scan has.
+            Wrong shape, no numbers, too few points, all points on a line, or values that no scan has.
         """
         check_unit(unit)
         said = f"{name}: " if name else ""
@@ -152,7 +152,7 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
 
 
 def bounds_of(array: np.ndarray) -> Bounds:
-    """Return the smallest and largest coordinates, (3,) each; NaN where one is NaN or infinite."""
+    """Return the smallest and largest coordinates, (3,) each; NaN if one is NaN or infinite."""
     if not len(array):
         return np.zeros(3), np.zeros(3)
     from ..kernels.geometry.bounds import widen_bounds
@@ -179,9 +179,9 @@ def _check_extent(lower: np.ndarray, upper: np.ndarray, said: str) -> float:
 def _local_origin(lower: np.ndarray, upper: np.ndarray, extent: float) -> np.ndarray:
     """Return an origin near the cloud from which every point differs by an exact float64.
 
-    An axis keeps its own zero where that lies near the cloud. Elsewhere the origin is the centre of the bounding box,
-    rounded to a power of two no larger than the extent: both then lie within a factor of two of each other, and such
-    a difference is exact (Sterbenz).
+    An axis keeps its own zero if that lies near the cloud. Otherwise the origin is the centre of the bounding box, rounded to a
+    power of two no larger than the extent: coordinates and origin then differ by at most a factor of two, and such a difference
+    is exact (Sterbenz).
     """
     step = 2.0 ** math.floor(math.log2(extent))
     centre = 0.5 * lower + 0.5 * upper
@@ -206,7 +206,7 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, said: str) -> None:
     """Refuse points whose spread across their main direction is rounding.
 
-    A strip is at least about one spacing wide, that is 1 / N of its length; what is much narrower is a line.
+    A strip is at least about one spacing wide, that is 1 / N of its length; anything much narrower is a line.
     """
     mean, products = sums[:3] / (count * extent), sums[3:] / (count * extent * extent)
     covariance = products[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3) - np.outer(mean, mean)
@@ -251,7 +251,7 @@ def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
 
 
 def measure_gap(points: np.ndarray) -> float:
-    """Return the median distance to the sixth neighbour that does not coincide with another one: it tells the density of any pattern.
+    """Return the median distance to the sixth neighbour, coincident points counted once: it measures the density of any pattern.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def measure_gap(points: np.ndarray) -> float:
 
 
 def _nearest_of(rows: np.ndarray, others: np.ndarray, same: float) -> np.ndarray:
-    """Return the distance of each row to the nearest of the others that does not coincide, inf where none."""
+    """Return the distance of each row to the nearest of the others that does not coincide, inf if none."""
     squared = np.zeros((len(rows), len(others)))
     for axis in range(3):
         squared += (rows[:, axis, None] - others[:, axis]) ** 2
@@ -295,8 +295,8 @@ def _refine(
 ) -> np.ndarray:
     """Return the nearest distances of the sample, exact up to their median, in the whole cloud.
 
-    Neighbours are looked for in search boxes around the points of the sample, whose size grows until more than half
-    of the sample have theirs, each counted as often as it was taken; the others are farther than the median. `some` distances to
+    Neighbours are sought in search boxes around the points of the sample, which grow until more than half of the sample have one
+    (repeated points count each time); the others are farther away than the median. `some` distances to
     the nearest of the sample (K,) tell where to begin.
     """
     found = np.full(len(sample), math.inf)
@@ -315,7 +315,7 @@ def _refine(
 
 
 def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) -> np.ndarray:
-    """Return the distance of each point of the sample to the nearest point within `size`, inf where there is none."""
+    """Return the distance of each point of the sample to the nearest point within `size`, inf if there is none."""
     from ..kernels.geometry.boxes import new_boxes
     from ..kernels.scan import nearby
 

@@ -1,4 +1,4 @@
-"""Which member lengths a scan can carry, and which one suits it."""
+"""The member lengths that are possible on a scan, and the one that suits it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from ..errors import InputError
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud
 
-SPACINGS = 3.0  #: a member needs this many point spacings: fewer points than that do not tell a boundary from a gap
-GAPS = 1.75  #: ... and where points lie at random, this many distances to the sixth neighbour
-USUAL_GAPS = 3.5  #: what suits evenly meshed scans, where nobody said a length
-USUAL = 25.0  #: members along the longest side of a scan, where nobody said a length
+SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be told from a gap
+GAPS = 1.75  #: ... and, for random points, this many distances to the sixth neighbour
+USUAL_GAPS = 3.5  #: the same for a suggested length, which suits evenly meshed scans
+USUAL = 25.0  #: members along the longest side of a scan, for a suggested length
 LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:
-    """Refuse a member length outside of the range that this scan can carry; see `length_range`.
+    """Refuse a member length outside the range of this scan; see `length_range`.
 
     Raises
     ------
@@ -51,18 +51,18 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
 
 
 def exact_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the smallest and the largest member length that a scan carries [scan unit]."""
+    """Return the smallest and the largest possible member length of a scan [scan unit]."""
     return max(SPACINGS * cloud.spacing, GAPS * cloud.gap), _usual_extent(cloud) / LARGEST_PER_EXTENT
 
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the smallest and the largest member length that a scan carries, rounded to two digits [scan unit]."""
+    """Return the smallest and the largest possible member length of a scan, rounded to two digits [scan unit]."""
     low, high = exact_range(cloud)
     return round_length(low, "up"), round_length(high, "down")
 
 
 def _usual_extent(cloud: PointCloud) -> float:
-    """Return the longest side of a scan; of its bulk where a few points lie so far away that they are none of it [scan unit]."""
+    """Return the longest side of a scan, or of its bulk if a few points lie too far away to belong to it [scan unit]."""
     from .checks import usual_extent
 
     usual = float(np.ptp(usual_extent(cloud.points), axis=0).max())

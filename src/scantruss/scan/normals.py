@@ -10,13 +10,13 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from .vectors import dots
 
-HEAD_ON = 40  # links of which a smooth two-sided surface has fewer that meet head-on
-SAMPLES_PER_THREAD = 1500  # samples that a thread takes at least
-STEEP = 0.75  # sine of the angle over the plane of a sample at which a neighbour lies on another sheet
+HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
+SAMPLES_PER_THREAD = 1500  # fewest samples that are worth a thread
+STEEP = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
 def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
-    """Drop links (S, K) to samples that stand over a sample rather than beside it."""
+    """Drop links (S, K) to samples that lie above a sample rather than beside it."""
     in_parts(
         len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j)
     )
@@ -53,7 +53,7 @@ def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> n
 
 
 def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
-    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards where that does not tell (a plate)."""
+    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards if that does not decide (a plate)."""
     count = np.bincount(piece)
     centre = np.stack([np.bincount(piece, mean[:, c]) / count for c in range(3)], axis=1)
     arm = mean - centre[piece]
@@ -69,10 +69,10 @@ def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> No
 
 
 def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
-    """Refuse a one-sided surface (Moebius strip): whatever side the normals are turned to, they meet head-on somewhere.
+    """Refuse a one-sided surface (Moebius strip): however its normals are oriented, opposite ones meet somewhere.
 
-    Counted are links in which neighbours of a smooth part lie side by side and yet face opposite sides: where the scan is rough
-    or overgrown that happens at random.
+    Only links within smooth parts count, between neighbours that lie side by side and yet face opposite sides: on rough or
+    overgrown scans that happens at random.
     """
     smooth = 0.15 * surface.step
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:

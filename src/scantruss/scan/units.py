@@ -1,4 +1,4 @@
-"""One unit for all coordinates: what the file says, what the user says, and heights that have another one."""
+"""Units of coordinates: from the file, from the user, and of heights that have another one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..settings import UNITS
 
 SAME_UNIT = 1e-5  # US survey feet are feet, to two parts in a million
 _NAMES = "mm|cm|m|inch|inches|foot|feet|ft|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?"
-_INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # what follows tells it from the word: "the unit in this file is mm"
+_INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # told from the word by what follows: "the unit in this file is mm"
 _GAP = r"[^\w\r\n]"
 PATTERN = rf"(?:units?|einheit){_GAP}{{0,3}}(?:in{_GAP}{{1,3}})?({_NAMES}|{_INCH})\b"  #: in a comment of a file
 _IN_NAME = re.compile(rf"[(\[<]\s*({_NAMES}|in)\s*[)\]>]$|[\s_]({_NAMES})$", re.IGNORECASE)  # x_in may be an input
@@ -20,13 +20,13 @@ _WORDS = {"feet": "foot", "ft": "foot", "in": "inch", "inches": "inch"}
 
 
 def check_unit(unit: str) -> None:
-    """Refuse a unit that is not known."""
+    """Refuse an unknown unit."""
     if unit not in UNITS:
         raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
 
 
 def metres_of(word: str) -> float | None:
-    """Return the metres of a word for a unit; None for "" and where it is not known."""
+    """Return the metres of a named unit; None for "" and unknown ones."""
     word = word.lower()
     for start, unit in (("mi", "mm"), ("ce", "cm"), ("me", "m")):
         word = unit if word.startswith(start) else word
@@ -34,13 +34,13 @@ def metres_of(word: str) -> float | None:
 
 
 def metres_of_comments(lines: Iterable[str]) -> float | None:
-    """Return the metres of a unit that a comment of a text file names; None where there is none."""
+    """Return the metres of a unit that a comment of a text file names; None if there is none."""
     found = (re.match(rf"\s*(?:#|//).*?\b{PATTERN}", line, re.IGNORECASE) for line in lines)
     return next((metres_of(match[1]) for match in found if match), None)
 
 
 def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, float | None]:
-    """Return the metres a unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None where they do not.
+    """Return the metres per unit of x and y, and of z, that names of columns tell, as ``X [mm]`` or ``z_ft``; None if they do not.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, f
 
 
 def name_of(metres: float | None) -> str:
-    """Return the name of a unit; "" where none of ours fits."""
+    """Return the name of a unit; "" if we have none for it."""
     for name, size in UNITS.items():
         if size and metres and math.isclose(size, metres, rel_tol=SAME_UNIT):
             return name

@@ -6,5 +6,5 @@ import numpy as np
 
 
 def dots(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the scalar product of each vector of a (N, 3) with that of b, (N,): by columns, as sums of three numbers are slow."""
+    """Return the scalar product of each vector of a (N, 3) with that of b, (N,): by columns, as sums along rows of three are slow."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]

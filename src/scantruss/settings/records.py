@@ -90,14 +90,14 @@ class MemberSettings(_Checked):
         "member lengths that vary over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
         unit="scan unit",
     )
-    method: str = _setting("default", "the paper to the letter, or the improved method", choices=METHODS)
+    method: str = _setting("default", "default: the improved method; paper: the paper to the letter", choices=METHODS)
     effort: str = _setting(
         "normal",
         "how much time to spend on regularity (default method only); best tries 24 fronts and anneals two",
         choices=EFFORTS,
     )
     prefer: str = _setting(
-        "balance", "what matters more where both cannot be had: equal members or regular triangles", choices=PREFER
+        "balance", "which matters more, if there is a choice: equal members or regular triangles", choices=PREFER
     )
 
 
@@ -139,12 +139,12 @@ class CleaningSettings(_Checked):
         True, "leave out duplicate points if they are a hundredth of the points or more", source="Sec. 2"
     )
     judge_outliers: str = _setting(
-        "auto", "when to look for outliers: auto, where samples stand alone or no grid passes; or always",
+        "auto", "when to look for outliers: auto, if samples are isolated or no grid passes; or always",
         choices=("auto", "always"),
     )  # fmt: skip
     keep_rods: bool = _setting(
         True,
-        "keep columns, scaffold and cables, thinner than a member; they are left out where no grid passes with them",
+        "keep columns, scaffold and cables, thinner than a member; they are left out if no grid passes with them",
     )
     piece: str = _setting(
         "auto",
@@ -212,8 +212,8 @@ class ConstraintSettings(_Checked):
         high=180.0,
     )
     fold_weight: float = _setting(
-        0.0, "draws nodes to the crests of folds that are no ridges, also rounded ones, at the cost of even members; 1 is usual,"
-        " 0: not at all (default method only)", low=0.0, high=10.0,
+        0.0, "draw nodes to the crests of folds that are no ridges, even rounded ones, at the cost of even members; 1 is usual,"
+        " 0: off (default method only)", low=0.0, high=10.0,
     )  # fmt: skip
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
-OPEN = 0.5  # mean normal by area from which on a shell is open: it faces one way on the whole
-FACING = 0.08  # ... from which on it tells which way is up where no flat face does
-FACE_DEPTH = 0.02  # how even a face is on which something stands [longest side]
+OPEN = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
+FACING = 0.08  # ... above which it tells which way is up if no flat face does
+FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
-DIRECTIONS = 64  # in which a convex polygon is looked for
+DIRECTIONS = 64  # directions in which a convex polygon is sought
 ANGLES = {  # azimuth and elevation of the views of a drawing [degree]
     "top": (0.0, 90.0), "bottom": (0.0, -90.0), "front": (0.0, 0.0), "back": (180.0, 0.0),
     "left": (-90.0, 0.0), "right": (90.0, 0.0),
@@ -66,7 +66,7 @@ def choose_camera(
 ) -> Camera:
     """Return a camera that looks at a grid from a side.
 
-    "auto" looks from above and aside: the more an open shell faces upwards, the more from above. The other views are those of a
+    "auto" looks obliquely from above: the more an open shell faces upwards, the more from above. The other views are those of a
     drawing: the front is where one looks along y, or against z where y is up.
 
     Parameters
@@ -108,9 +108,9 @@ def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """Return the direction that is probably up (3,), where nothing tells of gravity: what is there lies on its largest flat face.
+    """Return the direction that is probably up (3,), where gravity is not known: an object lies on its largest flat face.
 
-    An open shell stands on its opening. What has no flat face stands along its longest side, or lies where it is flat.
+    An open shell stands on its opening. An object without a flat face stands along its longest side, or lies if it is flat.
     """
     openness = float(np.linalg.norm(facing))
     if openness > OPEN:
@@ -163,7 +163,7 @@ def _is_lying(nodes: np.ndarray, ground: np.ndarray) -> bool:
 
 
 def _sides(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the horizontal directions to the one who looks from the front, and to the right of him."""
+    """Return the horizontal directions towards a viewer in front, and to the viewer's right."""
     forward = np.array([0.0, 0.0, 1.0]) if abs(ground[1]) > 0.8 else np.array([0.0, -1.0, 0.0])
     first = forward - (forward @ ground) * ground
     first /= np.linalg.norm(first)
@@ -171,7 +171,7 @@ def _sides(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _front(nodes: np.ndarray, ground: np.ndarray, facing: np.ndarray, openness: float) -> np.ndarray:
-    """Return a horizontal direction to the eye: a little aside of the front; across the longer side of what lies."""
+    """Return a horizontal direction to the eye: slightly off the front, or across the longer side of a lying object."""
     first, second = _sides(ground)
     level = facing - (facing @ ground) * ground
     turn = math.radians(28)
@@ -201,7 +201,7 @@ def map_depth(corners: np.ndarray, near: np.ndarray, shape: tuple[int, int]) -> 
     Returns
     -------
     nearest : np.ndarray
-        (rows, columns) nearness of what is in front, -inf where nothing is [scan unit].
+        (rows, columns) nearness of what is in front, -inf if nothing is [scan unit].
     triangle : np.ndarray
         (rows, columns) int64 triangle in front, -1 where none is.
     """

@@ -1,4 +1,4 @@
-"""What of a scan is drawn over its grid: the points that the grid follows, and those that it leaves out by what they are."""
+"""The points of a scan drawn over its grid: those that the grid follows, and those that it leaves out, by kind."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Shown:
 
 
 def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
-    """Return the points of a scan sorted by what its grid makes of them; all as followed where nobody knows how it was made."""
+    """Return the points of a scan by what its grid makes of them; all are followed if the settings of the grid are not known."""
     points = placed(cloud, grid)
     if grid.settings is None:
         return Shown(points)

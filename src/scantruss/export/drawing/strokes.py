@@ -122,19 +122,19 @@ def _surface_strokes(
 
 
 def fallen_shadow(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return (V, 3) where the shadow of each node falls on the ground a little below the lowest."""
+    """Return (V, 3) where the shadow of each node falls on the ground, just below the lowest node."""
     height = nodes @ camera.ground
     used = height[np.unique(triangles)]
     floor = float(used.min()) - 0.02 * float(np.ptp(used))
     across = float(np.ptp(nodes @ camera.right))
-    slope = min(1.0, 0.6 * across / max(float(np.ptp(used)), 1e-300))  # tall things throw shadows as short as flat ones
+    slope = min(1.0, 0.6 * across / max(float(np.ptp(used)), 1e-300))  # tall objects cast shadows as short as flat ones
     sun = _unit(camera.ground + slope * (-0.30 * camera.right + 0.12 * np.cross(camera.ground, camera.right)))
     fallen: np.ndarray = nodes - ((height - floor) / (sun @ camera.ground))[:, None] * sun
     return fallen
 
 
 def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
-    """Return the shadow that a surface throws on the ground below it."""
+    """Return the shadow that a surface casts on the ground below it."""
     shape = camera.project(fallen_shadow(nodes, triangles, camera))[0][triangles]
     colour = np.broadcast_to(np.concatenate([GROUND, [1.0]]), (len(shape), 4))
     return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))

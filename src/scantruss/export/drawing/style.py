@@ -18,7 +18,7 @@ class PictureStyle:
     Raises
     ------
     InputError
-        A value is none of those that are possible.
+        A value is not one of those allowed.
     """
 
     views: tuple[str, ...] = ("auto",)  #: side by side: names of `VIEWS`, or "AZIMUTH,ELEVATION" [degree]
@@ -39,7 +39,7 @@ class PictureStyle:
 
 
 def angles_of(view: str) -> tuple[float, float] | None:
-    """Return azimuth (from the front, anticlockwise seen from above) and elevation of a view [degree]; None where it names none."""
+    """Return azimuth (from the front, anticlockwise seen from above) and elevation of a view [degree]; None if it names none."""
     number = r"[+-]?\d+\.?\d*"
     found = re.fullmatch(rf"({number}),({number})", view)
     if found is None or abs(float(found[2])) > 90.0:

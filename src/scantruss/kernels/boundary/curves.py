@@ -10,7 +10,7 @@ from ...runtime.jit import kernel
 
 
 class Curves(NamedTuple):
-    """Polylines: closed ones, one a boundary loop, the last point of each joins its first; and those of lines, which may be open.
+    """Polylines: one closed one for each boundary loop, whose last point joins its first; and those of lines, which may be open.
 
     An open one is as long as the arc length of its last point.
     """
@@ -55,7 +55,7 @@ def is_open(curves: Curves, curve: int) -> bool:
 
 @kernel
 def segment_at(curves: Curves, curve: int, arc: float) -> int:
-    """Segment of a curve in which an arc length (0 to total) lies, by halving."""
+    """Segment of a curve in which an arc length (0 to total) lies, by bisection."""
     low, high = curves.start[curve], curves.start[curve + 1]
     while high - low > 1:
         middle = (low + high) // 2
@@ -120,7 +120,7 @@ def slide(
 
 @kernel
 def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int, float, float]:
-    """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 where there is no curve."""
+    """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 if there is no curve."""
     best, curve, arc = np.inf, -1, 0.0
     for c in range(len(curves.total)):
         i, last = curves.start[c], curves.start[c + 1]

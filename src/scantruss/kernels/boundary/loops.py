@@ -18,8 +18,8 @@ from ..surface.local_surface import Surface, flood, walk
 
 DIRECTIONS = 64
 BINS = 240
-OVER = 0.4  # sine of the angle over the mean plane of two places from which on they lie on two sheets
-ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places from which on they may lie on one sheet
+OVER = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
+ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places, above which they may lie on one sheet
 FACING = 0.2  # samples whose normals have a smaller cosine are another sheet, or a plant
 
 
@@ -27,7 +27,7 @@ FACING = 0.2  # samples whose normals have a smaller cosine are another sheet, o
 def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, noise: float) -> tuple[float, float]:
     """Direction of another place in the tangent plane, and its distance as if the surface were unrolled into the plane.
 
-    Heights over the plane below `noise` do not count: a rough scan is seen as a sheet.
+    Heights above the plane below `noise` do not count: a rough scan is taken as a sheet.
     """
     d = subtract(other, place)
     a, b = dot(d, u), dot(d, v)
@@ -37,7 +37,7 @@ def _polar(place: Vector, normal: Vector, u: Vector, v: Vector, other: Vector, n
 
 @kernel
 def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead: np.ndarray) -> bool:
-    """Whether the directions to the neighbours of a sample leave a gap wider than `widest` [rad]; False where there are none.
+    """Whether the directions to the neighbours of a sample leave a gap wider than `widest` [rad]; False if there are none.
 
     widest : less than a right angle. ahead (K, 3) is scratch: the directions in their order around the sample, each with a number that
     grows as its angle does.
@@ -59,7 +59,7 @@ def has_gap(surface: Surface, s: int, u: Vector, v: Vector, widest: float, ahead
                 at -= 1
             ahead[at, 0], ahead[at, 1], ahead[at, 2] = a, b, turn
             count += 1
-    if count == 0 or ahead[count - 1, 2] - ahead[0, 2] < 2.0:  # all to one side
+    if count == 0 or ahead[count - 1, 2] - ahead[0, 2] < 2.0:  # all on one side
         return count > 0
     limit = math.cos(widest)
     for k in range(count):
@@ -104,7 +104,7 @@ def _block(
 
 @kernel
 def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np.ndarray, begin: int, end: int) -> None:
-    """For each sample from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 where there is none.
+    """For each sample from `begin` to `end` - 1, a direction in which a disc that touches it would be empty, or 9 if there is none.
 
     Samples whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
     the middle of the widest free range, counted from `across(normal)`, less than a turn.
@@ -121,7 +121,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
             continue
         blocked[:] = False
         reach, left = 2.0 * radii[s], DIRECTIONS
-        for k in range(surface.neighbors.shape[1]):  # these are enough for most that are inside
+        for k in range(surface.neighbors.shape[1]):  # these rule out most samples that are inside
             n = surface.neighbors[s, k]
             if n < 0 or left == 0:
                 break
@@ -151,7 +151,7 @@ def sample_disc(surface: Surface, sample: int, direction: float, radius: float) 
 
 @kernel
 def _nearest_clear(cover: np.ndarray) -> int:
-    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS where there is none.
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS if there is none.
 
     cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
     """
@@ -250,7 +250,7 @@ def roll_disc(
 
 @kernel
 def come_nearer(surface: Surface, places: np.ndarray, samples: np.ndarray) -> None:
-    """Go from the sample near each place (M,) on to the nearest one."""
+    """Replace the sample near each place (M,) by the nearest one."""
     for m in range(len(places)):
         samples[m] = walk(surface, samples[m], row(places, m))
 
@@ -293,7 +293,7 @@ def touch_points(
                 if abs(y) < radius and abs(h) < noise:
                     x = dot(d, out)
                     t = x + math.sqrt(radius * radius - y * y)
-                    if t > best + 1e-9 * radius:  # of two alike the first, whatever rounding says
+                    if t > best + 1e-9 * radius:  # the first of equals, whatever the rounding
                         best = t
                         touched[m, 0], touched[m, 1], touched[m, 2] = row(surface.points, p)
 
@@ -310,7 +310,7 @@ def normals_along(surface: Surface, curve: np.ndarray, sample: int, normals: np.
 def _beside(d: Vector, a: Vector, b: Vector) -> bool:
     """Whether two places at a distance d with normals a and b may lie side by side on one sheet, not one over the other.
 
-    A bend lets the chord dip below the plane at one end and come up through that at the other: only their mean tells.
+    On a bend the chord dips below the plane at one end and rises through that at the other: only the mean plane tells.
     """
     rise = dot(d, a) + dot(d, b)
     facing = dot(a, b)
@@ -334,7 +334,7 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
 
     Returns
     -------
-    at, gap : the first place and the steps to the second; gap 0 where there are none
+    at, gap : the first place and the steps to the second; gap 0 if there are none
     """
     count, longest = len(curve), _longest_step(curve)
     at, gap = 0, 0
@@ -349,7 +349,7 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
                     at, gap = i, k
                     break
                 k -= 1
-            else:  # so many steps back it may be near enough
+            else:  # within so many steps it may be near enough
                 k -= max(1, int((away - width) / longest))
     return at, gap
 
@@ -364,12 +364,12 @@ def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
             away = norm(subtract(row(curve, (i + k) % count), row(curve, i)))
             if away < room[i]:
                 room[i] = away
-            k += max(1, int((away - room[i]) / longest))  # so many steps on it may be nearer
+            k += max(1, int((away - room[i]) / longest))  # the next place that may be nearer
 
 
 @kernel
 def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, sample: int, radius: float) -> float:
-    """Share of the places of a loop that have room for most of a disc outside, on whatever sheet: about 1 for a true boundary.
+    """Share of the places of a loop that have room for most of a disc outside, on any sheet: about 1 for a true boundary.
 
     places : (M, 3) boundary points in order, the surface to their left. sample : one near the first place.
     """

@@ -33,12 +33,12 @@ from .front import (
     rules_at,
 )
 
-GOOD_ENOUGH = 0.8  # share of the best quality with a node that is there, from which on no new one is looked for
+GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
 
 
 @kernel
 def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) -> Vector:
-    """Where the new node of a segment would be best: the angles at both ends are divided into equal parts near 60 degrees."""
+    """The ideal point of a segment: it divides the angles at both ends into equal parts near 60 degrees."""
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
@@ -55,7 +55,7 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
 
 @kernel
 def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
-    """Propose a node where a place falls onto the surface; False where the scan has no points there."""
+    """Propose a node at the projection of a place onto the surface; False if the scan has no points there."""
     sample = front.sample[front.tail[s]]
     if fit_patch(surface, patch, sample, place) < 3:
         return False
@@ -99,7 +99,7 @@ def choose_by_quality(
             if front.out[q] >= 0:
                 score[i] = 0.9 * value
             elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
-                score[i] = 0.95 * value  # a node of the rows that the front has not come to yet
+                score[i] = 0.95 * value  # a candidate node that the front has not reached yet
     enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = False
     while True:
@@ -139,7 +139,7 @@ def has_room(front: Front) -> bool:
 
 @kernel
 def take_segment(front: Front) -> int:
-    """Next active segment of the queue, -1 where it is empty."""
+    """Next active segment of the queue, -1 if it is empty."""
     while front.count[FIRST] < front.count[LAST]:
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1
@@ -180,7 +180,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 
 @kernel
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
-    """The same by the six cases of Table 1; apart from `advance`, so that only who asks for the paper compiles it."""
+    """The same by the six cases of Table 1; separate from `advance`, so that it is compiled for method paper only."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH)
     for _ in range(budget):

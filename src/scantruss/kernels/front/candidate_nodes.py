@@ -1,4 +1,4 @@
-"""Nodes that are there before the front starts: those it starts from, and others offered to it, which it comes to as to its own."""
+"""Nodes that exist before the front starts: those of the initial front, and candidate nodes that it may attach."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
 class CandidateNodes(NamedTuple):
-    """Nodes of the rows that the scan is laid out in, for the front to come to."""
+    """Nodes of the position field that a front may attach."""
 
     places: np.ndarray  #: (K, 3)
     normals: np.ndarray  #: (K, 3) outer normals of the surface there
@@ -43,7 +43,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
 
 @kernel
 def add_candidate_nodes(front: Front, surface: Surface, candidates: CandidateNodes, clear: float) -> None:
-    """Add nodes that the front may come to: all that are farther than `clear` from its segments on their side of the surface."""
+    """Add the candidate nodes that are farther than `clear` from the front segments on their sheet."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     begun = front.count[NODES]
     for i in range(len(candidates.places)):

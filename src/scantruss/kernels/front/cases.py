@@ -27,15 +27,15 @@ from .front import (
     remove_segment,
 )
 
-# What the paper leaves open: how strict the tests are by which a triangle is found fit.
+# What the paper leaves open: how strictly a triangle is tested.
 TOLERANT = 0.7  # strictness of the tests for a triangle that a case asks for, from 0 to 1
 SOUND = 0.4  # shape quality below which the triangle of two merged nodes is too flat
 KEPT_SOUND = 0.35  # shape quality below which merging would leave a finished triangle too flat
 ALIGNED = 0.5  # cosine of the angle between a triangle and the surface at its nodes, below which it stands up from it
 MERGED = 0.9  # free nodes farther apart than this are not merged [lengths]
 LEAST = 0.3  # quality delta below which no triangle with an existing node is made
-SEEN = 2.4  # how far the nodes of the front are looked at around a segment [lengths]
-APART = 0.45  # least distance of a new node from a node that the front has not come to yet [lengths]
+SEEN = 2.4  # distance from a segment up to which nodes of the front are considered [lengths]
+APART = 0.45  # least distance of a new node from a candidate node that the front has not reached yet [lengths]
 
 TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
 
@@ -195,7 +195,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
 
 @kernel
 def _merge(front: Front, keep: int, lose: int, place: Vector) -> None:
-    """Let one node take over the triangles and segments of another, and move it; its normal becomes their mean."""
+    """Give one node the triangles and segments of another, and move it; its normal becomes the mean of both."""
     take(front.boxes, keep, front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2])
     take(front.boxes, lose, front.nodes[lose, 0], front.nodes[lose, 1], front.nodes[lose, 2])
     front.nodes[keep, 0], front.nodes[keep, 1], front.nodes[keep, 2] = place
@@ -248,9 +248,9 @@ def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, nea
 
 @kernel
 def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
-    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False where there is none.
+    """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False if there is none.
 
-    Searched are the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
+    The search covers the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
     unmeshed side (Eq. 7). A region without points is doubled once; then the segment waits for a later round.
     """
     a, b = front.tail[s], front.head[s]
@@ -300,7 +300,7 @@ def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: n
 def far_from_front(
     front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float
 ) -> bool:
-    """Step 2 of Sec. 3.4: whether a new node keeps at least `least` to all surrounding front segments."""
+    """Step 2 of Sec. 3.4: whether a new node is at least `least` away from all surrounding front segments."""
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
         t = front.out[q]
@@ -366,7 +366,7 @@ def new_node(
 
 @kernel
 def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
-    """Advance a segment by the six cases of Table 1; False where the case's triangle does not fit."""
+    """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
     near = near_nodes(surface, front, s, SEEN * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
     if case == TRIANGLE:

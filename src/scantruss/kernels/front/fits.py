@@ -1,6 +1,6 @@
-"""What may be attached to a front: who is near, the angles of a segment, whether a triangle or a new node fits (Sec. 3.4, Table 1).
+"""What may be attached to a front: nodes nearby, the angles of a segment, whether a triangle or node fits (Sec. 3.4, Table 1).
 
-Valid is a triangle that leaves the grid manifold and crosses nothing, on its own sheet of the surface (Eqs. 7-9 and more).
+A triangle is valid if it leaves the grid manifold and crosses nothing on its own sheet (Eqs. 7-9 and more).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
 def near_nodes(surface: Surface, front: Front, s: int, reach: float, length: float, found: np.ndarray) -> int:
     """Nodes within reach of the middle of a segment, on its sheet; returns their number.
 
-    Finished nodes are among them: a front that has gone astray must not run over them.
+    Finished nodes are included: a front that has lost its way must not run over them.
     """
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
@@ -89,7 +89,7 @@ def right_angle(front: Front, s: int) -> float:
 
 @kernel
 def _sector(front: Front, leaving: int, q: int) -> float:
-    """Angle at the tail of a segment, from it to node q; NO_SECTOR where q is outside the unmeshed area there."""
+    """Angle at the tail of a segment, from it to node q; NO_SECTOR if q is outside the unmeshed area there."""
     p = front.tail[leaving]
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
@@ -102,7 +102,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
 
 @kernel
 def passage_of(front: Front, s: int, p: int) -> int:
-    """Segment that leaves node p where the triangle of s and p meets the front there; -1: it meets it nowhere rightly."""
+    """Segment that leaves node p where the triangle of s and p meets the front there; -1 if they do not meet properly."""
     a, b = front.tail[s], front.head[s]
     at = front.out[p]
     while at >= 0:
@@ -117,8 +117,9 @@ def passage_of(front: Front, s: int, p: int) -> int:
 def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: float, strict: float) -> tuple[bool, int]:
     """Whether the triangle of segment s and node p may be attached; and where it meets the front at p (see `attach`).
 
-    It must lie on the unmeshed side (Eq. 7), face as the surface does, stay within the sectors of the front at its three nodes,
-    repeat no edge, cross no segment of the front (Eqs. 8, 9) and hold no node of it. `strict` 1 asks for room, 0 only for rightness.
+    It must lie on the unmeshed side (Eq. 7), face the same side as the surface, stay within the sectors of the front at its three nodes,
+    repeat no edge, cross no segment of the front (Eqs. 8, 9) and hold no node of it. With `strict` 1 it must also keep clear of
+    the front, with 0 it only has to be valid.
     """
     a, b = front.tail[s], front.head[s]
     before, after = front.previous[s], front.next[s]

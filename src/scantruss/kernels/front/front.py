@@ -3,7 +3,7 @@
 A front segment runs from its tail to its head with the unmeshed area on its left. Segments form closed loops (previous, next).
 Attaching a triangle keeps the loops closed and every edge at two triangles, so the grid is manifold at every moment.
 
-Of the segments that are not GONE these hold from the initial front on, and whoever changes the lists keeps them:
+Two rules hold for all segments that are not GONE, from the initial front on; every change of the lists keeps them:
 
 - `next` is one to one among them, `previous` is its inverse, and each begins where the one before it ends;
 - the list of a node (`out`, `out_next`) holds each of them that starts there once, and nothing else; so does that of its corners.
@@ -28,7 +28,7 @@ MOST_NEAR_NODES = 400  # most front nodes looked at in one step
 
 
 class Rules(NamedTuple):
-    """What a front goes by."""
+    """The parameters of a front."""
 
     length: float  #: desired at the segment in hand [scan unit]
     desired: float  #: desired member length, which the length field multiplies [scan unit]
@@ -85,7 +85,7 @@ class Front(NamedTuple):
 
 @kernel
 def propose_node(front: Front, place: Vector, normal: Vector, sample: int, on_boundary: bool) -> int:
-    """Write down the node that may come next, without adding it; returns its number."""
+    """Store a proposed node without adding it; returns its number."""
     n = front.count[NODES]
     for c in range(3):
         front.nodes[n, c] = place[c]
@@ -193,7 +193,7 @@ def edge_exists(front: Front, a: int, b: int) -> bool:
 
 @kernel
 def attach(front: Front, s: int, p: int, passage: int) -> None:
-    """Attach the triangle of segment s and node p: the front goes round it from now on.
+    """Attach the triangle of segment s and node p: from now on the front runs around it.
 
     passage : segment that leaves p at the place where the triangle meets the front; -1 for a node that is new, or is the far end
     of a neighbouring segment

@@ -35,7 +35,7 @@ def gap_loop(front: Front, s: int, loop: np.ndarray) -> int:
 
 @kernel
 def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
-    """How bad a triangle is for the grid: shape, size, and whether it faces as the surface does at its nodes."""
+    """Cost of a triangle: shape, size, and whether it faces the same side as the surface at its nodes."""
     pa, pb, pc = row(front.nodes, a), row(front.nodes, b), row(front.nodes, c)
     face = unit(cross(subtract(pb, pa), subtract(pc, pa)))
     worst = min(dot(face, row(front.normals, a)), dot(face, row(front.normals, b)), dot(face, row(front.normals, c)))
@@ -45,7 +45,7 @@ def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
 
 @kernel
 def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
-    """Fill a closed loop of front segments with triangles of least total cost; returns their number, 0 where none fit.
+    """Fill a closed loop of front segments with triangles of least total cost; returns their number, 0 if none fit.
 
     New edges must not exist yet, so the grid stays manifold.
     """

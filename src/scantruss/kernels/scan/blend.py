@@ -1,4 +1,4 @@
-"""Scans over each other become one layer: how far each point lies off the layers of the others, and whose point it is there."""
+"""Overlapping scans become one layer: how far each point lies off the layers of the others, and which scan keeps its points there."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def own_places(
     own: np.ndarray,
     deep: np.ndarray,
 ) -> None:
-    """The place of its own scan nearest to each point, -1 where there is none, and how deep inside the scan that is."""
+    """The place of its own scan nearest to each point, -1 if there is none, and how deep inside the scan that is."""
     for p in range(len(points)):
         own[p] = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)
         deep[p] = depth[own[p]] if own[p] >= 0 else 0.0
@@ -57,13 +57,13 @@ def add_layer(
     weight: np.ndarray,
     kept: np.ndarray,
 ) -> None:
-    """Let one other scan speak for each point (N, 3): where its layer is, and whether the point is its own or the other's.
+    """Add one other scan's layer to the sums of each point (N, 3), and drop the points that the other scan sees better.
 
     own (N,), deep (N,) : as `own_places` gives them; normals : of the places of the point's scan.
     places to depth : of the other scan. back : (4, 4) from the frame of the points to that of the other scan.
-    first : 1 where of two equally deep scans the other comes first. beside, off : how far the nearest place may be along and across
-    the surface. full : depth from which on a scan has its full weight. shift (N, 3), weight (N,) : sums, added to, in the frame of
-    the points. kept (N,) : 0 where the other scan sees that spot better.
+    first : 1 if the other scan wins ties in depth. beside, off : largest distance of the nearest place along and across the
+    surface. full : depth beyond which a scan has full weight. shift (N, 3), weight (N,) : sums, added to, in the frame of
+    the points. kept (N,) : 0 if the other scan sees that spot better.
     """
     for p in range(len(points)):
         if own[p] < 0:

@@ -1,4 +1,4 @@
-"""Points that repeat another one: to the last bit, by a table of all coordinates, or within a small distance, by small search boxes."""
+"""Duplicate points: equal to the last bit, by a hash table of all coordinates, or within a small distance, by small search boxes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...runtime.jit import kernel
 
 @kernel
 def _mixed(a: int, b: int, c: int) -> int:
-    """A number of three whole numbers, the same for the same ones, spread over all bits; nothing overflows."""
+    """Hash of three integers, spread over all bits; nothing overflows."""
     mixed = 0
     for value in (a, b, c):
         low, high = value & 0x7FFFFFFF, (value >> 32) & 0x7FFFFFFF
@@ -22,7 +22,7 @@ def _mixed(a: int, b: int, c: int) -> int:
 
 @kernel
 def _roughly_mixed(a: int, b: int, c: int) -> int:
-    """The same in a third of the time, spread over the lowest bits only: for a table of few."""
+    """The same in a third of the time, spread over the lowest bits only: for a small table."""
     folded = a ^ (b << 21) ^ (b >> 43) ^ (c << 42) ^ (c >> 22)
     return (((folded ^ (folded >> 32)) & 0x7FFFFFFF) * 2654435) >> 20
 
@@ -52,7 +52,7 @@ def mark_repeats(points: np.ndarray, bits: np.ndarray, slots: np.ndarray, repeat
 
 @kernel
 def enter_points(points: np.ndarray, bits: np.ndarray, chosen: np.ndarray, slots: np.ndarray) -> int:
-    """Enter the chosen points (ascending) into a table; returns how many repeat another of them."""
+    """Enter the chosen points (ascending) into a hash table; returns how many repeat another of them."""
     mask = len(slots) - 1
     count = 0
     for i in range(len(chosen)):

@@ -1,4 +1,4 @@
-"""Features: how the surface bends around a place, in numbers that do not change when the scan is turned or moved."""
+"""Features: how the surface bends around a place, in numbers that do not change when the scan is rotated or moved."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def mix_histograms(
     begin: int,
     end: int,
 ) -> None:
-    """Mean of the histograms around each point from `begin` to `end` - 1, nearer ones counting more, its own the most."""
+    """Mean of the histograms around each point from `begin` to `end` - 1, weighted towards the nearer ones, its own most."""
     found = np.empty(4096, np.int64)
     for p in range(begin, end):
         many = search(boxes, points, points[p, 0], points[p, 1], points[p, 2], reach, found)

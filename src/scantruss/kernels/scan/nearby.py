@@ -31,8 +31,8 @@ def _mark_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
 def spread_sample(boxes: SearchBoxes, sample: np.ndarray, size: float, marked: np.ndarray) -> None:
     """Put each place (K, 3) into all boxes within `size` of it, and mark these.
 
-    boxes : no smaller than `size`, so that a place reaches three along an axis at most, with room for COPIES * K items, of which
-    item i stands for place i // COPIES. marked : (2^m,) bool, several boxes may share a mark.
+    boxes : no smaller than `size`, so that a place reaches at most three along an axis, with room for COPIES * K items; item i
+    stands for place i // COPIES. marked : (2^m,) bool, several boxes may share a mark.
     """
     for s in range(len(sample)):
         x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]
@@ -105,9 +105,9 @@ def nearest_places(
     begin: int,
     end: int,
 ) -> None:
-    """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 where there is none; boxes : of the places."""
+    """The place (S, 3) nearest to each point from `begin` to `end` - 1 within reach, -1 if there is none; boxes : of the places."""
     for p in range(begin, end):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        number[p] = nearest(boxes, places, x, y, z, 0.5 * reach)  # most have one
+        number[p] = nearest(boxes, places, x, y, z, 0.5 * reach)  # most points have one
         if number[p] < 0:
             number[p] = nearest(boxes, places, x, y, z, reach)

@@ -1,4 +1,4 @@
-"""Noise taken off a scan: each point goes to the local surface of the points around it, along the normal."""
+"""Noise removed from a scan: each point moves along the normal to the local surface of the points around it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..surface.patches import Patches, fit, foot, gather
 
 ROOM = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
-PATCH_FITS = 2  # fits of a patch, the second with the points that lie off the first weighed down
+PATCH_FITS = 2  # fits of a patch, the second with less weight for points off the first
 
 
 @kernel
@@ -27,7 +27,7 @@ def fit_patches(
     begin: int,
     end: int,
 ) -> None:
-    """Fit patches at some points (C,), from `begin` to `end` - 1: of several radii the widest that fits as well as is usual there.
+    """Fit patches at some points (C,), from `begin` to `end` - 1, with the widest of several radii that fits as well as is usual there.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def fit_patches(
     widest : radius of the widest in these
     usual : (C,) rms distance of the points from a patch that fits
     patches : filled
-    flatness : (C,), filled with how flat the distances of the points from each patch are distributed, see `_flatness`
+    flatness : (C,), filled with the kurtosis of the distances of the points from each patch, see `_flatness`
     """
     stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(ROOM, np.int64)
     buffer, matrix = np.zeros((ROOM, COLUMNS)), np.zeros((6, 7))
@@ -57,7 +57,7 @@ def fit_patches(
 
 @kernel
 def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
-    """Fourth moment of the distances from a patch over the square of the second: 3 for noise, 1 for points at two distances."""
+    """Kurtosis of the distances from a patch, fourth moment over squared variance: 3 for noise, 1 for points at two distances."""
     total = second = fourth = 0.0
     for i in range(taken):
         w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
@@ -77,7 +77,7 @@ def onto_patches(
     begin: int,
     end: int,
 ) -> None:
-    """Foot of each point on the patches around it: their mean, in which those count most that are near, fit well and hold the point.
+    """Projection of each point onto the patches around it: a mean weighted towards those that are near, fit well and hold the point.
 
     number : (N,) int64 patch of each point that is a centre, else -1. moved, normals (N, 3), filled.
     """

@@ -1,4 +1,4 @@
-"""Sides of single points, from points whose sides are settled."""
+"""Normals of single points turned to the side of points that are already oriented."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..geometry.vectors import dot, row, subtract
 def turn_like_beside(
     tree: KDTree, settled: np.ndarray, points: np.ndarray, normals: np.ndarray, beside: int, begin: int, end: int
 ) -> None:
-    """Turn the normals of points to the side of that point of the tree, of the nearest few, that lies most beside them.
+    """Turn the normal of each point to the side of one of its nearest points in the tree: the one most in its tangent plane.
 
-    settled : normals of the points of the tree. normals (N, 3), turned in place. What stands over a point is on another sheet.
+    settled : normals of the points of the tree. normals (N, 3), turned in place. Points above it are on another sheet.
     """
     stack, found, squares = np.empty(2 * STACK_LEVELS, np.int64), np.empty(beside, np.int64), np.empty(beside)
     for p in range(begin, end):

@@ -1,4 +1,4 @@
-"""Points that belong to no surface: those that stand alone, and those that stand off."""
+"""Points that belong to no surface: isolated ones, and those that lie off the surface around them."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from ..geometry.quadric import COLUMNS, SQUARE
 from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
 from ..surface.patches import POINTS_FOR_PLANE, POINTS_FOR_QUADRIC, empty_patches, fit, height_variance, terms_for
 
-PATCH_FITS = 3  # fits of a patch, each with the points that lie off the one before weighed down
-BULK = 40  # points around a place that tell a cloud from a crease
-FEW_COMPANY, COMPANY = 10, 16  # points that tell whether a sheet goes through a point: a thin one, any
+PATCH_FITS = 3  # fits of a patch, each with less weight for points off the one before
+BULK = 40  # points around a place by which a cloud is told from a crease
+FEW_COMPANY, COMPANY = 10, 16  # points by which a sheet through a point is found: a thin one, any
 THIN_SHEET, SHEET = (
     0.08,
     0.15,
 )  # thickness of that sheet and distance of the point from it; 1 of 5,000 random points are as flat [radii]
-SIMILAR = 3.0  # reach of a point over that of another up to which they are about as far apart
-MOST_LOOKED_AT = 512  # points among which those are looked for
+SIMILAR = 3.0  # largest ratio of the reaches of two points that are about equally dense
+MOST_LOOKED_AT = 512  # most points searched for those
 SECTORS, EMPTY_SECTORS = (
     12,
     5,
 )  # sectors around a point on a sheet, and those side by side without any point where it ends
-THICK = 0.2  # thickness, in radii, from which on the points around a place are no surface to stand off from
+THICK = 0.2  # thickness, in radii, above which the points around a place form no surface
 
 
 @kernel
 def nearest_alive(
     tree: KDTree, alive: np.ndarray, which: np.ndarray, neighbors: np.ndarray, squares: np.ndarray
 ) -> None:
-    """Fill the rows of some points in the table of `nearest_others` anew, from points that are alive (N,) bool."""
+    """Refill the rows of some points in the table of `nearest_others` from the points that are alive (N,) bool."""
     most = neighbors.shape[1]
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(3 * most, np.int64), np.empty(3 * most)
     for i in range(len(which)):
@@ -52,7 +52,7 @@ def nearest_alive(
 def usual_reaches(
     neighbors: np.ndarray, reach: np.ndarray, rank: int, low: np.ndarray, middle: np.ndarray, begin: int, end: int
 ) -> None:
-    """Of the reaches of the neighbours of each point the one of a rank, counted from the smallest, and the middle one."""
+    """For each point, the reach of a given rank among its neighbours, from the smallest, and the median one."""
     most = neighbors.shape[1]
     held = np.empty(most)
     for p in range(begin, end):
@@ -77,10 +77,10 @@ def stand_off(
     begin: int,
     end: int,
 ) -> None:
-    """How far some points (P,) stand off the surface of those around them, in what is to be expected of a point there; off (P,), filled.
+    """Distance of some points (P,) from the surface of those around them, in multiples of the expected one; off (P,), filled.
 
-    A point itself is left out of its surface. What is expected grows with the thickness of the points there and with the doubt
-    about the surface, large at a boundary. least : part of the radius that counts as thickness in any case.
+    The point itself is left out of its surface. The expected distance grows with the thickness of the points there and with the
+    uncertainty of the surface, which is large at a boundary. least : least thickness, as a share of the radius.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
     buffer, matrix, patches = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), empty_patches(1)
@@ -123,14 +123,14 @@ def find_sheets(
     begin: int,
     end: int,
 ) -> None:
-    """Look for a thin sheet of points like each of `which` (P,) and about as far apart, however dense the rest of the scan is.
+    """For each point of `which` (P,) look for a thin sheet of points as far apart as it is, however dense the rest of the scan.
 
     Parameters
     ----------
     like : (N,) bool, points that the sheet may consist of
     reach : (N,) distance of each point to its eighth neighbour [scan unit]
-    company : (P, COMPANY) int64, filled with the points of the sheet, -1 where there are none
-    at_edge : (P,) bool, filled: no living point lies beyond the point to one side of that sheet
+    company : (P, COMPANY) int64, filled with the points of the sheet, -1 if there are none
+    at_edge : (P,) bool, filled: on one side of that sheet no living point lies beyond the point
     """
     stack, found, away = (
         np.empty(2 * STACK_LEVELS, np.int64),
@@ -166,7 +166,7 @@ def find_sheets(
 
 @kernel
 def _is_on_sheet(offsets: np.ndarray, count: int, thin: float) -> bool:
-    """Whether the first of some offsets (K, 3) from a point, nearest first, lie on a plane through it, as far as `thin` tells [radii]."""
+    """Whether the first of some offsets (K, 3) from a point, nearest first, lie on a plane through it within `thin` [radii]."""
     mean, normal, spread, _ = plane_of(offsets, count)
     radius, rms = norm(row(offsets, count - 1)), math.sqrt(spread / count)
     return rms <= thin * radius and abs(dot(mean, normal)) <= max(2.0 * rms, thin * radius)
@@ -176,7 +176,7 @@ def _is_on_sheet(offsets: np.ndarray, count: int, thin: float) -> bool:
 def _is_at_edge(
     tree: KDTree, alive: np.ndarray, place: Vector, offsets: np.ndarray, few: int, found: np.ndarray, count: int
 ) -> bool:
-    """Whether neither the sheet nor any living point found lies in some five of twelve sectors around a place on that sheet."""
+    """Whether five of twelve adjacent sectors around a place hold neither points of its sheet nor any other living point."""
     _, normal, _, _ = plane_of(offsets, few)
     x, taken = across(normal), np.zeros(SECTORS, np.bool_)
     y = cross(normal, x)
@@ -199,7 +199,7 @@ def _is_at_edge(
 def measure_planes(
     tree: KDTree, which: np.ndarray, neighbors: np.ndarray, thick: np.ndarray, aside: np.ndarray, begin: int, end: int
 ) -> None:
-    """How thick the nearest of points `which` lie, in radii, and how far off their plane each is, in thicknesses; (P,), filled."""
+    """Thickness of the points nearest to each of `which`, in radii, and its distance from their plane, in thicknesses; (P,), filled."""
     offsets = np.empty((neighbors.shape[1], 3))
     for i in range(begin, end):
         p = which[i]
@@ -225,7 +225,7 @@ def measure_planes(
 def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.ndarray, begin: int, end: int) -> None:
     """Share of the spread of the living points around each of `which` that is across their plane; bulk (P,), filled.
 
-    0 on a surface, 1/3 where points lie to all sides alike, and little more than half of that in a sharp crease.
+    0 on a surface, 1/3 where points spread evenly to all sides, and little more than half of that in a sharp crease.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
     offsets = np.empty((BULK, 3))

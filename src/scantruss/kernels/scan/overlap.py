@@ -1,4 +1,4 @@
-"""Two scans over each other: nearest places, the sums of a generalized ICP step, and how well they agree where they overlap."""
+"""Two overlapping scans: nearest places, the sums of a generalized ICP step, and how well the scans agree."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..geometry.vectors import Vector, cross, dot, row, subtract
 
 @kernel
 def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
-    """The first of the places (S, 3) within reach of each point (N, 3), -1 where there is none; boxes : of the places."""
+    """The first of the places (S, 3) within reach of each point (N, 3), -1 if there is none; boxes : of the places."""
     found = np.empty(256, np.int64)
     for p in range(len(points)):
         owner[p] = -1
@@ -24,7 +24,7 @@ def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, rea
 
 @kernel
 def mark_boundary(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, aside: np.ndarray) -> None:
-    """How far the mean of its neighbours lies aside of each place, in the reach of the farthest; near 0.4 at a straight boundary."""
+    """Offset of the mean of its neighbours from each place, as a share of their reach; about 0.4 at a straight boundary."""
     for s in range(len(places)):
         o = row(places, s)
         x = y = z = far = 0.0
@@ -52,7 +52,7 @@ def face_like(
     boxes: SearchBoxes,
     reach: float,
 ) -> None:
-    """Turn each normal to the side that the normal of the nearest place faces; where none is near it stays."""
+    """Turn each normal to the side of the nearest place's normal; it stays if none is near."""
     for p in range(len(points)):
         n = nearest(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach)
         if n >= 0 and dot(row(normals, p), row(place_normals, n)) < 0.0:
@@ -84,8 +84,8 @@ def turned(pose: np.ndarray, v: Vector) -> Vector:
 def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: float, weight: float) -> None:
     """Add one pair of places to the (7, 7) sums: difference d, normals n and m, lever arm from the centre.
 
-    Plane-to-plane (Segal, Haehnel and Thrun 2009): the difference counts by the inverse of C = 2 I - (1 - e)(n n' + m m'), here
-    by its two parts that matter, the sum and the difference of the normals; `sharp` is 1 / e.
+    Plane-to-plane (Segal, Haehnel and Thrun 2009): the difference is weighted by the inverse of C = 2 I - (1 - e)(n n' + m m'),
+    here by the two parts that matter, along the sum and the difference of the normals; `sharp` is 1 / e.
     """
     cosine = min(max(dot(n, m), -1.0), 1.0)
     for part in range(3):
@@ -135,8 +135,8 @@ def step_sums(
     """Add the pairs of every `every`-th point with its nearest place within `reach` to the (7, 7) sums; returns their number.
 
     pose : (4, 4) of the points into the common frame, where the sums are taken around `centre`; back : (4, 4) of the points into
-    the frame of the places. turn : 1, or -1 where the normals of the scans face opposite sides. soft : distance across the surface
-    at which a pair counts half [scan unit]. Rows and columns of the sums: turning, moving, what is left.
+    the frame of the places. turn : 1, or -1 if the normals of the scans face opposite sides. soft : distance across the surface
+    at which a pair has half its weight [scan unit]. Rows and columns of the sums: rotation, translation, residual.
     """
     count = 0
     for p in range(0, len(points), every):
@@ -193,9 +193,9 @@ def judge(
 ) -> None:
     """Compare every point with the surface of the other scan under a pose; into sums (5,).
 
-    Counted: 0 points over the other scan's surface and within `near` of it, 1 those between `near` and `reach` or tilted (two
-    surfaces that cannot both be there), 2 the sum of squared distances of the former from the planes, 3 those whose normals say
-    that they lie on the other side of a thin body, 4 the sum of 1 - cosine of the normals of the former.
+    Sums: 0 points over the other scan's surface and within `near` of it; 1 those between `near` and `reach`, or tilted (two
+    surfaces that cannot both be there); 2 squared distances of the former from the planes; 3 points that by their normals lie on
+    the other side of a thin body; 4 1 - cosine of the normals of the former.
     """
     for p in range(len(points)):
         q = moved(back, row(points, p))

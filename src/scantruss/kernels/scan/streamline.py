@@ -28,7 +28,7 @@ def choose_first(
 ) -> int:
     """Choose the first of the points `among` (M,), of those before `end` where M is 0, in each box that is not taken yet.
 
-    What lies together in space does so in memory: a scan of which all boxes do not fit into the cache has few blocks of them.
+    Boxes that are neighbours in space are neighbours in memory, so that a large scan touches few blocks at a time.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Thinning a scan of any size: sums, extremes and nearest points of search boxes (Sec. 2, streamlining).
 
 Boxes are cubes on a lattice through the zero of the scan's own frame, so that every part of a scan knows the same boxes. Sums are
-whole numbers (2**32 steps along the side of a box): they do not depend on the order in which points come, nor on who adds what.
+integers (2**32 steps along the side of a box), so that they do not depend on the order of the points, nor on which worker adds
+them.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ FARTHEST = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
 LARGEST_INTEGER = 9223372036854775807  # int64
 ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
-WIDE = 2  # boxes to every side that tell whether a box is at the boundary
+WIDE = 2  # boxes to every side by which a box at the boundary is told
 BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
-ASIDE = 0.25  # it is at the boundary where their middle lies farther aside than this [box]
+ASIDE = 0.25  # distance of their centre from its own mean above which a box is at the boundary [box]
 
 
 class BoxTable(NamedTuple):
@@ -34,7 +35,7 @@ class BoxTable(NamedTuple):
 
 @kernel
 def slot_of_box(slots: np.ndarray, rows: np.ndarray, i: int, j: int, k: int) -> int:
-    """Slot of a box: where it is, or the free slot where it would go. Eight boxes along x lie side by side, as scans come."""
+    """Slot of a box, or the free slot for it. Eight boxes along x are stored side by side, as scans are ordered that way."""
     mask = len(slots) - 1
     mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST_INTEGER
     mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST_INTEGER
@@ -49,7 +50,7 @@ def slot_of_box(slots: np.ndarray, rows: np.ndarray, i: int, j: int, k: int) -> 
 
 @kernel
 def is_farther(points: np.ndarray, n: int, extremes: np.ndarray, row: int, side: int) -> bool:
-    """Whether point n lies farther to a side than the extreme of a row; of two equally far ones the first by x, y, z."""
+    """Whether point n lies farther to a side than the extreme of a row; ties go to the first by x, y, z."""
     axis, begin = side // 2, 3 * side
     ahead = points[n, axis] - extremes[row, begin + axis]
     if ahead != 0.0:
@@ -160,7 +161,7 @@ def take_nearest(
 ) -> int:
     """Put the points nearest to the means of their boxes into `best` (C, 4): squared distance, x, y, z.
 
-    Of two points equally near the first by x, y, z is taken. Returns how many points are in no box (not finite, or changed since).
+    Ties go to the first by x, y, z. Returns how many points are in no box (not finite, or changed since).
     """
     missed = 0
     for n in range(len(points)):
@@ -195,8 +196,8 @@ def take_nearest(
 def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
     """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the boundary that lie on its outer side.
 
-    Returns their number. A box is at the boundary where the middle of the points around it, the nearer the more they count, lies
-    aside of its own mean: the extremes on the other side stand for the boundary, which a mean misses by up to half a box.
+    Returns their number. A box is at the boundary if the weighted centre of the points around it is far from its own mean. The
+    extremes on the opposite side represent the boundary, which a mean misses by up to half a box.
     """
     count = 0
     for row in range(begin, end):

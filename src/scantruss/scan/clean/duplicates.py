@@ -1,4 +1,4 @@
-"""Repeated points: the same point stored twice, or measured again from the same place."""
+"""Duplicate points: stored twice, or measured again at the same place."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ...kernels.scan import duplicates as kernels
 from ...runtime.parallel import in_parts
 from .nearby import build_kd_tree
 
-POINTS_LOOKED_AT = 500  # points of which repeats are looked for before it is worth looking for all
-REPEATED_SHARE = 0.01  # part of these that must be repeated
-POINTS_PER_THREAD = 50_000  # fewest points for a thread of their own
-COPIES = 16  # a point may be repeated almost so often and its spacing be told
+POINTS_LOOKED_AT = 500  # points checked for duplicates before all are
+REPEATED_SHARE = 0.01  # share of these that must be repeated
+POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
+COPIES = 16  # the spacing is still measured if points are repeated almost this often
 SAID = 300  # points at which the spacing is measured
-DENSEST = 0.05  # part of the points that lie closer than what counts as spacing here
+DENSEST = 0.05  # share of the points that lie closer than what counts as the spacing here
 
 
 def find_repeated(points: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def find_repeated(points: np.ndarray) -> np.ndarray:
 
 
 def has_repeats(points: np.ndarray) -> bool:
-    """Whether so many points are repeated that it is worth looking for all; takes a hundredth of the time of a look at all."""
+    """Whether enough points are repeated to check all; takes a hundredth of the time of checking all."""
     points = np.ascontiguousarray(points, np.float64)
     chosen = np.linspace(0, len(points) - 1, min(len(points), POINTS_LOOKED_AT)).astype(np.int64)
     slots = np.full(1 << 12, -1, np.int64)
@@ -44,7 +44,7 @@ def has_repeats(points: np.ndarray) -> bool:
 def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
     """Return which points lie within a share of the spacing from an earlier one that stays (N,) bool.
 
-    The spacing is that where the points lie densest, so that no dense part of an uneven scan is thinned.
+    The spacing is that of the densest part, so that no dense part of an uneven scan is thinned.
     """
     radius = share * _densest_spacing(points)
     left_out = np.zeros(len(points), np.bool_)
@@ -52,7 +52,7 @@ def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
         return left_out
     lower = points.min(axis=0)
     size = np.ptp(points, axis=0).max() / radius
-    if size > 1e15:  # boxes could not be numbered: nothing that is a number lies that close
+    if size > 1e15:  # boxes could not be numbered, and no two float64 lie that close
         return left_out
     slots = np.full(1 << max(int(2 * len(points) - 1).bit_length(), 4), -1, np.int64)
     following = np.full(len(points), -1, np.int64)
@@ -61,7 +61,7 @@ def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
 
 
 def _densest_spacing(points: np.ndarray) -> float:
-    """Mean spacing in the densest twentieth of a scan, told by the sixteenth nearest so that a few copies do not matter."""
+    """Mean spacing in the densest twentieth of a scan, from the sixteenth nearest point, so that a few copies do not matter."""
     rank = min(COPIES, len(points) - 1)
     if rank < 1:
         return 0.0

@@ -1,4 +1,4 @@
-"""The nearest other points of every point, whatever the density: what the steps of cleaning look at."""
+"""The nearest neighbours of every point, whatever the density: the data of all cleaning steps."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from ...kernels.geometry import kd_tree as kernels
 from ...runtime.parallel import in_parts
 
-NEAREST = 16  # other points that are known of each point
+NEAREST = 16  # neighbours of each point
 REACH_TO = 8  # a point's reach is the distance to this one of them
-POINTS_PER_THREAD = 2000  # least points of a part that a thread looks at
+POINTS_PER_THREAD = 2000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
-    """Points in a tree, and a table of the nearest of each; all rows in the order of the tree."""
+    """Points in a k-d tree, and a table of the nearest of each; all rows in the order of the tree."""
 
     tree: kernels.KDTree
     neighbors: np.ndarray  #: (N, NEAREST) int64, nearest first, -1 where there are fewer
-    squares: np.ndarray  #: (N, NEAREST) squared distances, inf where there are fewer [scan unit^2]
+    squares: np.ndarray  #: (N, NEAREST) squared distances, inf if there are fewer [scan unit^2]
 
     @classmethod
     def of(cls, points: np.ndarray) -> Nearby:
@@ -36,7 +36,7 @@ class Nearby:
 
     @property
     def reach(self) -> np.ndarray:
-        """Distance of each point to its eighth neighbour (N,) [scan unit]; inf where there is none."""
+        """Distance of each point to its eighth neighbour (N,) [scan unit]; inf if there is none."""
         return np.sqrt(self.squares[:, REACH_TO - 1])
 
     def in_order(self, values: np.ndarray) -> np.ndarray:
@@ -47,7 +47,7 @@ class Nearby:
 
 
 def build_kd_tree(points: np.ndarray) -> kernels.KDTree:
-    """Return the tree of points (N, 3), N > 0."""
+    """Return the k-d tree of points (N, 3), N > 0."""
     tree = kernels.empty_kd_tree(points)
     kernels.divide(tree, 0, 1)
     if len(tree.first) > 1:

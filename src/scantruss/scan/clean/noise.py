@@ -1,4 +1,4 @@
-"""Noise and doubled layers: points go to the surface that those around them form, along its normal, so that boundaries stay."""
+"""Noise and doubled layers: points move along the normal to the surface of the points around them, so that boundaries stay."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ...runtime.parallel import in_parts
 from .nearby import NEAREST, Nearby
 
 NARROW = 28.0  # points of the narrowest patch
-WIDEST = 2.0  # radius of the widest in that of the narrowest
-WORSE = 1.1  # how much worse than the narrowest a wider patch may fit
-SPARSE = 8  # of so many nearest one has a patch
-SOME = 0.02  # part of the points that must lie in layers, as a few seem to at random
-FLATNESS = 2.1  # fourth moment of the distances from a patch below which they are those of two layers; 3 for noise
-BROAD = 3.0  # radius of a patch that holds as much of two layers, in the distance up to which they are looked for
-FOLLOWED = 0.5  # a narrower patch that fits so much better shows that the surface is one
-PATCHES_PER_THREAD = 200  # least patches of a part that a thread fits
+WIDEST = 2.0  # radius of the widest patch over that of the narrowest
+WORSE = 1.1  # factor by which a wider patch may fit worse than the narrowest
+SPARSE = 8  # one of this many nearest points has a patch
+SOME = 0.02  # share of the points that must lie in layers; a few seem to at random
+FLATNESS = 2.1  # kurtosis of the distances from a patch below which they are those of two layers; 3 for noise
+BROAD = 3.0  # radius of a patch that holds two layers equally, in the largest distance of layers
+FOLLOWED = 0.5  # a narrower patch that fits better than this share shows a single surface
+PATCHES_PER_THREAD = 200  # fewest patches that are worth a thread
 
 
 class Surfaces(NamedTuple):
@@ -35,7 +35,7 @@ class Surfaces(NamedTuple):
 
 
 def fit_surfaces(near: Nearby) -> Surfaces:
-    """Fit patches all over a scan, as wide as the surface lets them be."""
+    """Fit patches all over a scan, as wide as the surface allows."""
     chosen = np.zeros(len(near.neighbors), np.bool_)
     choose_apart(np.ascontiguousarray(near.neighbors[:, :SPARSE]), chosen)
     centres = np.flatnonzero(chosen)
@@ -66,7 +66,7 @@ def _fit(
 
 
 def _around(near: Nearby, number: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return for each point (N,) the middle one of the values (C,) of the patches around it."""
+    """Return for each point (N,) the median of the values (C,) of the patches around it."""
     own = np.column_stack([np.arange(len(number)), near.neighbors])
     patch = np.where(own >= 0, number[own], -1)
     found = np.sort(np.where(patch >= 0, values[patch], np.inf), axis=1)
@@ -76,7 +76,7 @@ def _around(near: Nearby, number: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def onto_surfaces(near: Nearby, surfaces: Surfaces) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the points lie on the patches around them, and the normals there, of either sign; (N, 3) each, rows of the tree."""
+    """Return the projections of the points onto the patches around them, and the normals there, of either sign; (N, 3), by tree rows."""
     points = near.tree.points
     moved, normals = np.empty_like(points), np.empty_like(points)
     in_parts(
@@ -90,13 +90,13 @@ def onto_surfaces(near: Nearby, surfaces: Surfaces) -> tuple[np.ndarray, np.ndar
 
 
 def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which points lie in two layers no farther apart than `distance` [scan unit], and where these would be one.
+    """Return which points lie in two layers no farther apart than `distance` [scan unit], and their places on the merged layer.
 
-    Those that are `known` (N,) to have done so, which are on their way, are among them.
+    Points `known` (N,) from an earlier round, which are half merged, are included.
 
-    Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly at none. A patch
-    that holds as much of both is several times wider than they are apart. A corrugated surface lies at two distances from it
-    too, but a narrower patch follows that.
+    Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly near zero. A
+    patch that holds both equally is several times wider than they are apart. A corrugated surface looks alike, but a narrower
+    patch follows it.
 
     Returns
     -------

@@ -16,23 +16,23 @@ from .thinning import thin_to
 COARSE = (
     2.0  # spacing of the points at which sides are settled, in mean spacings: lines of a scanner are no pieces then
 )
-LINKS_OF_A_POINT = 10  # links of each of them
-SMOOTH = 0.15  # thickness, in their spacings, up to which these are smooth enough to tell that a surface is one-sided
-NEIGHBORS_ASKED = 4  # of them a point asks for its side, the one most beside it counts
+LINKS_OF_A_POINT = 10  # links of each of these points
+SMOOTH = 0.15  # thickness, in their spacings, up to which they are smooth enough to reveal a one-sided surface
+NEIGHBORS_ASKED = 4  # nearest oriented points of a point; the one most in its tangent plane tells its side
 
 
 class OrientedNormals(NamedTuple):
-    """Sides that have been settled."""
+    """Normals that face one side of each piece."""
 
     normals: np.ndarray  #: (N, 3) unit normals, rows of the tree
     pieces: int  #: pieces each of which has a side of its own
-    one_sided: int  #: links that meet head-on: some dozens on a one-sided surface
+    one_sided: int  #: links between opposite normals: dozens on a one-sided surface
 
 
 def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) -> OrientedNormals:
     """Turn normals (N, 3) of points (N, 3), rows of the tree, to one side of each piece.
 
-    A piece faces away from its middle, which is outwards where it is closed; where that does not tell (a plate) upwards.
+    A piece faces away from its centre, so outwards if it is closed; a plate, where that does not decide, faces upwards.
     """
     reach = near.reach[np.isfinite(near.reach)]
     mean_spacing = float(np.median(reach)) * np.sqrt(np.pi / REACH_TO) if len(reach) else 0.0

@@ -1,6 +1,6 @@
 """Outliers: measured points that belong to no surface, and loose small pieces.
 
-`surface.samples` calls this by itself where samples stand alone, `scan.clean.steps` where it was asked for.
+`surface.samples` calls this if it finds isolated samples, `scan.clean.steps` on request.
 """
 
 from __future__ import annotations
@@ -12,39 +12,39 @@ from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts
 from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
 
-MOST_ROUNDS = 5  # outliers near each other hide each other: after a round some more stand out
-FARTHEST_REACH = 4.5  # reach, in those of which a quarter of the points have more, at which a point is an outlier whatever is near it
-CLOUD = 2.5  # ... where the points around form no surface
-THICK = 0.2  # thickness of the nearest points, in radii, from which on they form none
-MUCH = 0.1  # part of the points that form none from which on it is no cloud of outliers but the scan
-CLOUD_SHARE = 0.18  # share of the spread across the plane from which on points are no crease but a cloud
-SKIN = 3  # neighbours to neighbours by which a cloud is larger than what lies inside it
-CLOUD_NEIGHBORS = 4  # neighbours in a cloud from which on a point is looked at with it
-SIGHT = 2.0  # distance from their plane, in their thickness, from which on a point is looked at closely
-TOO_FAR = 1.1  # reach in member lengths from which on points are too far apart for a grid
+MOST_ROUNDS = 5  # outliers close together hide each other: each round reveals some more
+FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
+CLOUD = 2.5  # ... if the points around it form no surface
+THICK = 0.2  # thickness of the nearest points, in radii, above which they form no surface
+MUCH = 0.1  # share of points without a surface above which they are no cloud of outliers but the scan itself
+CLOUD_SHARE = 0.18  # share of the spread across the plane above which points are a cloud and no crease
+SKIN = 3  # steps from neighbour to neighbour by which a cloud extends beyond its interior
+CLOUD_NEIGHBORS = 4  # neighbours in a cloud with which a point is examined together with it
+SIGHT = 2.0  # distance from the plane of its neighbours, in their thickness, above which a point is examined
+TOO_FAR = 1.1  # reach above which points are too far apart for a grid [member lengths]
 LONELY = (
     0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 )
-DENSE = 4  # ... the reach of the densest but so many around it
-PATCH = 28  # points of the surface that a point may stand off
-STANDS_OFF = 5.0  # distance from it, in what is to be expected, from which on it does
-THIN = 0.01  # what is to be expected in any case, in radii of that surface
-SMALLEST_PART = 8  # fewest doubted points that are a part of a sheet
-OPEN_EDGE = 0.05  # share of them beyond which there is no other point to one side, from which on they are a fringe
-LONE = 3e-4  # share of samples without neighbours from which on outliers are looked for
+DENSE = 4  # ... with the reach of the fifth densest point around it
+PATCH = 28  # points of the surface from which the distance of a point is measured
+STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
+THIN = 0.01  # least expected distance, in radii of that surface
+SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
+OPEN_EDGE = 0.05  # share of them at a free edge above which they are a fringe of the scan
+LONE = 3e-4  # share of samples without neighbours above which outliers are sought
 
 
 def has_outliers(neighbors: np.ndarray) -> bool:
-    """Whether so many samples stand alone that it is worth looking for outliers; neighbors (S, K) as `kernels.nearest_samples`."""
+    """Whether enough samples are isolated to look for outliers; neighbors (S, K) as `kernels.nearest_samples`."""
     return bool((neighbors[:, 5] < 0).mean() > LONE)
 
 
 def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
     """Return which points are outliers (N,) bool: those that lie off every sheet.
 
-    A point is doubted if its reach is more than `distance` times that of its neighbours, if there are hardly any around it in what
-    is a full neighbourhood for those, or if it stands off the surface by far more than the points there do. It is an outlier
-    unless it lies on a sheet of points that are about as far apart as it is: a sparse part of a scan is none.
+    A point is doubted if its reach is more than `distance` times that of its neighbours, if few points lie around it within what
+    is a full neighbourhood for those, or if it lies off the surface by far more than the points there do. It is an outlier unless
+    it lies on a sheet of points about as far apart as it is: a sparse part of a scan stays.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
         found = _in_clouds(near, alive, np.flatnonzero(alive & (cloud | beside)))
         if not len(found):
             break
-        for _ in range(2):  # the surface below is told better now
+        for _ in range(2):  # without the outliers found the surface is known better
             alive[found] = False
             which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
             kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
@@ -99,7 +99,7 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
 def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
     """Return which of the doubted points (D,) lie on a sheet that they form with each other: a sparse part inside the scan.
 
-    A few in one plane may be there by chance, and a sparse fringe beyond the edge of the scan is none of it.
+    A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it.
     """
     company, at_edge = np.empty((len(doubted), kernels.COMPANY), np.int64), np.zeros(len(doubted), np.bool_)
     number = np.full(len(alive), -1)
@@ -121,7 +121,7 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
 
 
 def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
-    """Return which points belong to dense clouds (N,) bool: inside, they and those around spread to all sides, unlike in a crease."""
+    """Return which points belong to dense clouds (N,) bool: inside these, points spread to all sides, unlike in a crease."""
     which = np.flatnonzero(alive)
     cloud, bulk = np.zeros(len(alive), np.bool_), np.zeros(len(alive))
     thick = which[_planes(near, which)[0] > THICK]
@@ -142,7 +142,7 @@ def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
 
 
 def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarray:
-    """Return which of the points of clouds, which hold each other, stand off the surface around."""
+    """Return which of the points of clouds, which support each other, lie off the surface around."""
     sure = alive.copy()
     sure[doubted] = False
     off = np.empty(len(doubted))
@@ -155,7 +155,7 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
 
 
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how thick the nearest of some points lie, in radii, and how far off their plane each is, in that thickness."""
+    """Return the thickness of the points nearest to each, in radii, and its distance from their plane, in that thickness."""
     thick, aside = np.empty((2, len(which)))
     in_parts(
         len(which),
@@ -180,7 +180,7 @@ def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: f
 
 
 def _stand_off(near: Nearby, alive: np.ndarray, which: np.ndarray, doubted: np.ndarray) -> np.ndarray:
-    """One round of `find_outliers`, by the surface of the points around: which of the doubted points stand off."""
+    """One round of `find_outliers`, by the surface of the points around: which of the doubted points lie off it."""
     outlier = np.zeros(len(which), np.bool_)
     looked = which[doubted]
     off = np.empty(len(looked))

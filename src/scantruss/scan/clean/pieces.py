@@ -1,4 +1,4 @@
-"""Loose small pieces: a few points together, away from all that is large."""
+"""Loose small pieces: a few points together, away from all large pieces."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .nearby import REACH_TO, Nearby, build_kd_tree
 from .outliers import THICK
 
 LINK = 3.0  # reaches over which points belong to one piece
-BLOB = 4.0  # a cloud of points may have so many times more of them than a small surface
-NARROW = 0.3  # extent of such a cloud, in that of the largest piece, up to which it is small however many points it has
+BLOB = 4.0  # a cloud counts as small up to this many times the points of a small surface
+NARROW = 0.3  # extent of a cloud, over that of the largest piece, up to which it is small however many points it has
 PIECE_DISTANCE = (
     6.0  # reaches over which a small piece belongs to what is beside it: a line of the scanner, a part behind a shadow
 )
@@ -21,9 +21,9 @@ PIECE_DISTANCE = (
 def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     """Return which points belong to loose small pieces, away from all others; rows of the tree.
 
-    Small is a piece with fewer than this share of all points, or than `REACH_TO` of them; one that is no surface but a cloud also with
-    fewer than `BLOB` times as many, or with any number where it is narrower than `NARROW` of the largest piece. A
-    small surface that lies near a large one stays, and so does what lies near that. No piece is small where the share is 0.
+    A piece is small if it has less than this share of all points, or fewer than `REACH_TO`; a cloud (no surface) also with fewer
+    than `BLOB` times as many, or if it is narrower than `NARROW` of the largest piece. A small surface near a large one stays,
+    and so does what lies near that. With a share of 0 no piece is small.
     """
     count = len(near.squares)
     if count <= REACH_TO or share == 0.0:
@@ -62,7 +62,7 @@ def _pieces(near: Nearby) -> np.ndarray:
 
 
 def _small_clouds(points: np.ndarray, piece: np.ndarray, clouds: np.ndarray, largest: int) -> np.ndarray:
-    """Return which points are of those of some clouds that are small beside the largest piece in extent (N,) bool."""
+    """Return which points belong to clouds that are small in extent compared with the largest piece (N,) bool."""
     limit = NARROW * float(np.linalg.norm(np.ptp(points[piece == largest], axis=0)))
     small = [cloud for cloud in clouds if np.linalg.norm(np.ptp(points[piece == cloud], axis=0)) < limit]
     return np.isin(piece, small)

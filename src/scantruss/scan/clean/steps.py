@@ -17,16 +17,16 @@ from .outliers import find_outliers
 from .pieces import find_loose_pieces
 from .thinning import thin_to
 
-FEWEST_POINTS_OF_A_SURFACE = 24  # points of a surface
-LAYERS = 3  # rounds of merging layers: what lies farther apart comes together step by step
+FEWEST_POINTS_OF_A_SURFACE = 24  # fewest points of a surface
+LAYERS = 3  # rounds of merging layers: those farther apart merge step by step
 
 
 @dataclass(frozen=True)
 class Step:
-    """What a step did."""
+    """The result of one step."""
 
     name: str  #: duplicates, near_duplicates, outliers, pieces, layers, noise, spacing, normals
-    count: int  #: points it was done to
+    count: int  #: points that it changed or left out
     words: str  #: one line for people
 
 
@@ -61,21 +61,21 @@ def clean_points(
     ----------
     points : (N, 3) array or PointCloud [scan unit]
     duplicates : float
-        Points nearer to an earlier one than this share of the spacing where the scan is densest are left out, and all repeats.
+        Points nearer to an earlier one than this share of the spacing in the densest part are left out, and all exact duplicates.
     outlier_distance : float
-        Points so many times farther from others than their neighbours are left out, and what stands off the surface; 0 keeps
-        all, as `Settings.outlier_distance` does.
+        Points this many times farther from others than their neighbours are left out, and points off the surface; 0 keeps all, as
+        with `Settings.outlier_distance`.
     loose_pieces : float
-        Pieces with fewer than this share of the points, away from all others, are left out; clouds of points that form no surface
-        with up to four times as many, or with any number where they are narrow beside the largest piece; 0 leaves out none.
+        Detached pieces with less than this share of the points are left out; clouds that form no surface with up to four times as
+        many, or of any number if they are narrow compared with the largest piece; 0 leaves out none.
     layer_distance : float
-        Two layers up to so many mean spacings apart become one.
+        Two layers up to this many mean spacings apart become one.
     smooth : bool
-        Points move along the normal to the surface that those around them form.
+        Points move along the normal to the surface of the points around them.
     spacing : float, optional
         One point stays in each search box of this width [scan unit].
     normals : bool
-        Normals are found and turned to one side.
+        Normals are computed and turned to one side.
     unit : str
         Unit of an array of points.
     progress : callable, optional
@@ -140,7 +140,7 @@ class _Work:
         return self._nearby[1]
 
     def say(self, stage: str) -> None:
-        """Tell which step begins."""
+        """Report which step begins."""
         if self._progress:
             self._progress(stage, 0.0)
 
@@ -158,7 +158,7 @@ class _Work:
                 self._normals = self._normals[~which]
 
     def check_enough(self) -> None:
-        """Refuse to go on with next to nothing."""
+        """Refuse to go on with too few points."""
         if len(self.points) < FEWEST_POINTS_OF_A_SURFACE:
             raise InputError(
                 f"only {len(self.points)} points are left after cleaning, {FEWEST_POINTS_OF_A_SURFACE} are needed;"
@@ -166,7 +166,7 @@ class _Work:
             )
 
     def settle(self, layer_distance: float | None, smooth: bool) -> None:
-        """Merge layers and take the noise off."""
+        """Merge layers and remove the noise."""
         self.check_enough()
         near = self.nearby()
         surfaces = fit_surfaces(near)
@@ -204,6 +204,6 @@ class _Work:
             else "normals turned to one side"
         )
         if oriented.one_sided:
-            said += "; the surface is one-sided (like a Moebius strip), so somewhere they change sides"
+            said += "; the surface is one-sided (like a Moebius strip), so they change sides somewhere"
         self.add("normals", len(self.points), said)
         return near.in_order(oriented.normals)

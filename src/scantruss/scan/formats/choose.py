@@ -27,7 +27,7 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
 
 
 def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
-    """Return what could be selected of a file, in words; "" where it has no points but NaN or infinite ones."""
+    """Return what could be selected from a file, in words; "" if all its points are NaN or infinite."""
     real = np.isfinite(points).all(axis=1)
     if not real.any():
         return ""

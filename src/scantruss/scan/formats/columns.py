@@ -29,14 +29,14 @@ NAMES = {
 
 
 def clean_name(name: str) -> str:
-    """Return a column name without quotes, brackets, unit and all that is not a letter or digit of ASCII, in lower case."""
+    """Return a column name in lower case, ASCII letters and digits only, without quotes, brackets and unit."""
     name = re.sub(r"\(.*?\)|\[.*?\]|<.*?>", "", name.strip().strip("\"'").lower())
     name = re.sub(r"[\s_.:/-]+(mm|cm|m|ft|feet|foot|in|inch|inches|met(er|re)s?)\s*$", "", name)
     return re.sub(r"[^0-9a-z]", "", name)
 
 
 def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:
-    """Return the columns named x, y, z (or easting, northing, height); None where a name is missing."""
+    """Return the columns named x, y, z (or easting, northing, height); None if a name is missing."""
     clean = [clean_name(name) for name in names]
     for family in _FAMILIES:
         found = [next((i for i, name in enumerate(clean) if axis.fullmatch(name)), -1) for axis in family]
@@ -46,7 +46,7 @@ def find_columns(names: Sequence[str]) -> tuple[int, int, int] | None:
 
 
 def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, int]:
-    """Return the columns that hold the wanted attributes, by their names; those that are not there are left out."""
+    """Return the columns that hold the wanted attributes, by their names; missing ones are left out."""
     clean = [clean_name(name) for name in names]
     return {
         attribute: column
@@ -56,7 +56,7 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
 
 
 def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[int, int, int] | None:
-    """Return the columns of x, y, z for rows of a given width; None where the names do not fit the rows.
+    """Return the columns of x, y, z for rows of a given width; None if the names do not fit the rows.
 
     Parameters
     ----------

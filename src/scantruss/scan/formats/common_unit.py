@@ -1,4 +1,4 @@
-"""One unit for all coordinates of a scan, whatever its files say."""
+"""One unit for all coordinates of a scan, whatever the units of its files."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .content import Content
 def to_common_unit(
     path: Path, content: Content, unit: str, z_unit: str, common: str
 ) -> tuple[np.ndarray, str, tuple[str, ...]]:
-    """Return points brought to the unit that other files have, where their own is known; see `to_one_unit`.
+    """Return points converted to the unit of the other files, if their own is known; see `to_one_unit`.
 
     Parameters
     ----------
     path, content, unit, z_unit
         As for `to_one_unit`.
     common : str
-        Unit of the files before; "" where none has one.
+        Unit of the files before; "" if none has one.
     """
     points, own, notes = to_one_unit(path, content, unit, z_unit)
     feet = (content.feet,) if content.feet and own != "foot" and not z_unit else ()
@@ -68,7 +68,7 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
         name, scale = "m", metres
         notes.append(f"the unit of {path.name}, {metres:g} m, has no name here; its points are brought to m")
     if z_unit and not name:
-        raise InputError(f"{path} does not say the unit of x and y; --unit says it, besides --z-unit {z_unit}")
+        raise InputError(f"{path} does not state the unit of x and y; give it with --unit, besides --z-unit {z_unit}")
     z_metres = UNITS[z_unit] or z_metres
     size = UNITS[name]
     if not size or not z_metres or math.isclose(z_metres, size * scale, rel_tol=SAME_UNIT):

@@ -1,4 +1,4 @@
-"""What a reader returns and what a writer is given."""
+"""What a reader returns and what a writer takes."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ class Content:
 
     points: np.ndarray  #: (N, 3) numbers, in the unit and frame of the file
     attributes: dict[str, np.ndarray] = field(default_factory=dict)  #: class, return_number ... (N,) each
-    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
-    z_metres: float | None = None  #: metres a unit of z
+    metres: float | None = None  #: metres per unit of x and y; None if the file does not state it
+    z_metres: float | None = None  #: metres per unit of z
     system: str = ""  #: reference system, "EPSG:32642" or its name
     degrees: bool = False  #: x and y are longitude and latitude
     notes: tuple[str, ...] = ()  #: what a user should know
     left_out: dict[str, int] = field(
         default_factory=dict
-    )  #: points that the file itself says are none, by words for them
+    )  #: points that the file itself marks as none, by words for them
     unread: dict[str, int] = field(
         default_factory=dict
-    )  #: points that a reader passed over as they lie outside a part of the selection, by words for them
-    feet: str = ""  #: ... unless heights are in feet, or their unit is said
+    )  #: points that a reader skipped because they lie outside a part of the selection, by words for them
+    feet: str = ""  #: note that heights look like feet, used unless their unit is known
 
 
 class Cloud(NamedTuple):
@@ -47,5 +47,5 @@ class Cloud(NamedTuple):
 
 
 def surplus_note(name: str, held: int, promised: int) -> str:
-    """Return a note on a file with more points than it promises."""
+    """Return a note on a file with more points than its header promises."""
     return f"{name} promises {promised:,} points and holds {held:,}; all of them are read"

@@ -1,7 +1,7 @@
 """The part of a COPC file that touches a part of space: COPC is LAZ whose chunks are the boxes of an octree, listed in a table.
 
-Not by laspy's reader of COPC, which follows a damaged table for ever or leaves points out without a word, and holds all points
-before it cuts.
+laspy's own COPC reader is not used: on a damaged table it never ends or silently leaves points out, and it loads all points
+before it crops.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CLOSE = 1e-9  # of the octree's side; coordinates are rounded
 class Place(NamedTuple):
     """The box around a part of space from which points are wanted, in the unit of a file."""
 
-    words: str  #: for points that do not lie in it
+    words: str  #: for points outside it
     lower: np.ndarray  #: (3,)
     upper: np.ndarray  #: (3,)
 
@@ -43,9 +43,9 @@ class Boxes(NamedTuple):
     upper: np.ndarray  #: (K, 3)
 
 
-@np.errstate(all="ignore")  # what is not finite fits nothing
+@np.errstate(all="ignore")  # comparisons with values that are not finite fail
 def find_boxes(path: Path, header: Any) -> Boxes | None:
-    """Return the boxes of a file; None where it is no COPC, or its table does not fit its points, so that all must be read."""
+    """Return the boxes of a file; None if it is no COPC or its table does not match its points, so that all must be read."""
     with path.open("rb") as file:
         file.seek(HEADER_14)
         record = file.read(RECORD + INFO)
@@ -75,9 +75,7 @@ def _read_table(file: BinaryIO, place: int, size: int, end: int) -> np.ndarray:
     pages, found, left = [(place, size)], [np.empty(0, ENTRY)], end
     while pages:
         place, size = pages.pop()
-        if (
-            not 0 < size <= min(end - place, left)
-        ):  # nor more than the file holds, or a page may lead to itself for ever
+        if not 0 < size <= min(end - place, left):  # nor more entries than the file holds: a page may refer to itself
             continue
         left -= size
         file.seek(place)
@@ -99,12 +97,12 @@ def _chunks_of(file: BinaryIO, header: Any) -> np.ndarray:
 
 
 def _described(header: Any) -> bytes:
-    """Return the record that tells how points are packed."""
+    """Return the record that describes how points are packed."""
     return next((bytes(vlr.record_data_bytes()) for vlr in header.vlrs if vlr.record_id == LASZIP), b"")
 
 
 def _fit(entries: np.ndarray, chunks: np.ndarray, header: Any) -> bool:
-    """Whether a table has just the chunks of a file, and these the points that its header promises."""
+    """Whether a table has exactly the chunks of a file, and these the points that its header promises."""
     if not len(chunks) or len(entries) != len(chunks) or chunks[:, 0].sum() != header.point_count:
         return False
     places = header.offset_to_point_data + 8 + np.cumsum(chunks[:, 1]) - chunks[:, 1]
@@ -123,7 +121,7 @@ def _begin_inside(path: Path, header: Any, boxes: Boxes) -> bool:
 def touching(boxes: Boxes, places: Sequence[Place]) -> tuple[np.ndarray, dict[str, int]]:
     """Return the numbers of the boxes that touch all places, in order, and how many points lie in others, by the words of the places.
 
-    The coarsest box is always among them: it says what the file holds.
+    The coarsest box is always included: it shows what the file holds.
     """
     left = np.ones(len(boxes.points), np.bool_)
     unread: dict[str, int] = {}
@@ -146,7 +144,7 @@ def read_boxes(path: Path, header: Any, boxes: Boxes, rows: np.ndarray, most: in
     rows : (R,) int64 array
         Numbers of boxes; the points come in their order.
     most : int
-        Points that are held at once; at least a box.
+        Most points in memory at once; at least one box.
     fields
         What is unpacked, as lazrs says it.
 

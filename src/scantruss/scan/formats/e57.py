@@ -1,7 +1,7 @@
 """Points of an E57 file (ASTM E2807): all its scans by their poses, or each in its own frame.
 
-An own reader on numpy: the package e57 is right on every whole file that was tried, but prints the panic of its Rust code
-on a damaged one, and ends the process where a header claims more points than fit into memory.
+This reader uses numpy only: on a damaged file the package e57 prints a Rust panic, and it ends the process if a header claims
+more points than fit into memory.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .e57_header import SPHERICAL, Field, Scan, logical, read_pages, read_scans
 from .kinds import read_head, wrong_kind
 from .las_header import room_note
 
-LEAST_SURPLUS = 64  # bits of a field behind those of its records that may only fill a word
-RECORDS_PER_BLOCK = 1 << 18  # records taken out of their bits in one go
+LEAST_SURPLUS = 64  # bits of a field after those of its records that may be padding
+RECORDS_PER_BLOCK = 1 << 18  # records unpacked at a time
 
 
 class ScanPoints(NamedTuple):
@@ -158,7 +158,7 @@ def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> lis
 
 
 def _streams(packet: np.ndarray, count: int) -> list[np.ndarray] | None:
-    """Return the bytes of each field in a data packet; None where it does not hold so many fields."""
+    """Return the bytes of each field in a data packet; None if it holds another number of fields."""
     stated, begin = int(packet[4]) + 256 * int(packet[5]), 6 + 2 * count
     if stated != count or begin > len(packet):
         return None

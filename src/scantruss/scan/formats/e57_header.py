@@ -16,7 +16,7 @@ from ...errors import FormatError
 
 PAGE = 1024  # bytes
 DATA = 1020  # bytes of a page that are data
-MOST_PAGES = 1 << 14  # pages checked in one go
+MOST_PAGES = 1 << 14  # pages checked at a time
 POLYNOMIAL = 0x82F63B78  # Castagnoli's, bits reversed
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -48,7 +48,7 @@ class Scan:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The fields that hold the coordinates; () where there are none."""
+        """The fields that hold the coordinates; () if there are none."""
         names = [field.name for field in self.fields]
         return next((axes for axes in (CARTESIAN, SPHERICAL) if set(axes) <= set(names)), ())
 
@@ -74,7 +74,7 @@ def read_pages(path: Path) -> np.ndarray:
 
 
 def logical(place: int) -> int:
-    """Return the byte of the data that a byte of the file holds."""
+    """Return the offset in the data of an offset in the file."""
     return place // PAGE * DATA + min(place % PAGE, DATA)
 
 
@@ -95,7 +95,7 @@ def checksums(pages: np.ndarray) -> np.ndarray:
 
 @cache
 def _table() -> np.ndarray:
-    """Return what 16 shifts make of each pair of bytes, (65536,) uint32."""
+    """Return the CRC of each pair of bytes after 16 shifts, (65536,) uint32."""
     table: np.ndarray = np.arange(1 << 16, dtype=np.uint32)
     for _ in range(16):
         table = (table >> 1) ^ np.where(table & 1, np.uint32(POLYNOMIAL), np.uint32(0))

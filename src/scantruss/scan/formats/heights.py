@@ -1,7 +1,7 @@
-"""Whether the heights of an airborne scan look like feet: trees tell it where the file says nothing.
+"""Whether the heights of an airborne scan look like feet, judged by trees if the file does not say.
 
-Where a laser pulse comes back in several parts it went through leaves, so that the points around reach from the ground to the
-crowns. In woods that is 10 to 30 m; half of such places being more than 45 units high means that the unit is no metre.
+A laser pulse with several returns went through leaves, so that the points around it reach from the ground to the crowns: 10 to 30
+m in woods. If half of such places are more than 45 units high, the unit is not the metre.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-TALL = 45.0  # units; the median of woods, in metres, stays below
-POINTS_LOOKED_AT = 400_000  # points
-PLACES = 100  # boxes of either kind that are enough to tell
+TALL = 45.0  # median height of woods that is not reached in metres
+POINTS_LOOKED_AT = 400_000  # most points examined
+PLACES = 100  # boxes of either kind that are needed to decide
 
 
 def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
-    """Return a note where heights look like feet, else "".
+    """Return a note if heights look like feet, else "".
 
     Parameters
     ----------

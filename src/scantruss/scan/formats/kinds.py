@@ -1,4 +1,4 @@
-"""What a file is by its first bytes, so that a wrong suffix is refused in words."""
+"""The kind of a file by its first bytes, so that a wrong suffix is refused with a clear message."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...errors import FormatError
 
-HEAD = 4096  # bytes looked at
+HEAD = 4096  # bytes examined
 
 _SIGNATURES = (
     (b"ply\n", "a PLY file"),
@@ -63,7 +63,7 @@ def read_head(path: Path) -> bytes:
 
 
 def kind_of(head: bytes) -> str:
-    """Return what the first bytes of a file say that it is; "" where they tell nothing."""
+    """Return the kind of a file by its first bytes; "" if they tell nothing."""
     for signature, kind in _SIGNATURES:
         if head.startswith(signature):
             return kind
@@ -89,7 +89,7 @@ def wrong_kind(path: Path, head: bytes, wanted: str) -> FormatError:
 
 
 def unreadable(path: Path, kind: str, error: BaseException) -> FormatError:
-    """Return the error for a file on which a library failed; errors that are not the file's are raised as they are."""
+    """Return the error for a file that a library cannot read; errors not caused by the file are raised unchanged."""
     if isinstance(error, MemoryError | OSError) or not (
         isinstance(error, Exception) or type(error).__name__ == "PanicException"  # Rust's, not an Exception
     ):

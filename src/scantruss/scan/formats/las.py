@@ -24,12 +24,12 @@ from .systems import system_of
 
 POINTS_PER_CHUNK = 1_000_000  # points
 FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
-LOST_OF_SPACING = 1e-3  # of the spacing: what a coordinate may lose
+LOST_OF_SPACING = 1e-3  # rounding of a coordinate, as a share of the spacing
 LARGEST_INTEGER = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
 CODES = {"m": 9001, "foot": 9002}  # EPSG
-WITHHELD = "marked as withheld"  # the format's word for deleted
+WITHHELD = "marked as withheld"  # the format's term for deleted
 
-Places = Callable[[Content], list[Place]]  # by what a file says of its units
+Places = Callable[[Content], list[Place]]  # by the units that a file states
 
 
 def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
@@ -82,7 +82,7 @@ def check_count(path: Path, promised: int, got: int) -> None:
 
 
 def note_on_heights(path: Path) -> str:
-    """Return a note where the heights of a LAS or LAZ file look like feet, by its first points; "" where it says their unit."""
+    """Return a note if the heights of a LAS or LAZ file look like feet, by its first points; "" if it states their unit."""
     import laspy
 
     try:
@@ -94,7 +94,7 @@ def note_on_heights(path: Path) -> str:
 
 
 def fields_for(names: Sequence[str]) -> Any:
-    """Return what must be unpacked for points and some attributes, as laspy says it."""
+    """Return what must be unpacked for points and some attributes, in laspy's terms."""
     from laspy import DecompressionSelection as Fields
 
     fields = Fields.base() | Fields.Z | Fields.FLAGS
@@ -153,7 +153,7 @@ def write_las(path: Path, cloud: Cloud) -> None:
         header.vlrs.extend(_unit_records(cloud.unit))
     try:
         _write_points(path, header, points, normals)
-    except lazrs.LazrsError as error:  # what it makes of a disk that is full
+    except lazrs.LazrsError as error:  # raised when the disk is full
         raise OSError(str(error)) from None
 
 

@@ -1,4 +1,4 @@
-"""Claims in the header of a LAS file that its size belies: laspy would follow them, four billion records if need be."""
+"""Checks of the header of a LAS file against the size of the file: laspy would follow any claim, up to four billion records."""
 
 from __future__ import annotations
 
@@ -62,14 +62,14 @@ def check_header(path: Path) -> tuple[str, ...]:
 
 
 def room_note(path: Path, count: int, room: int, of: str = "") -> tuple[str, ...]:
-    """Return a note where a file surely holds more points than are promised."""
+    """Return a note if a file certainly holds more points than its header promises."""
     if room <= count:
         return ()
     return (f"the header of {path.name} promises {count:,} points{of}, the file has {room:,}; the others are left out",)
 
 
 def _check_packed(path: Path, size: int, length: int, records: int, start: int, width: int, count: int) -> int:
-    """Refuse packed points whose chunks are more or larger than the file; return how many there are at least."""
+    """Refuse packed points with more or larger chunks than the file can hold; return the least number of points."""
     import lazrs
 
     early = FormatError(f"{path} ends early: the table of its packed points is not whole; copy it again")
@@ -78,7 +78,7 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
         file.seek(start)
         words = file.read(8)
         table = struct.unpack("<Q", words)[0] if len(words) == 8 else 0
-        if table == ONES:  # a writer that could not go back wrote it at the end
+        if table == ONES:  # a writer that could not seek wrote it at the end
             file.seek(size - 8)
             table = struct.unpack("<Q", file.read(8))[0]
         if len(described) < 34 or not start + 8 <= table <= size - 8:
@@ -95,7 +95,7 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
             raise early
         file.seek(start)
         entries = lazrs.read_chunk_table(file, lazrs.LazVlr(described))
-        entries = [entry for entry in entries if entry != (0, 0)]  # what some writers put behind the last chunk
+        entries = [entry for entry in entries if entry != (0, 0)]  # some writers put these after the last chunk
         if not all(0 < entry[0] <= max(count, MOST_IN_CHUNK) for entry in entries):
             raise FormatError(f"{path}: its packed points come in chunks of no sensible size; the file is damaged")
         layers = sum({10: 9, 11: 1, 12: 2, 13: 1, 14: long}.get(kind, 0) for kind, long in parts)
@@ -112,7 +112,7 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
 
 
 def _find_record(file: BinaryIO, place: int, records: int, number: int) -> bytes:
-    """Return what a variable length record holds; nothing where there is none."""
+    """Return the content of a variable length record; empty if there is none."""
     for _ in range(records):
         file.seek(place)
         entry = file.read(RECORD)

@@ -1,4 +1,4 @@
-"""A file of desired member lengths: x, y, z and a length a line, as text of any layout that scans may have."""
+"""A file of desired member lengths: x, y, z and a length on each line, in any text layout that scans may have."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NAMES = ("length", "member", "desired", "l", "size", "edge")  # of the column of
 def read_lengths(path: str | Path) -> list[tuple[float, ...]]:
     """Return the rows of a file of lengths, (x, y, z, length) each [scan unit].
 
-    The length is in the column that the header calls so, else in the one behind the coordinates.
+    The length is in the column of that name, else in the one after the coordinates.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def read_lengths(path: str | Path) -> list[tuple[float, ...]]:
 
 
 def _length_column(header: list[str], layout: Layout) -> int:
-    """Column of the lengths: by its name, else the one behind the coordinates."""
+    """Column of the lengths: by its name, else the one after the coordinates."""
     for line in reversed(header):
         names = [name.strip().lower() for name in split_fields(line.strip().lstrip("#/%!;* "), layout.separator)]
         for column, name in enumerate(names if len(names) > 3 else ()):
@@ -57,7 +57,7 @@ def _length_column(header: list[str], layout: Layout) -> int:
 
 
 def _number(field: str, layout: Layout) -> float:
-    """Value of a field; ValueError where it is none or not finite."""
+    """Value of a field; ValueError if it is no number or not finite."""
     value = number_of(field, layout.comma)
     if not math.isfinite(value):
         raise ValueError(field)

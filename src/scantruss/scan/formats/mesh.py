@@ -1,6 +1,6 @@
-"""Points of OBJ, STL and OFF files: all their vertices, referred to by a face or not.
+"""Points of OBJ, STL and OFF files: all their vertices, with or without a face.
 
-Own readers of a few lines: libraries for such files drop vertices without a face, or reorder and repeat them.
+These readers are our own: libraries for such files drop vertices without a face, or reorder and repeat them.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def read_off(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 
 def read_stl(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the corners of an STL file, each place once."""
+    """Return the corners of an STL file, each once."""
     head = read_head(path)
     size = path.stat().st_size
     facets = int(np.frombuffer(head, "<u4", 1, 80)[0]) if size >= STL_START else -1

@@ -42,7 +42,7 @@ def read_npy(path: Path, wanted: Sequence[str] = ()) -> Content:
             array = np.load(file, allow_pickle=False)
     except FormatError:
         raise
-    except Exception as error:  # a damaged header ends in many ways
+    except Exception as error:  # a damaged header raises many kinds of errors
         raise unreadable(path, "NPY", error) from None
     content = _content(array, wanted)
     if content is None:
@@ -72,9 +72,9 @@ def check_claim(path: Path, file: IO[bytes], size: int) -> None:
 
 
 def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the points of an NPZ file: those of an array whose name says so, or of the only one that fits.
+    """Return the points of an NPZ file: the array with a fitting name, or the only one with a fitting shape.
 
-    An array `unit` says the unit.
+    An array `unit` gives the unit.
     """
     head = read_head(path)
     if not head.startswith(b"PK"):
@@ -88,12 +88,12 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
             return replace(content, metres=_metres(arrays, path), notes=notes)
     except FormatError:
         raise
-    except Exception as error:  # a damaged archive ends in many ways
+    except Exception as error:  # a damaged archive raises many kinds of errors
         raise unreadable(path, "NPZ", error) from None
 
 
 def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return which array of an archive holds the points, and notes; by names and headers, as all may be large."""
+    """Return the name of the array that holds the points, and notes; only names and headers are read, as arrays may be large."""
     fitting, held = [], []
     for name in arrays.files:
         shape, kind = _shape_of(arrays, name, path)
@@ -122,7 +122,7 @@ def _plain(name: str) -> str:
 
 
 def _shape_of(arrays: Any, name: str, path: Path) -> tuple[tuple[int, ...] | None, np.dtype[Any] | None]:
-    """Return shape and type of an array of an archive by its header; None where it is no array."""
+    """Return shape and type of an array of an archive by its header; None if it is no array."""
     if (inside := f"{name}.npy") not in arrays.zip.namelist():
         return None, None
     with arrays.zip.open(inside) as file:
@@ -132,14 +132,14 @@ def _shape_of(arrays: Any, name: str, path: Path) -> tuple[tuple[int, ...] | Non
 
 
 def metres_of_npz(path: Path) -> float | None:
-    """Return the metres of the unit that an NPZ file names, without reading its points; None where it names none."""
+    """Return the metres of the unit that an NPZ file names, without reading its points; None if it names none."""
     with suppress(Exception), path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return _metres(arrays, path)
-    return None  # damaged in some way: reading its points says in which
+    return None  # damaged: reading its points reports how
 
 
 def _member(arrays: Any, name: str, path: Path) -> np.ndarray | None:
-    """Return an array of an archive; None where it holds Python objects or is no array."""
+    """Return an array of an archive; None if it holds Python objects or is no array."""
     if (inside := f"{name}.npy") in arrays.zip.namelist():
         with arrays.zip.open(inside) as file:
             check_claim(path, file, arrays.zip.getinfo(inside).file_size)
@@ -172,7 +172,7 @@ def is_turned(shape: tuple[int, ...]) -> bool:
 
 
 def _content(array: np.ndarray | None, wanted: Sequence[str]) -> Content | None:
-    """Return x, y, z of an array with columns or with fields of these names; None where it has neither."""
+    """Return x, y, z of an array with columns or with fields of these names; None if it has neither."""
     if array is None or not holds_points(array.shape, array.dtype):
         return None
     if not (names := array.dtype.names):

@@ -1,4 +1,4 @@
-"""Files packed by gzip (scan.xyz.gz): unpacked beside the temporary files of the system, within bounds."""
+"""Files packed by gzip (scan.xyz.gz): unpacked into the system's folder for temporary files, up to a bound."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 from ...errors import FormatError
 from .kinds import read_head, wrong_kind
 
-MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros would to a thousandth
+MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros pack to a thousandth
 ALWAYS = 1 << 26  # bytes that any file may unpack to
 BYTES_PER_BLOCK = 1 << 20  # bytes
 
@@ -51,7 +51,7 @@ def _unpack(path: Path, inner: Path) -> None:
 
 
 def check_size(path: Path, size: int) -> None:
-    """Refuse a packed file that unpacks to so many bytes as no scan would."""
+    """Refuse a packed file that unpacks to more bytes than any scan would."""
     most = max(ALWAYS, MOST_SHRUNK * path.stat().st_size)
     if size > most:
         raise FormatError(f"{path} unpacks to over {most:,} bytes, which no scan of its size does; unpack it yourself")

@@ -35,8 +35,8 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 
 def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:
-    """Return the metres a unit of x and y, and of z, that the columns name, without reading them; None where they do not."""
-    with suppress(Exception):  # of a damaged file reading the points says what is wrong
+    """Return the metres per unit of x and y, and of z, that the columns name, without reading them; None if they do not."""
+    with suppress(Exception):  # if the file is damaged, reading the points reports how
         import pyarrow.parquet as parquet
 
         names = parquet.read_schema(path).names

@@ -16,8 +16,8 @@ Source = str | Path | Iterable[str | Path]
 def files_of(source: Source) -> list[Path]:
     """Return the files that a name, a pattern such as ``tiles/*.laz``, or several of these mean.
 
-    The files of a pattern come in the order of their names (`**` looks into folders), each file once; a file whose name
-    holds the signs of a pattern is that file.
+    The files of a pattern come in the order of their names (`**` looks into folders), each file once; a file whose name holds
+    pattern characters is taken as that file.
 
     Raises
     ------

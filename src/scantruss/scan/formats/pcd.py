@@ -1,7 +1,7 @@
 """Points of a PCD file: ascii, binary or compressed; any order, type and number of fields.
 
-An own reader on numpy: the package pypcd4 takes no second blank between two numbers, nor a field of several values,
-and reserves as many points as a header claims. The unpacking (LZF) is that of the package it uses.
+This reader uses numpy only: the package pypcd4 accepts neither two blanks between numbers nor fields of several values, and
+allocates as many points as a header claims. LZF is unpacked by the package that pypcd4 uses.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Header:
     data: str  #: ascii, binary or binary_compressed
     start: int  #: [byte] of the points
     metres: float | None
-    moved: bool  #: the scanner stood elsewhere than at the origin
+    moved: bool  #: the scanner did not stand at the origin
 
     @property
     def row(self) -> np.dtype[np.void]:
@@ -66,12 +66,12 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     if len(table) > header.points:
         notes.append(surplus_note(path.name, len(table), header.points))
     if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
-        notes.append(f"{path.name} goes on for {more:,} bytes behind the points that it promises; they are left aside")
+        notes.append(f"{path.name} goes on for {more:,} bytes after the points that it promises; they are ignored")
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
 
 def read_pcd_header(path: Path) -> Header:
-    """Return what the header of a PCD file says; FormatError where it is none."""
+    """Return the header of a PCD file; FormatError if it is none."""
     with path.open("rb") as file:
         raw = file.read(LONGEST_HEADER)
     end = re.search(rb"(?:^|\n)[ \t]*DATA[ \t]+(\w+)[ \t]*\r?(\n|$)", raw)
@@ -142,7 +142,7 @@ def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarr
 
 
 def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
-    """Unpack a file that stands field by field."""
+    """Unpack a file that is stored field by field."""
     with path.open("rb") as file:
         file.seek(header.start)
         sizes = np.frombuffer(file.read(8), dtype="<u4")

@@ -1,6 +1,6 @@
 """Points of a PLY file: ascii or binary of either byte order; of the element `vertex` x, y, z and wanted attributes count.
 
-An own reader on numpy: the library of choice, plyfile, has a licence (GPL) that this package cannot take on.
+This reader uses numpy only: the licence of the usual library, plyfile, is the GPL.
 """
 
 from __future__ import annotations
@@ -170,12 +170,12 @@ def _open_data(path: Path, header: Header) -> TextIOWrapper:
 
 
 def _pass(lines: Iterable[str], count: int) -> int:
-    """Pass over so many lines and return how many there were."""
+    """Skip a number of lines and return how many there were."""
     return sum(1 for _ in itertools.islice(lines, count))
 
 
 def _load_rows(lines: Iterator[str], vertex: Element, names: Sequence[str]) -> np.ndarray | None:
-    """Return the points where each row is a line; None where the rows are laid out in another way."""
+    """Return the points if each row is a line; None if rows are laid out in another way."""
     first = next(lines, "")
     if vertex.has_lists or len(first.split()) != len(vertex.properties):
         return None

@@ -44,12 +44,12 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
-    """What the header says, and where the data starts."""
+    """The content of the header, and where the data starts."""
 
     order: str  #: "" for ascii, "<" or ">" for binary
     elements: tuple[Element, ...]
     start: int  #: [byte]
-    unit: str = ""  #: word for the unit, where a comment says it
+    unit: str = ""  #: unit, if a comment names it
 
 
 def read_header(path: Path) -> Header:

@@ -31,10 +31,10 @@ class Part:
 
     points: np.ndarray  #: (N, 3) [unit]
     unit: str
-    system: str  #: reference system, "" where the file does not say it
+    system: str  #: reference system, "" if the file does not say it
     count: int  #: points in the file
-    left_out: dict[str, int]  #: what the file calls none and what each part of the selection left out
-    held: str  #: what could have been selected, where nothing was
+    left_out: dict[str, int]  #: points that the file marks as none, and points that each part of the selection left out
+    held: str  #: what could have been selected, if nothing was
     notes: tuple[str, ...]
 
 
@@ -98,7 +98,7 @@ def places_in_file(path: Path, said: Content, unit: str, selection: Selection, c
 def select(
     path: Path, content: Content, unit: str, selection: Selection, common: str = "", described: int | None = None
 ) -> Part:
-    """Return what is selected of some points of a file; where nothing is, about so many of them are described, or all."""
+    """Return what is selected of some points of a file; if nothing is, about `described` of them are described, or all."""
     check_attributes(path, content.attributes, selection)
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, chosen = choose(points, content.attributes, selection)
@@ -111,13 +111,13 @@ def select(
 
 
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
-    """Return what could be selected, by about so many points from everywhere, as the first may all be NaN."""
+    """Return what could be selected, judged by points from all parts of the file, as the first may all be NaN."""
     some = slice(None, None, max(len(points) // most, 1) if most else 1)
     return describe(points[some], {name: values[some] for name, values in content.attributes.items()})
 
 
 def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
-    """Return what a file holds, as it stands in it: all points and the wanted attributes.
+    """Return the content of a file unchanged: all points and the wanted attributes.
 
     Where the file has a table of places only the points near `places_of` what it says of its units are read.
     """
@@ -132,7 +132,7 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
             known = " ".join(sorted(READERS))
             raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
         try:
-            with np.errstate(all="ignore"):  # what is not finite is counted and left out later
+            with np.errstate(all="ignore"):  # values that are not finite are counted and left out later
                 return read_las(inner, wanted, places_of) if reader is read_las else reader(inner, wanted)
         except OSError as error:
             raise FormatError(f"{path} cannot be read: {error.strerror or ' '.join(str(error).split())}") from None
@@ -152,13 +152,13 @@ def _join(files: Sequence[Path], parts: Sequence[Part]) -> tuple[np.ndarray, str
 def joint_notes(
     files: Sequence[Path], units: Sequence[str], notes: Sequence[Sequence[str]]
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of all files of a scan, "" where none says one, and the notes on them, each once."""
+    """Return the unit of all files of a scan, "" if none says one, and the notes on them, each once."""
     unit = next((unit for unit in units if unit), "")
     said: dict[str, None] = {}
     for file, own, words in zip(files, units, notes, strict=True):
         said.update(dict.fromkeys(words))
         if unit and not own:
-            said[f"{file.name} does not say its unit and is taken to be in {unit} as the others"] = None
+            said[f"{file.name} does not state its unit and is taken to be in {unit} like the others"] = None
     return unit, tuple(said)
 
 

@@ -1,4 +1,4 @@
-"""What a LAS file says of its reference system: WKT (both editions) or GeoTIFF keys. Only units and the name count."""
+"""The reference system of a LAS file: WKT (both editions) or GeoTIFF keys. Only units and the name are used."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class System:
     """A reference system, as far as units go."""
 
     name: str = ""
-    metres: float | None = None  #: metres a unit of x and y
+    metres: float | None = None  #: metres per unit of x and y
     z_metres: float | None = None  #: ... of z
     degrees: bool = False
 
 
 def system_of(records: Sequence[Any]) -> System:
-    """Return the system that the variable length records of a LAS file tell; an empty one where they tell none."""
+    """Return the system given by the variable length records of a LAS file; an empty one if they give none."""
     bodies = {r.record_id: bytes(r.record_data_bytes()) for r in records if r.user_id.strip("\0 ") == "LASF_Projection"}
     if 2112 in bodies:
         found = from_wkt(bodies[2112].decode("utf-8", errors="replace").rstrip("\0 \n"))
@@ -44,7 +44,7 @@ def system_of(records: Sequence[Any]) -> System:
 
 
 def from_wkt(text: str) -> System:
-    """Return the system of a WKT text; an empty one where it cannot be understood."""
+    """Return the system of a WKT text; an empty one if it cannot be parsed."""
     root = _root(text)
     if root is None:
         return System()
@@ -61,7 +61,7 @@ def from_wkt(text: str) -> System:
 
 
 def _root(text: str) -> Node | None:
-    """Return the outermost keyword of a WKT text with what its brackets hold; None where there is none."""
+    """Return the outermost keyword of a WKT text with what its brackets hold; None if there is none."""
     stack: list[Node] = [("", [])]
     for token in _TOKEN.findall(text):
         held = stack[-1][1]
@@ -99,7 +99,7 @@ def _is_geographic(node: Node) -> bool:
 
 
 def _units(node: Node) -> tuple[float | None, float | None]:
-    """Return the metres a unit of the plane axes and of the axis that points up, where it has its own."""
+    """Return the metres per unit of the plane axes and of the axis that points up, where it has its own."""
     own = [m for child in _children(node) if child[0] in ("UNIT", "LENGTHUNIT") and (m := _metres(child))]
     axes = []
     for axis in (child for child in _children(node) if child[0] == "AXIS"):

@@ -24,7 +24,7 @@ class Format(NamedTuple):
     """One format of scans."""
 
     read: Reader  #: returns the points and the wanted attributes of a file
-    write: Writer | None = None  #: None where the format is only read
+    write: Writer | None = None  #: None if the format is only read
 
 
 FORMATS = {

@@ -24,17 +24,17 @@ from .content import Cloud, Content, surplus_note
 from .text_fields import COMMENT, header_names, holds_numbers, number_of, split_line
 from .text_layout import BOM, BYTES_LOOKED_AT, LINE_BREAK, Layout, find_layout
 
-EMPTY = "without coordinates"  # what is said of lines whose fields are empty
+EMPTY = "without coordinates"  # words for lines whose fields are empty
 LARGE = 1 << 22  # bytes of text for which importing pyarrow pays
 BYTES_PER_BLOCK = 1 << 24  # bytes read at a time
-BYTES_PER_THREAD = 1 << 22  # bytes that pyarrow gives to a thread
+BYTES_PER_THREAD = 1 << 22  # bytes per thread of pyarrow
 ROWS_PER_WRITE = 1 << 16  # rows written at a time
 NAME_IT = "a first line that names the columns (time x y z ...) settles it"
 _WORDS_IN_COMMENT = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
 
 
 class Rows(NamedTuple):
-    """What the lines of a text hold."""
+    """The content of lines of text."""
 
     rows: np.ndarray  #: (N, columns) float64
     promised: int  #: points that count lines among them promise
@@ -66,7 +66,7 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
 
 
 def write_text(path: Path, cloud: Cloud) -> None:
-    """Write numbers with as many digits as give back the same doubles."""
+    """Write numbers with enough digits to give back the same doubles."""
     sign = "," if path.suffix.lower() == ".csv" else " "
     with path.open("w", encoding="utf-8", newline="\n") as file:
         if sign == ",":
@@ -82,7 +82,7 @@ def write_text(path: Path, cloud: Cloud) -> None:
 
 
 def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
-    """Yield the whole lines behind the header, some at a time, with the byte of the file at which they begin."""
+    """Yield blocks of whole lines after the header, with the byte of the file at which each begins."""
     if layout.encoding == "utf-16":
         lines = LINE_BREAK.split(path.read_bytes().decode("utf-16", errors="replace"))
         yield 0, "\n".join(lines[layout.skip :]).encode()
@@ -99,7 +99,7 @@ def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
 
 
 def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Rows:
-    """Return the columns of whole lines behind the header.
+    """Return the columns of whole lines after the header.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
     Raises
     ------
     FormatError
-        A line holds numbers, but not those that are wanted; or it names other columns than the header.
+        A line holds numbers but not the wanted ones, or names other columns than the header.
     """
     if is_plain(block, layout):
         if len(block) > LARGE and (rows := _read_by_pyarrow(block, layout, columns)) is not None:
@@ -134,7 +134,7 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
 
 
 def is_plain(block: bytes, layout: Layout) -> bool:
-    """Whether a reader that knows one separator and skips what follows a # misses nothing."""
+    """Whether a reader with one separator that skips text after a # reads everything."""
     if not layout.plain or block.isspace():
         return False
     if b"#" not in block:
@@ -144,7 +144,7 @@ def is_plain(block: bytes, layout: Layout) -> bool:
 
 
 def _read_by_pyarrow(block: bytes, layout: Layout, columns: Sequence[int]) -> np.ndarray | None:
-    """Return some columns of lines with the same fields, (N, len(columns)); None where a line has others."""
+    """Return some columns of lines with the same fields, (N, len(columns)); None if a line has others."""
     if b"#" in block:
         return None
     import pyarrow
@@ -184,7 +184,7 @@ def _with_single_separators(block: bytes, layout: Layout) -> bytes:
         codes = np.frombuffer(block, np.uint8)
         space = codes <= ord(" ")
         if (space[1:] & space[:-1]).any():
-            surplus = (codes[1:] == ord(" ")) & space[:-1]  # behind another blank or a line's end
+            surplus = (codes[1:] == ord(" ")) & space[:-1]  # after another blank or a line's end
             block = codes[np.append(True, ~surplus)].tobytes().replace(b" \n", b"\n")
     return block.lstrip(b"\n")
 
@@ -201,7 +201,7 @@ def _lines_before(path: Path, layout: Layout, end: int) -> int:
 def read_ragged(
     path: Path, lines: Sequence[str], layout: Layout, columns: Sequence[int], count_before: Callable[[], int]
 ) -> Rows:
-    """Return the columns of lines that no faster way can read; see `read_lines`."""
+    """Return the columns of lines that no faster reader can handle; see `read_lines`."""
     values, promised, empty = array("d"), 0, 0
     names: _Names | None = None
     needed = columns[: len(columns) - len(layout.attributes)]
@@ -248,12 +248,12 @@ class _Names(NamedTuple):
 
     @property
     def in_comment(self) -> bool:
-        """Whether it may as well be prose with an x, a y and a z."""
+        """Whether it might as well be prose that contains x, y and z."""
         return bool(COMMENT.match(self.line.strip()))
 
 
 def _find_names(number: int, line: str, layout: Layout) -> _Names | None:
-    """Return the names x, y, z ... of a line; None where it has none, or is a line of the header again."""
+    """Return the names x, y, z ... of a line; None if it has none, or repeats a line of the header."""
     if not line.strip() or line.strip() in layout.header:
         return None
     for names in header_names([line], layout.separator):
@@ -265,7 +265,7 @@ def _find_names(number: int, line: str, layout: Layout) -> _Names | None:
 def _check_names(
     path: Path, names: _Names, row: Sequence[str], layout: Layout, count_before: Callable[[], int]
 ) -> None:
-    """Refuse names by which the row below them has its coordinates elsewhere than the header of the file says."""
+    """Refuse names that put the coordinates of the rows below into other columns than the header does."""
     found = fit_columns(names.names, len(row), layout.columns[0] > 0)
     if found is None and names.in_comment:
         return
@@ -277,7 +277,7 @@ def _check_names(
 
 
 def _differs(path: Path, names: Sequence[str], columns: Sequence[int], layout: Layout) -> bool:
-    """Whether attributes stand elsewhere, or lengths are in another unit."""
+    """Whether attributes are in other columns, or lengths in another unit."""
     if max(columns) >= len(names):
         return False
     metres, z_metres = metres_of_columns(path, [names[column] for column in columns])
@@ -293,12 +293,12 @@ def _rises(values: np.ndarray) -> bool:
 
 
 def is_number_of_point(values: np.ndarray) -> bool:
-    """Whether values are whole numbers that only rise, with or without gaps."""
+    """Whether values are integers that only increase, with or without gaps."""
     return _rises(values) and not (values[np.isfinite(values)] % 1).any()
 
 
 def first_column_note(name: str, layout: Layout, *parts: np.ndarray) -> tuple[str, ...]:
-    """Return a note on how the first column of a file, or of parts of it, is taken; () where it is plain."""
+    """Return a note on how the first column of a file, or of parts of it, is read; () if that is obvious."""
     if not layout.has_unnamed_first or sum(map(len, parts)) < 3:
         return ()
     values = np.concatenate(parts)

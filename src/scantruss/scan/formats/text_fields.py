@@ -1,4 +1,4 @@
-"""The fields of a line of text: separators, comments, quotes, numbers and words for missing ones."""
+"""The fields of a line of text: separators, comments, quotes, numbers and words for missing values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MISSING = frozenset(
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
-    """Return the fields of a line without its comment; [] where nothing is left."""
+    """Return the fields of a line without its comment; [] if nothing is left."""
     if "#" in line or "//" in line:
         line = COMMENT.split(line, maxsplit=1)[0]
     return split_fields(line.strip(" \r\n") if separator == "\t" else line.strip(), separator)
@@ -56,7 +56,7 @@ def is_number(field: str, comma: bool) -> bool:
 
 
 def number_of(field: str, comma: bool) -> float:
-    """Return the value of a field, NaN where it is empty or says that it is missing; ValueError where it is no number."""
+    """Return the value of a field, NaN if it is empty or marked as missing; ValueError if it is no number."""
     if (NUMBER_COMMA if comma else NUMBER).fullmatch(field):
         return float(re.sub("[dD]", "e", field.replace(",", ".")))
     if not field or _is_missing(field):
@@ -65,7 +65,7 @@ def number_of(field: str, comma: bool) -> float:
 
 
 def _is_missing(field: str) -> bool:
-    """Whether a field is a word for a missing number, or the stars for one that a program had no room for."""
+    """Whether a field is a word for a missing number, or the stars of a number too wide for its column."""
     return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
 
 
@@ -75,7 +75,7 @@ def count_numbers(row: Sequence[str], comma: bool) -> int:
 
 
 def holds_numbers(row: Sequence[str], comma: bool) -> bool:
-    """Whether a field is a number, or two are in the line when it is split by any separator: it may have another one."""
+    """Whether a field is a number, or the line holds two numbers when split by any separator."""
     if any(is_number(field, comma) for field in row):
         return True
     words = [word for field in row for word in _BREAKS.split(field)]

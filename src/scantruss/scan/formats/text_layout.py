@@ -1,4 +1,4 @@
-"""The layout of a text file of points, found from a part of it: separator, decimal sign, header, columns."""
+"""The layout of a text file of points, found from parts of it: separator, decimal sign, header, columns."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
 from .text_fields import ANY, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
 
-BYTES_LOOKED_AT = 1 << 16  # bytes looked at, at the start and in the middle
-LINES = 1000  # lines looked at in each part
+BYTES_LOOKED_AT = 1 << 16  # bytes examined at the start and in the middle
+LINES = 1000  # lines examined in each part
 BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
 LINE_BREAK = re.compile(r"\r\n|\n|\r")
 THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
@@ -39,7 +39,7 @@ class Layout:
     """Where the coordinates of a text file are."""
 
     encoding: str
-    separator: str | None  #: one sign, None for blanks, or ANY
+    separator: str | None  #: one character, None for blanks, or ANY
     comma: bool  #: a comma may be the decimal sign
     skip: int  #: lines before the first point
     columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number
@@ -47,18 +47,18 @@ class Layout:
     width: int = 0  #: fields of most lines
     named: bool = False  #: the header names the columns
     attributes: tuple[tuple[str, int], ...] = ()  #: wanted attributes that the header names, and their columns
-    metres: float | None = None  #: metres a unit of x and y, where a comment or the names of the columns say it
+    metres: float | None = None  #: metres per unit of x and y, where a comment or the names of the columns say it
     z_metres: float | None = None  #: ... of z
     header: tuple[str, ...] = ()  #: the lines before the first point
 
     @property
     def plain(self) -> bool:
-        """Whether one sign, which is no decimal sign too, stands between two numbers."""
+        """Whether numbers are separated by one character that is not also the decimal sign."""
         return self.separator != ANY and not (self.separator == "," and self.comma)
 
     @property
     def has_unnamed_first(self) -> bool:
-        """Whether the first of four or more columns may be a number, a time or x, as no header names it."""
+        """Whether the first of four or more columns may be a point number, a time or x, as no header names it."""
         return not self.named and self.width > 3 and self.columns[0] == 0
 
 
@@ -91,7 +91,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
 
 
 def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequence[str]) -> Layout:
-    """Return a layout with what its header says of attributes and units."""
+    """Return a layout with the attributes and units of its header."""
     lines = list(header_names(header, layout.separator))
     if not layout.named:
         for names in lines:
@@ -138,13 +138,13 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
 
 
 def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
-    """Whether one line of ten holds more numbers with decimal commas: 1,5;2,5;3,5;200;100;50 has three without."""
+    """Whether one line in ten holds more numbers if commas are decimal: 1,5;2,5;3,5;200;100;50 has only three otherwise."""
     split = [split_line(line, separator) for line in lines]
     return 10 * sum(count_numbers(row, True) > count_numbers(row, False) for row in split) > len(split)
 
 
 def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
-    """Refuse numbers such as 5.118,216 and "5,118.216", which would fall into two."""
+    """Refuse numbers such as 5.118,216 and "5,118.216", which would be split in two."""
     for separator in (";", "|", "\t", ",", None):
         for row in rows[:: len(rows) // 20 + 1]:
             fields = split_line(row, separator)
@@ -156,7 +156,7 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
 
 
 def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
-    """Refuse "1,234","2,345" where nothing tells that the commas within the quotes are decimal signs."""
+    """Refuse "1,234","2,345" if nothing shows that the commas within the quotes are decimal signs."""
     fields = [field for row in rows for field in split_line(row, ",") if NUMBER_COMMA.fullmatch(field)]
     if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
         said = next(field for field in fields if "," in field)
@@ -166,7 +166,7 @@ def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
 
 
 def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:
-    """Refuse points above the first line that is split as most are: with another separator they would pass for a header."""
+    """Refuse points above the first line with the usual separator: with another one they would be taken for a header."""
     for number, line in enumerate(header, start=1):
         fields = split_line(line, ANY)
         if len(fields) >= 3 > count_numbers(split_line(line, separator), comma) and all(

@@ -1,4 +1,4 @@
-"""From points to a file of a cloud."""
+"""From points to a cloud file."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def write_points(
     path : str or Path
         One of the suffixes in `WRITERS`; `check_cloud_output` says beforehand whether it can be.
     points : (N, 3) array [unit]
-        In the scan's own frame. Doubles are kept as they are, in LAS and LAZ to less than a thousandth of the spacing.
+        In the scan's own frame. Doubles are written exactly, in LAS and LAZ to less than a thousandth of the spacing.
     normals : (N, 3) array, optional
         Kept by all formats.
     unit : str
-        Written where the format can say it; text files say it in the names of their columns (CSV) or in a comment.
+        Written if the format can hold it; text files hold it in their column names (CSV) or in a comment.
     origin : (3,) array, optional
         A place near the points, from which LAS counts.
 

@@ -1,7 +1,7 @@
-"""Scans that would fit as well elsewhere: each is held against all the others together, in all ways that offer themselves.
+"""Scans that would fit elsewhere as well: each is tested against all the others together, in every plausible place.
 
-On a body that looks the same when turned, or slides on itself, scans agree in a wrong place as well as in the right one; then nothing
-in them tells which it is.
+On a shape that looks the same when rotated, or slides on itself, scans agree in a wrong place as well as in the right one, and
+nothing in them tells which is which.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from .poses import move, small_motion, turn_by
 from .scans import Scan
 from .views import boxes_of, make_view
 
-AS_GOOD = 0.03  # agreement that another place may lack
-AS_CLOSE = 1.25  # residual that it may have, in that of the present one
-AS_MUCH = 0.2  # places that must agree there, in those that agree now
-LEAST = 0.08  # and in those of the scan
-ELSEWHERE = 1.5  # distance from which on a place is another one, in coarse spacings
-FEWEST_SCANS = 3  # scans that tell which of several ways holds where one of them does not
-PUSH = 4.0  # how far a scan is pushed to see whether it comes back, in coarse spacings
+AS_GOOD = 0.03  # difference in agreement up to which another place is as good
+AS_CLOSE = 1.25  # largest residual there, over the present one
+AS_MUCH = 0.2  # least share of the places that agree now which must agree there
+LEAST = 0.08  # ... and of all places of the scan
+ELSEWHERE = 1.5  # distance beyond which a place is another one [coarse spacings]
+FEWEST_SCANS = 3  # fewest scans that can decide between several ways
+PUSH = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]
 
 
 def leave_out_doubtful(
     scans: list[Scan], group: Group, sure: set[int], progress: Callable[[str, float], None]
 ) -> tuple[Group, set[int]]:
-    """Return what is left of a group without the scans that fit elsewhere as well, and these.
+    """Split off the scans of a group that fit elsewhere as well; return the rest of the group, and those.
 
-    What only they held is left out with them. With fewer scans others may fit in more ways, so that is repeated; two that are left
-    of more do not tell which way holds.
+    Scans that only they connected are left out too. With fewer scans others may become ambiguous, so this is repeated; if only
+    two of several remain, they cannot decide which way is right.
 
     Parameters
     ----------
-    sure : scans that are not doubted, since their places were given
+    sure : scans that are not doubted, because their poses were given
     """
     left_out: set[int] = set()
     while len(group.members) > 1:
@@ -65,7 +65,7 @@ def leave_out_doubtful(
 
 
 def _largest_linked(scans: list[Scan], group: Group, without: set[int]) -> list[int]:
-    """Return the most scans of a group that overlap one after the other, some left out."""
+    """Return the largest set of scans of a group that are linked by overlaps, some scans left out."""
     part = {i: {i} for i in group.members if i not in without}
     for i, j in links_of(scans, group):
         if i in part and j in part and part[i] is not part[j]:
@@ -76,7 +76,7 @@ def _largest_linked(scans: list[Scan], group: Group, without: set[int]) -> list[
 
 
 def _fits_elsewhere(scans: list[Scan], group: Group, i: int) -> bool:
-    """Whether a scan lies on the others, taken together, in another place about as well."""
+    """Whether a scan fits the others, taken together, about as well in another place."""
     scan, others = scans[i], _all_but(scans, group, i)
     pose, turn = group.poses[i], group.turns[i]
     now = judge_views(scan.middle, others.middle, pose, turn)
@@ -111,7 +111,7 @@ def _all_but(scans: list[Scan], group: Group, i: int) -> Scan:
 
 
 def _pushed(scan: Scan, pose: np.ndarray) -> list[np.ndarray]:
-    """Return poses that put a scan aside, and turned about its middle, both ways along and around three axes."""
+    """Return poses that shift a scan, and rotate it about its centre, both ways along and around three axes."""
     points = move(pose, scan.coarse.points)
     centre = points.mean(axis=0)
     axes = np.linalg.eigh(np.cov((points - centre).T))[1].T

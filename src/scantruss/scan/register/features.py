@@ -1,8 +1,8 @@
-"""Features of a scan: for every place, how the surface bends around it, told without regard to where the scan lies.
+"""Features of a scan: for every place, how the surface bends around it, independent of the pose of the scan.
 
-Fast point feature histograms (Rusu, Blodow and Beetz 2009) with two changes that smooth shells need. The bins are quantiles of the
-values of all scans together: on a shell with little working mesh most values are near zero and equal bins would hold them all. And near and
-far pairs are counted apart.
+Fast point feature histograms (Rusu, Blodow and Beetz 2009) with two changes that smooth shells need. The bins are quantiles of
+the values of all scans together: on a shell with little relief most values are near zero, and equal bins would hold them all. And
+near and far pairs are counted separately.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ...runtime.parallel import in_parts
 from .views import View
 
 BINS = 11
-FEATURE_REACH = 6.0  # reach of a feature, in spacings of the view
-FEATURE_STEPS = 1000.0  # steps in which a feature is told
+FEATURE_REACH = 6.0  # radius of a feature, in spacings of the view
+FEATURE_STEPS = 1000.0  # steps to which a feature is rounded
 SAMPLES = 200_000  # values of each scan from which the bins are found
 
 
@@ -43,7 +43,7 @@ def _edges(views: Sequence[View]) -> np.ndarray:
         reach = FEATURE_REACH * view.spacing
         count = kernels.sample_values(view.points, view.normals, view.boxes, reach, every, sample)
         values.append(sample[:count])
-    sizes = np.sort(np.abs(np.concatenate(values)), axis=0)  # mirrored, they are those of both sides
+    sizes = np.sort(np.abs(np.concatenate(values)), axis=0)  # mirrored, they serve both sides
     halves = [sizes[int(len(sizes) * (2 * part + 1) / BINS)] for part in range(BINS // 2)] if len(sizes) else []
     upper = np.array(halves).reshape(-1, 3)
     return np.ascontiguousarray(np.concatenate([-upper[::-1], upper]).T)

@@ -1,4 +1,4 @@
-"""Fine alignment: generalized ICP of one scan onto another, and what tells a right pose from a wrong one."""
+"""Fine alignment: generalized ICP of one scan onto another, and how a right pose is told from a wrong one."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ...kernels.scan import overlap as kernels
 from .poses import invert, small_motion
 from .views import View
 
-SHARP = 1000.0  # how much stiffer places hold across the surface than along it
+SHARP = 1000.0  # stiffness across the surface over that along it
 MOST_STEPS = 10  # most steps with one reach
 STILL = 5e-3  # a step that moves no place farther than this share of the spacing is the last
 AGREEING_DISTANCE = 0.5  # distance across the surface within which two scans agree, in spacings
 DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond they may be two sides of a body
-DAMPING = 1e-6  # share of the stiffness that is added, so that what slides stays where it is
+DAMPING = 1e-6  # share of the stiffness added, so that directions that slide freely stay at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Fit:
     """How two scans agree under a pose."""
 
     agreeing: int  #: places of both scans that lie on the other's surface
-    against: int  #: places that lie over the other's surface, but off it
+    against: int  #: places over the other's surface, but off it
     share: float  #: overlap: the agreeing share of the places of the scan that has the larger one
     residual: float  #: root of the mean squared distance of agreeing places across the surface [scan unit]
     near: float  #: distance across the surface within which places agree [scan unit]
@@ -37,9 +37,9 @@ class Fit:
 
     @property
     def score(self) -> float:
-        """What counts when poses are compared: agreeing places, less where others are against or it is at random.
+        """Score by which poses are compared: agreeing places, reduced where others contradict or agreement is random.
 
-        Surfaces that only cross are anywhere within `near`: the mean squared distance is then a third of its square.
+        Surfaces that merely cross lie anywhere within `near`: the mean squared distance is then a third of its square.
         """
         return self.agreeing * self.agreement**2 * max(1.0 - 3.0 * (self.residual / self.near) ** 2, 0.0)
 
@@ -58,9 +58,9 @@ def align(
     Parameters
     ----------
     pose : (4, 4) from the frame of the first scan to that of the second
-    turn : 1, or -1 where the normals of the two views face opposite sides
-    reaches : distances within which places pair, one after the other [scan unit]
-    few : places of a scan that are enough
+    turn : 1, or -1 if the normals of the two views face opposite sides
+    reaches : distances within which places are paired, one after the other [scan unit]
+    few : places of a scan that suffice
     rounds : most steps with one reach
     """
     every = max(min(len(first.points), len(second.points)) // few, 1)
@@ -110,15 +110,15 @@ def add_pairs(
 
 
 def solve(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
-    """Return the step (6 K,) that takes away what is left, turns [radian] before moves; what slides freely stays.
+    """Return the step (6 K,) that removes the residual, rotations [radian] before translations; what slides freely stays.
 
-    arm : length that makes turns and moves alike [scan unit]
+    arm : length that makes rotations comparable to translations [scan unit]
     """
     scale = np.tile([1.0 / arm] * 3 + [1.0] * 3, len(load) // 6)
     matrix = stiffness * scale[:, None] * scale
     matrix[np.diag_indices(len(load))] += DAMPING * np.trace(matrix) / len(load) + 1e-300
     rest = -load * scale
-    for k in range(len(load)):  # by hand: a library may round otherwise with other threads
+    for k in range(len(load)):  # by hand: a library may round differently with other numbers of threads
         factor = matrix[k + 1 :, k] / matrix[k, k]
         matrix[k + 1 :, k:] -= np.multiply.outer(factor, matrix[k, k:])
         rest[k + 1 :] -= factor * rest[k]

@@ -1,7 +1,7 @@
-"""The pose graph: scans put together pair by pair, the surest pairs first; a pair that contradicts what stands is not taken.
+"""The pose graph: scans joined pair by pair, the surest pairs first; a pair that contradicts earlier ones is rejected.
 
-Scans that stand together are a group. A pair between two groups puts every scan of the one over every scan of the other, and all of
-them must agree with it: that is what tells a wrong pair, which may look right by itself, from a right one.
+Joined scans are a group. A pair between two groups puts every scan of one over every scan of the other, and all of them must
+agree: that tells a wrong pair, which may look right by itself, from a right one.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from .views import View
 
 SURE = 0.88  # agreement of two groups at which they belong together
 AGREEING_SHARE = 0.08  # share of the smaller group's places that must agree
-CONTRADICTION = 0.6  # agreement of two scans, over each other, below which they contradict a pair of groups
-CONTRADICTED = 0.08  # share of the places of the smaller one from which on that counts
-CLEAR_LEAD = 0.03  # how much better the agreement of one way must be than that of another
+CONTRADICTION = 0.6  # agreement of two overlapping scans below which they contradict a pair of groups
+CONTRADICTED = 0.08  # least share of the places of the smaller one for that to count
+CLEAR_LEAD = 0.03  # difference in agreement by which one way is clearly better than another
 MOST_WAYS = 12  # pairs that are tried between two groups
-LINKED = 0.02  # overlap from which on two scans hold each other
-PLACES_PER_STEP = 2000  # places of a scan that are taken in a step of all
+LINKED = 0.02  # least overlap by which two scans are connected
+PLACES_PER_STEP = 2000  # places of a scan used in a step of all scans
 
 
 @dataclass
@@ -40,15 +40,15 @@ class Group:
 def assemble(
     scans: list[Scan], pairs: list[Pair], progress: Callable[[str, float], None]
 ) -> tuple[list[Group], set[int]]:
-    """Return the groups that the pairs make, the one with most scans first, and the scans that fit in more ways than one.
+    """Return the groups formed by the pairs, the largest first, and the scans that fit in more ways than one.
 
-    Two groups that fit in several ways, as parts of a symmetric body do, wait until others settle which way holds.
+    Two groups that fit in several ways, as parts of a symmetric shape do, wait until others decide.
     """
     group_of = {i: Group([i], {i: np.eye(4)}, {i: 1.0}) for i in range(len(scans))}
     waiting = sorted(pairs, key=lambda pair: (-pair.fit.score, pair.first, pair.second))
     tried: dict[
         tuple[int, ...], bool
-    ] = {}  # two groups between which nothing has come of it, and whether for too many ways
+    ] = {}  # pairs of groups that could not be joined, and whether because of too many ways
     at = 0
     while at < len(waiting):
         progress("assemble", 1.0 - len({id(group) for group in group_of.values()}) / len(scans))
@@ -60,7 +60,7 @@ def assemble(
         ways = _ways(scans, one, other, [pair for pair in waiting if _links(pair, one, other)])
         if len(ways) == 1:
             group_of |= dict.fromkeys(ways[0].members, ways[0])
-            at = 0  # what was too little, or too much, between two scans may be settled between groups
+            at = 0  # what two scans could not decide, groups may
         else:
             tried[key] = tried[(*other.members, -1, *one.members)] = len(ways) > 1
     groups = sorted(
@@ -83,7 +83,7 @@ def _links(pair: Pair, one: Group, other: Group) -> bool:
 
 
 def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> list[Group]:
-    """Return the different ways in which two groups make a whole, the best first; only those that are about as good."""
+    """Return the different ways to join two groups that are about equally good, the best first."""
     found: list[tuple[Fit, Group]] = []
     for pair in pairs[:MOST_WAYS]:
         if any(agree_on_pose(pair, whole, scans) for _, whole in found):
@@ -96,7 +96,7 @@ def _ways(scans: list[Scan], one: Group, other: Group, pairs: list[Pair]) -> lis
 
 
 def _rivals(fit: Fit, best: Fit) -> bool:
-    """Whether a way holds about as well as the best, however much of the scans overlaps in it."""
+    """Whether a way agrees about as well as the best, however large its overlap."""
     return (
         fit.agreement > best.agreement - CLEAR_LEAD
         and fit.residual < (1.0 + 8.0 * CLEAR_LEAD) * best.residual
@@ -105,26 +105,26 @@ def _rivals(fit: Fit, best: Fit) -> bool:
 
 
 def agree_on_pose(pair: Pair, whole: Group, scans: list[Scan]) -> bool:
-    """Whether two scans lie in the whole as a pair says."""
+    """Whether two scans of a group lie as a pair has them."""
     lies = invert(whole.poses[pair.second]) @ whole.poses[pair.first]
     return apart(lies, pair.pose, scans[pair.first].coarse) < 1.5 * scans[pair.first].coarse.spacing
 
 
 def _is_same(whole: Group, before: Group, one: Group, other: Group, scans: list[Scan]) -> bool:
-    """Whether two groups lie to each other alike in two wholes."""
+    """Whether two joined groups have the same relative pose."""
     i, j = one.members[0], other.members[0]
     lies, lay = (invert(group.poses[j]) @ group.poses[i] for group in (whole, before))
     return apart(lies, lay, scans[i].coarse) < 1.5 * scans[i].coarse.spacing
 
 
 def apart(one: np.ndarray, other: np.ndarray, view: View) -> float:
-    """Return how far apart two poses put the places of a view [scan unit], root of the mean square."""
+    """Return the root mean square distance between the places of a view under two poses [scan unit]."""
     points = view.points[:: max(len(view.points) // 100, 1)]
     return float(np.sqrt(((move(one, points) - move(other, points)) ** 2).sum(axis=1).mean()))
 
 
 def _join(scans: list[Scan], one: Group, other: Group, pair: Pair) -> tuple[Fit, Group] | None:
-    """Return both groups in the frame of the second as the pair says, and how they agree; None where that does not hold."""
+    """Return both groups joined by the pair in the frame of the second, and how they agree; None if they do not."""
     into = other.poses[pair.second] @ pair.pose @ invert(one.poses[pair.first])
     turn = other.turns[pair.second] * pair.turn * one.turns[pair.first]
     poses = {i: into @ one.poses[i] for i in one.members} | other.poses
@@ -138,7 +138,7 @@ def _join(scans: list[Scan], one: Group, other: Group, pair: Pair) -> tuple[Fit,
 
 
 def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, loose: bool) -> Fit | None:
-    """Return how the scans of two groups agree as they lie in the whole, None where they do not.
+    """Return how the scans of two joined groups agree, None if they do not.
 
     loose : before they are aligned with each other
     """
@@ -169,7 +169,7 @@ def fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit:
 
 
 def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit:
-    """Return how the fine views of two scans of a group agree, within the distance in which the middle ones do."""
+    """Return how the fine views of two scans of a group agree, within the distance used for the middle views."""
     one, other = scans[first], scans[second]
     pose = invert(group.poses[second]) @ group.poses[first]
     near, reach = nearness(one.middle, other.middle), DISAGREEING_DISTANCE * one.middle.spacing
@@ -177,7 +177,7 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
 
 
 def links_of(scans: list[Scan], group: Group, *, against: bool = False) -> dict[tuple[int, int], Fit]:
-    """Return how the scans of a group agree that overlap, two by two; with `against` also those that overlap and do not agree."""
+    """Return how overlapping scans of a group agree, pair by pair; with `against` also overlaps without agreement."""
     pairs = pairs_as_they_lie(scans, group)
     return {(p.first, p.second): p.fit for p in pairs if (p.fit.over if against else p.fit.share) >= LINKED}
 
@@ -203,12 +203,12 @@ def settle(
     few: int = PLACES_PER_STEP,
     progress: Callable[[float], None] = lambda share: None,
 ) -> None:
-    """Move all scans of a group at once so that all that overlap agree best (generalized ICP of all pairs); the first stays.
+    """Move all scans of a group at once so that overlapping ones agree best (generalized ICP of all pairs); the first stays.
 
-    A pair weighs by the square of its overlap: scans with a small one look from different sides, so that what both see they see
-    aslant, where scanners err most.
+    Pairs are weighted by the square of their overlap: scans with little overlap see what they share at a flat angle, where
+    scanners are least exact.
 
-    reaches : distances within which places pair, one after the other, in spacings of the views
+    reaches : distances within which places are paired, one after the other, in spacings of the views
     """
     links = links_of(scans, group)
     if not links:
@@ -241,7 +241,7 @@ def _step(
     size: float,
     few: int,
 ) -> np.ndarray:
-    """Return how each scan of a group turns and moves (M, 6) in one step of all; the first does not."""
+    """Return rotation and translation (M, 6) of each scan of a group in one step; those of the first are 0."""
     count = len(group.members)
     stiffness, load = np.zeros((6 * count, 6 * count)), np.zeros(6 * count)
     for (i, j), fit in links.items():

@@ -1,8 +1,9 @@
-"""Coarse alignment of two scans: poses that bring many alike places together.
+"""Coarse alignment of two scans: poses that bring many similar places together.
 
-Pairs of places with alike features are mostly wrong. Those that are right keep all that a rigid motion keeps: the distance of any two
-places and the angles of their normals with the line and with each other. Groups of pairs that agree in this give the candidates
-(second order: two pairs count by how many others agree with both; Chen, Sun, Yang and Tao 2022). Nothing is left to chance.
+Pairs of places with similar features are mostly wrong. Right pairs preserve what a rigid motion preserves: the distance of any
+two places, and the angles of their normals with the line between them and with each other. Groups of pairs that agree in this
+give the candidates
+(second order: two pairs count by how many others agree with both; Chen, Sun, Yang and Tao 2022). No random numbers are used.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from .features import flip
 from .poses import make_pose, move, turn_by
 from .views import View
 
-ALIKE_PLACES = 3  # places of the other scan that may be the same, for each place
-MOST_PAIRS = 800  # pairs of alike places that are looked at
-DISTANCE_TOLERANCE = 1.2  # difference of distances that two agreeing pairs may have, in spacings
+ALIKE_PLACES = 3  # most similar places of the other scan for each place
+MOST_PAIRS = 800  # most pairs of similar places
+DISTANCE_TOLERANCE = 1.2  # largest difference of distances of two agreeing pairs, in spacings
 ANGLE = 0.30  # the same for the cosines of the normals
 PAIR_DISTANCE = 3.0  # least distance between the places of two agreeing pairs, in spacings
 SEEDS = 60  # groups that become candidates
 GROUP = 24  # pairs in a group
-FEWEST_PAIRS = 5  # pairs below which a group says nothing
+FEWEST_PAIRS = 5  # fewest pairs of a group that count
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +31,8 @@ class Candidate:
     """A pose that may bring a scan onto another."""
 
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
-    turn: float  #: 1, or -1 where the normals of the two views face opposite sides
-    support: int  #: pairs of alike places that agree with it
+    turn: float  #: 1, or -1 if the normals of the two views face opposite sides
+    support: int  #: pairs of similar places that agree with it
 
 
 def find_candidates(
@@ -41,7 +42,7 @@ def find_candidates(
 
     Parameters
     ----------
-    turn : 1, or -1 where the normals of the two views are taken to face opposite sides
+    turn : 1, or -1 if the normals of the two views are taken to face opposite sides
     """
     features = first_features if turn > 0 else flip(first_features)
     pairs = _alike(features, second_features)
@@ -53,9 +54,9 @@ def find_candidates(
 
 
 def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return pairs of places (M, 2) with alike features: near ones for either side, the most alike first.
+    """Return pairs of places (M, 2) with similar features, from either side, the most similar first.
 
-    Features are whole numbers, so that the sums are exact in whatever order they are taken.
+    Features are whole numbers, so that sums are exact in any order.
     """
     apart = (first * first).sum(axis=1)[:, None] + (second * second).sum(axis=1) - 2.0 * (first @ second.T)
     count = min(ALIKE_PLACES, len(first), len(second))
@@ -67,7 +68,7 @@ def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     two = np.stack([back.ravel(), np.repeat(np.arange(len(second)), count)], axis=1)
     code, times = np.unique(np.concatenate([one, two]) @ np.array([len(second), 1]), return_counts=True)
     pairs = np.stack([code // len(second), code % len(second)], axis=1)
-    # how alike two places are counts against how alike others are to them: places on plain parts are alike to all
+    # similarity counts relative to that of other places: places on plain parts are similar to all
     usual = np.partition(apart, count - 1, axis=1)[:, count - 1]
     other = np.partition(apart, count - 1, axis=0)[count - 1]
     i, j = pairs.T
@@ -112,7 +113,7 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
 
 
 def _agree(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: float) -> np.ndarray:
-    """Return which pairs agree with which (M, M) float32: distances and angles are those of one rigid body."""
+    """Return which pairs agree (M, M) float32: their distances and angles fit one rigid motion."""
     one, two = _between(p, n), _between(q, m)
     length = one[0]
     agree = (np.abs(length - two[0]) < DISTANCE_TOLERANCE * spacing) & (length > PAIR_DISTANCE * spacing)
@@ -126,7 +127,7 @@ def _between(p: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
     """Return for all two points their distance, the cosine of their normals, and that of the first normal with the line."""
     p, n = (p - p.mean(axis=0)).astype(np.float32), n.astype(np.float32)
     square, rise, cosine = (np.zeros((len(p), len(p)), np.float32) for _ in range(3))
-    for axis in range(3):  # sums of three by hand: a matrix product may round differently with other threads
+    for axis in range(3):  # sums of three by hand: a matrix product may round differently with other numbers of threads
         d = p[:, axis] - p[:, axis, None]
         square += d * d
         rise += n[:, axis, None] * d
@@ -151,7 +152,7 @@ def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _different(found: list[Candidate], view: View, most: int) -> list[Candidate]:
-    """Return the first `most` candidates that put the scan to different places."""
+    """Return the first `most` candidates with different poses."""
     corners = _corners(view.points)
     kept: list[Candidate] = []
     places: list[np.ndarray] = []

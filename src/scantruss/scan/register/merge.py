@@ -1,7 +1,8 @@
 """From scans in one frame to one cloud: one layer where they overlap, as dense as one scan.
 
-Where several scans see a spot, its points are moved across the surface to the mean of their layers, each scan counting less towards
-its boundary, so that nothing jumps where one ends. Only the points of the scan that sees the spot farthest from its boundary are kept.
+Where several scans see a spot, its points move across the surface to the mean of the layers, with less weight towards the
+boundary of a scan, so that there is no step where one ends. Only the points of the scan that sees the spot farthest from its
+boundary are kept.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from .poses import invert, move
 from .scans import Scan
 from .views import View, boxes_of
 
-DEEPEST_INSIDE = 20.0  # depth inside a scan from which on it makes no difference, in spacings
-FULL = 6.0  # depth from which on a layer has its full weight
+DEEPEST_INSIDE = 20.0  # depth inside a scan beyond which it makes no difference, in spacings
+FULL = 6.0  # depth beyond which a layer has its full weight
 SEEN_REACH = 2.2  # reach in which a scan sees a point, in spacings
 SAME_LAYER = 2.0  # distance across the surface up to which two layers are the same, in spacings
 
@@ -46,7 +47,7 @@ def _depth(view: View) -> np.ndarray:
 
 
 def _points_of(scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndarray], ranked: list[int]) -> np.ndarray:
-    """Return the points that scan i gives to the whole, moved to the mean layer, in the frame of the group."""
+    """Return the points that scan i contributes, moved to the mean layer, in the frame of the group."""
     points, view = scans[i].cloud.points, scans[i].fine
     own, deep = np.empty(len(points), np.int64), np.empty(len(points))
     beside, full = SEEN_REACH * view.spacing, FULL * view.spacing

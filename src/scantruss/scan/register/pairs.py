@@ -15,32 +15,32 @@ from .matching import find_candidates
 from .scans import Scan
 from .views import View
 
-CANDIDATES = 40  # poses from the features that are judged as they are
+CANDIDATES = 40  # poses from the features that are judged without alignment
 ALIGNED = 10  # the best of them, which are aligned
 TRIED = 4  # the best of these, which are aligned closely
-WORSE = 0.2  # of them those whose score is not below this share of the best
-PLACES_FOR_ALIGNMENT = 800  # places of a scan that are enough to align it
+WORSE = 0.2  # least score of those, as a share of the best
+PLACES_FOR_ALIGNMENT = 800  # places of a scan that suffice to align it
 KEPT = 3  # poses of a pair that are handed on
-GOOD = 0.9  # agreement at which the other side of the normals need not be looked at
-BULGE = 0.6  # how surely normals must face the outside for the other side not to be looked at
+GOOD = 0.9  # agreement above which the other side of the normals is not tried
+BULGE = 0.6  # certainty that normals face outwards above which the other side is not tried
 LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
 AGREEMENT = 0.6  # agreement below which it is not
 NOISE = 3.0  # distance within which two scans agree, in the noise of both together
-LEAST = 0.15  # least such distance, in spacings of the view; scanners bend what they see a little
+LEAST = 0.15  # least such distance, in spacings of the view; scanners distort slightly
 LARGEST_OVERLAP = 0.5  # the largest
-WITHIN = 3.0  # distance within which two scans agree, in the residual of pairs that are taken for right
-STRICTEST = 0.35  # least share of that distance that may be left of it so
+WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
+STRICTEST = 0.35  # least share to which that reduces the distance
 DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two scans in a pose in which they agree."""
+    """Two scans and a pose in which they agree."""
 
     first: int
     second: int
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
-    turn: float  #: 1, or -1 where the normals of the two face opposite sides
+    turn: float  #: 1, or -1 if the normals of the two face opposite sides
     fit: Fit
 
 
@@ -61,7 +61,7 @@ def find_pairs(
     wanted: Iterable[tuple[int, int]],
     progress: Callable[[str, float], None],
 ) -> list[Pair]:
-    """Return the pairs that may hold, up to `KEPT` for two scans; `wanted` says which two to look at."""
+    """Return the plausible pairs, up to `KEPT` for two scans; `wanted` selects the two."""
     todo = list(wanted)
     found: list[Pair] = []
     pool = ThreadPoolExecutor(processors())
@@ -78,9 +78,9 @@ def find_pairs(
 def find_pair(
     scans: list[Scan], features: list[np.ndarray], first: int, second: int, *, thorough: bool = False
 ) -> list[Pair]:
-    """Return the poses in which two scans may belong together, the best first.
+    """Return the plausible poses of two scans, the best first.
 
-    thorough : try more poses, and both sides of the normals even where one is told or does well
+    thorough : try more poses, and both sides of the normals even if one is known or does well
     """
     one, other = scans[first], scans[second]
     found: list[Pair] = []
@@ -104,12 +104,12 @@ def _roughly(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> np.ndarra
 
 
 def settled_from(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> list[Pair]:
-    """Return the pair of two scans that alignment makes of a pose; nothing where they do not agree then."""
+    """Return the pair of two scans after alignment from a pose; nothing if they do not agree then."""
     return closer(one, other, 0, 1, _roughly(one, other, pose, turn), turn)
 
 
 def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: float) -> list[np.ndarray]:
-    """Return the better ones of some poses, best first, by how the coarse views agree within `near` spacings."""
+    """Return the better poses, best first, by the agreement of the coarse views within `near` spacings."""
     spacing = one.coarse.spacing
     scores = [
         judge(one.coarse, other.coarse, pose, turn, near * spacing, DISAGREEING_DISTANCE * spacing).score
@@ -120,9 +120,9 @@ def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: fl
 
 
 def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
-    """Return the scans, to be judged as strictly as the best of the pairs allow: those that lie right may agree far better.
+    """Return the scans with the strictness that the best pairs allow: right pairs may agree far better than the default.
 
-    Of the best pairs of each scan those with the smaller residuals are taken for right.
+    Among the best pairs of each scan, those with the smaller residuals are taken as right.
     """
     best: dict[int, tuple[float, float]] = {}
     for pair in pairs:
@@ -135,7 +135,7 @@ def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
 
 
 def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
-    """Return those of the pairs that still hold with the views as they are now."""
+    """Return the pairs that still agree with the present views."""
     found = []
     for pair in pairs:
         fit = judge_views(scans[pair.first].middle, scans[pair.second].middle, pair.pose, pair.turn)
@@ -145,7 +145,7 @@ def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
 
 
 def closer(one: Scan, other: Scan, first: int, second: int, pose: np.ndarray, turn: float) -> list[Pair]:
-    """Return the pair after close alignment from a pose nearby; nothing where they do not agree."""
+    """Return the pair after close alignment from a pose nearby; nothing if they do not agree."""
     reach = one.middle.spacing
     pose = align(one.middle, other.middle, pose, turn, (2.0 * reach, reach), 2 * PLACES_FOR_ALIGNMENT)
     fit = judge_views(one.middle, other.middle, pose, turn)
@@ -155,7 +155,7 @@ def closer(one: Scan, other: Scan, first: int, second: int, pose: np.ndarray, tu
 
 
 def _different(found: list[Pair], view: View) -> list[Pair]:
-    """Return those of the pairs that put the first scan to places of their own."""
+    """Return the pairs that put the first scan into different places."""
     kept: list[Pair] = []
     arm = float(np.linalg.norm(np.ptp(view.points, axis=0)))
     centre = np.append(view.points.mean(axis=0), 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import FormatError
 from .poses import make_pose, quaternion_of
 
-SKEW = 1e-3  # how far a rotation may be from one before the file is refused
+SKEW = 1e-3  # deviation from a rotation above which the file is refused
 
 
 def read_poses(path: str | Path) -> dict[str, np.ndarray]:
@@ -71,5 +71,5 @@ def pose_values(pose: np.ndarray) -> dict[str, Any]:
 
 
 def poses_for(names: Sequence[str], poses: dict[str, np.ndarray]) -> list[np.ndarray | None]:
-    """Return the pose of each scan, found by the name given or by its last part; None where there is none."""
+    """Return the pose of each scan, found by the name given or by its last part; None if there is none."""
     return [poses.get(name, poses.get(Path(name).name)) for name in names]

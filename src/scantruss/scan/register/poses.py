@@ -18,7 +18,7 @@ def invert(pose: np.ndarray) -> np.ndarray:
 
 
 def turn_by(pose: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Return directions (N, 3) turned by a pose (4, 4); sums by hand, since a matrix product may round otherwise with other threads."""
+    """Return directions (N, 3) rotated by a pose (4, 4); summed by hand, as a matrix product may round differently with other threads."""
     x, y, z = directions[:, 0, None], directions[:, 1, None], directions[:, 2, None]
     turned: np.ndarray = x * pose[:3, 0] + y * pose[:3, 1] + z * pose[:3, 2]
     return turned

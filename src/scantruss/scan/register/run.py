@@ -38,9 +38,9 @@ class PairFit:
 
     first: str
     second: str
-    overlap: float  #: share of the places of the one that has the larger share, which lie on the other
+    overlap: float  #: share of the places of one scan that lie on the other, the larger of the two
     agreement: float  #: share of the places over the other scan that lie on it
-    residual: float | None  #: root of the mean squared distance of what agrees [scan unit]; None where nothing does
+    residual: float | None  #: root of the mean squared distance of what agrees [scan unit]; None if nothing does
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +52,18 @@ class Splice:
     pairs: tuple[PairFit, ...]  #: of all scans that overlap
     left_out: tuple[str, ...]  #: scans that fit nowhere
     doubtful: tuple[str, ...]  #: those of them that fit in more ways than one
-    kept: dict[str, int]  #: points that each scan gives to the whole
+    kept: dict[str, int]  #: points that each scan contributes
     spacing: float  #: typical spacing of the scans [scan unit]
     unit: str
 
     @property
     def contradicting(self) -> tuple[PairFit, ...]:
-        """Pairs that lie over each other but do not agree; only poses used as given have any."""
+        """Pairs that overlap without agreeing; only with poses used as given."""
         return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTION)
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """Scans that agree with no other; only poses used as given leave any."""
+        """Scans that agree with no other; only with poses used as given."""
         agreeing = {
             name for pair in self.pairs if pair.agreement >= CONTRADICTION for name in (pair.first, pair.second)
         }
@@ -71,7 +71,7 @@ class Splice:
 
     @property
     def frame(self) -> str:
-        """Name of the scan whose frame is the common one; "" where it is that of poses used as given."""
+        """Name of the scan whose frame is the common one; "" if it is that of poses used as given."""
         return next((name for name, pose in self.poses.items() if np.array_equal(pose, np.eye(4))), "")
 
 
@@ -96,7 +96,7 @@ def splice_scans(
     use_poses : bool
         Take these poses as they are; all scans need one then.
     progress : callable
-        Told the stage and how much of it is done, 0 to 1.
+        Called with the stage and its share done, 0 to 1.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def _checked_names(clouds: Sequence[PointCloud], names: Sequence[str]) -> list[s
 
 
 def _digest(cloud: PointCloud) -> bytes:
-    """Return what a scan is sorted by, so that the order in which scans are given does not matter."""
+    """Return the key by which scans are sorted, so that the order in which they are given does not matter."""
     return hashlib.sha256(cloud.points.tobytes() + cloud.origin.tobytes()).digest()
 
 
@@ -152,7 +152,7 @@ def _into_local(pose: np.ndarray | None, cloud: PointCloud) -> np.ndarray | None
 def _put_together(
     scans: list[Scan], names: list[str], given: list[np.ndarray | None], progress: Progress
 ) -> tuple[list[Scan], Group, tuple[str, ...]]:
-    """Return all scans with the strictness they were judged with, those that fit together, and who fits in several ways."""
+    """Return all scans with their strictness, the group that fits together, and the scans that fit in several ways."""
     telling = [i for i, scan in enumerate(scans) if scan.tells]
     both = [(i, j) for j in telling for i in telling if i < j]
     started = [pair for i, j in both for pair in _start(scans, given, i, j)]
@@ -178,7 +178,7 @@ def _put_together(
 
 
 def _why_not(scans: list[Scan], names: list[str], groups: list[Group], doubtful: set[int]) -> str:
-    """Return the words on scans of which most do not fit together."""
+    """Return the message for scans that mostly do not fit together."""
 
     def listed(members: Iterable[int]) -> list[str]:
         return sorted((scans[i].name for i in members), key=names.index)
@@ -197,7 +197,7 @@ def _why_not(scans: list[Scan], names: list[str], groups: list[Group], doubtful:
 
 
 def _start(scans: list[Scan], given: list[np.ndarray | None], first: int, second: int) -> list[Pair]:
-    """Return the pair that the given poses make of two scans, after alignment; nothing where it does not hold."""
+    """Return the pair of two scans by their given poses, after alignment; nothing if they do not agree."""
     one, other = given[first], given[second]
     if one is None or other is None:
         return []
@@ -211,7 +211,7 @@ def _start(scans: list[Scan], given: list[np.ndarray | None], first: int, second
 
 
 def _sure(scans: list[Scan], group: Group, started: list[Pair]) -> set[int]:
-    """Return the scans of a group that lie as given poses say; where the features placed a scan its pose tells nothing."""
+    """Return the scans of a group that lie as their given poses say; a scan placed by its features does not count."""
     members = set(group.members)
     held = [p for p in started if {p.first, p.second} <= members and agree_on_pose(p, group, scans)]
     return {i for pair in held for i in (pair.first, pair.second)}
@@ -268,7 +268,7 @@ def _result(
 
 
 def _judged_as_they_lie(scans: list[Scan], group: Group) -> list[Scan]:
-    """Return the scans, to be judged as strictly as those of a group agree: alike for poses that were found and that were given."""
+    """Return the scans with a strictness from the agreement of a group: the same for poses found and given."""
     scans = with_strictness(scans, [])
     return with_strictness(scans, pairs_as_they_lie(scans, group))
 

@@ -1,4 +1,4 @@
-"""The scans of a splice, each looked at with three spacings: for features, for judging, and for the last alignment."""
+"""The scans of a splice, each with views at three spacings: for features, for judging, and for the last alignment."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ COARSEST = 1.2  # least coarse spacing, in distances between points
 EVEN_GAP = (
     1.4  # distance of the sixth neighbour in points as even as those of a range grid, in distances between points
 )
-FEWEST_PLACES = 60  # coarse places below which a scan is too small to be told by its features
+FEWEST_PLACES = 60  # coarse places below which a scan is too small for features
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Scan:
 
     @property
     def tells(self) -> bool:
-        """Whether it is large enough beside the others to be told by its shape."""
+        """Whether it is large enough, compared with the others, to be matched by its shape."""
         return len(self.coarse.points) >= FEWEST_PLACES
 
 
@@ -60,7 +60,7 @@ def prepare_scans(
     for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
         progress("prepare", place / len(clouds))
         wide = make_view(cloud.points, coarse)
-        if len(wide.points) < FEWEST_PLACES:  # in another unit, or too sparse beside the others
+        if len(wide.points) < FEWEST_PLACES:  # in another unit, or too sparse compared with the others
             scans.append(Scan(name, cloud, wide, wide, wide))
             continue
         middle_view = make_view(cloud.points, middle, wide)

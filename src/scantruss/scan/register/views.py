@@ -1,4 +1,4 @@
-"""Views: a scan at one spacing, with normals that face one side, as every step of splicing looks at it."""
+"""Views: a scan at one spacing, with normals that face one side; every step of splicing works on them."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ...surface.linked_samples import samples_of_points
 from ..normals import face_one_side, mean_normals
 
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
-FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out: it lies on no surface
-BOUNDARY_OFFSET = 0.32  # how far the mean of its neighbours lies aside of a place at the boundary, in their reach
-PIECE = 0.02  # share of the places that a loose piece must have to vote for the side it faces
+FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out, as it lies on no surface
+BOUNDARY_OFFSET = 0.32  # offset of the mean of its neighbours from a place at the boundary, as a share of their reach
+PIECE = 0.02  # least share of the places of a piece whose normals count for the side that it faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +30,8 @@ class View:
     boxes: SearchBoxes  #: of the places
     spacing: float  #: distance the places keep [scan unit]
     noise: float  #: typical distance of a place from the plane of its neighbours [scan unit]
-    bulge: float  #: how surely the normals face the outside of a bulge, 0 to 1
-    strict: float = 1.0  #: by what the distance is lessened within which other scans agree with this one
+    bulge: float  #: certainty that the normals face the outside of a bulge, 0 to 1
+    strict: float = 1.0  #: factor on the distance within which other scans agree with this one
 
 
 def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) -> View:
@@ -41,7 +41,7 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     ----------
     points : (N, 3) array [scan unit]
     spacing : distance between places [scan unit]
-    coarse : another view of the scan, whose normals tell the side to face; else the outside of a bulge
+    coarse : another view of the scan whose normals give the side to face; else the outside of a bulge
 
     Returns
     -------
@@ -76,7 +76,7 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
 
 
 def thin(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Return places (S, 3) that nearly keep a spacing: means of the points around the first of each neighbourhood."""
+    """Return places (S, 3) about one spacing apart: means of the points around the first of each neighbourhood."""
     owner, chosen, samples, boxes = samples_of_points(points, spacing)
     kernels_of_overlap.first_places(points, boxes, samples, spacing, owner)
     count = len(chosen)
@@ -106,14 +106,14 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
             points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
         ),
     )
-    far = 3.3 * spacing  # the kernel looks farther where there are few; here those are outliers
+    far = 3.3 * spacing  # the kernel searches farther if there are few; here those are outliers
     off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
     neighbors[off] = -1
     return neighbors
 
 
 def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
-    """Turn all normals to one side: along the links of each piece, the pieces as one sensor sees them, outwards as a whole."""
+    """Turn all normals to one side: along the links of each piece, pieces as seen from one sensor, the whole outwards."""
     piece = face_one_side(places, normals, neighbors)
     counts = np.bincount(piece)
     sums = np.stack([np.bincount(piece, normals[:, c]) for c in range(3)], axis=1)
@@ -129,6 +129,6 @@ def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
 
 
 def _bulge(places: np.ndarray, normals: np.ndarray) -> float:
-    """Return by how much more the normals point away from the middle of the places than towards it, -1 to 1."""
+    """Return how much more the normals point away from the centre of the places than towards it, -1 to 1."""
     rise = (normals * (places - places.mean(axis=0))).sum(axis=1) if len(places) else np.zeros(1)
     return float(rise.sum() / max(np.abs(rise).sum(), 1e-300))

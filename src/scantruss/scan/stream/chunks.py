@@ -1,4 +1,4 @@
-"""The points of a tile, some at a time, so that memory does not grow with the scan."""
+"""The points of a tile in chunks, so that memory does not grow with the scan."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from .source import Source, Tile
 
 POINTS_PER_CHUNK = 1_000_000  # points
-POINTS_DESCRIBED = 10_000  # points that are described where none is taken
+POINTS_DESCRIBED = 10_000  # points that are described if none is taken
 TEXT_BYTES_PER_BLOCK = 1 << 24  # bytes of text
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How points are taken from all files of a scan."""
+    """How points are read from all files of a scan."""
 
-    unit: str = ""  #: what the user says
+    unit: str = ""  #: given by the user
     selection: Selection = field(default_factory=Selection)
-    common: str = ""  #: unit of the first file that says one; others are brought to it
+    common: str = ""  #: unit of the first file that states one; others are converted to it
 
 
 class Chunk(NamedTuple):
@@ -44,8 +44,8 @@ class Chunk(NamedTuple):
     points: np.ndarray  #: (K, 3) float64 [unit of the scan], in the scan's own frame
     read: int  #: points that were read
     left_out: dict[str, int]  #: of these, what the file calls none and what each part of the selection left out
-    notes: tuple[str, ...] = ()  #: what the reader of a whole file says
-    held: str = ""  #: what could have been selected, where nothing was
+    notes: tuple[str, ...] = ()  #: of the reader of a whole file
+    held: str = ""  #: what could have been selected, if nothing was
     promised: int = 0  #: points that count lines among them promise: texts of several scans
 
 
@@ -63,7 +63,7 @@ def read_chunks(
     size : int
         Most points of a chunk, where the file can be read in chunks.
     alone : bool
-        Nobody else reads, so that a reader may use all processors.
+        No other tile is read at the same time, so that a reader may use all processors.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def _taken(path: Path, content: Content, reading: Reading) -> Chunk:
 
 
 def read_ahead(chunks: Iterator[Chunk]) -> Iterator[Chunk]:
-    """Yield the same chunks, each read while the one before is worked on."""
+    """Yield the same chunks, each read while the previous one is processed."""
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(next, chunks, None)
         while (chunk := waiting.result()) is not None:
@@ -146,7 +146,7 @@ def _places_of(source: Source, reading: Reading) -> list[Place]:
 
 
 def count_unread(source: Source, reading: Reading) -> int:
-    """Return how many points of a file are never read, as they lie in parts of it that are far from what is cropped."""
+    """Return how many points of a file are never read, because their part of it is outside the crop."""
     if not (places := _places_of(source, reading)):
         return 0
     import laspy
@@ -182,7 +182,7 @@ def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
 
 
 def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
-    """Read the lines that begin in a range of bytes; `counts` takes what count lines promise."""
+    """Read the lines that begin in a range of bytes; `counts` receives the numbers of count lines."""
     source, layout = tile.source, tile.source.layout
     assert layout is not None
     columns = (*source.columns, *(column for _, column in layout.attributes))
@@ -190,7 +190,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
         file.seek(tile.begin)
         if tile.begin > source.begin:
             file.seek(tile.begin - 1)
-            file.readline()  # of a line that began before: another tile has it
+            file.readline()  # the rest of a line that belongs to the previous tile
         while (at := file.tell()) < tile.end:
             block = file.read(min(TEXT_BYTES_PER_BLOCK, tile.end - at))
             if not block.endswith(b"\n"):

@@ -27,12 +27,12 @@ from .tiles import find_source, tiles_of
 if TYPE_CHECKING:
     from ...settings import Settings
 
-FINENESS = 20.0  # boxes along a member, where a scan is thinned to fit into memory
-BYTES = 100.0  # of memory that a point takes on its way to a grid; 55 to 90 were measured
-PACKED_POINT = 8  # bytes; a point of a packed text has about as many
+FINENESS = 20.0  # boxes along a member if a scan is thinned to fit into memory
+BYTES = 100.0  # memory per point on the way to a grid; 55 to 90 were measured [bytes]
+PACKED_POINT = 8  # bytes of a point in a packed text, about
 NEVER_TOO_MANY_POINTS = 100_000  # points that are never too many
-LOOK = 1000.0  # boxes along the diagonal of a scan that is only looked at
-MEMORY_SHARE = 0.5  # of the memory at hand that a scan may take
+LOOK = 1000.0  # boxes along the diagonal of a scan for a first look
+MEMORY_SHARE = 0.5  # share of the available memory that a scan may take
 
 
 def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None) -> float:
@@ -45,7 +45,7 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
     names : str, Path or several of them
         Files or patterns.
     settings : Settings
-        Tell the desired length, and a spacing that somebody has chosen.
+        The desired length, and the spacing if one was chosen.
     memory : float, optional
         Bytes that the scan may take; half of what is available by default.
     """
@@ -64,19 +64,19 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
 def spacing_to_look(names: Names, settings: Settings, progress: Progress | None = None) -> float:
     """Return a spacing for a first look at a scan for which no length is chosen yet, by its extent [scan unit].
 
-    Points far from most others have no say.
+    Points far from most others do not count.
     """
     sources, reading, _ = open_scan(names, settings.unit, settings.selection)
     some = _sample(sources, reading, Share(progress, "look", sources))
     if not len(some):
-        return 1.0  # who thins it says why
+        return 1.0  # thinning will report the reason
     return float(np.linalg.norm(np.ptp(usual_extent(some), axis=0))) / LOOK or 1.0
 
 
 def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.ndarray:
-    """Return points from everywhere in a scan, (K, 3): all of a small one, up to twice `BULK` of a large one.
+    """Return points from all parts of a scan, (K, 3): all of a small one, up to twice `BULK` of a large one.
 
-    By chance, as every n-th may be of one column of the scanner; the same each time.
+    They are random, with a fixed seed, because every n-th point may be of one column of the scanner.
     """
     some, share, rng = np.empty((0, 3)), 1.0, np.random.default_rng(0)
     for tile in tiles_of(sources):
@@ -100,7 +100,7 @@ def _guess(path: Path) -> int:
 def read_thinned(names: Names, settings: Settings, progress: Progress | None = None) -> tuple[PointCloud, int]:
     """Return a scan thinned to `settings.thin_spacing` with its boundary kept, and how many points were read.
 
-    The mean of a box has less noise than its points, but lies up to half a box inside at the boundary; so the outermost points there stay.
+    The mean of a box has less noise than its points but lies up to half a box inside the boundary, so the outermost points there are kept.
     """
     thinned = thin_scan(
         names,
@@ -118,7 +118,7 @@ def read_thinned(names: Names, settings: Settings, progress: Progress | None = N
 def read_to_fit(
     names: Names, settings: Settings, *, memory: float | None = None, progress: Progress | None = None
 ) -> tuple[PointCloud, Settings]:
-    """Return a scan as it is, or thinned where it is larger than memory, and the settings with which it comes out so again."""
+    """Return a scan, thinned if it is larger than memory, and settings that reproduce it."""
     spacing = spacing_to_fit(names, settings, memory)
     if not spacing:
         return read_points(names, unit=settings.unit, selection=settings.selection), settings

@@ -1,4 +1,4 @@
-"""The files of a scan by their headers: where their points are, their units, and how they are taken."""
+"""The files of a scan by their headers: where their points are, their units, and how they are read."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ class OpenScan(NamedTuple):
 
     sources: list[Source]
     reading: Reading
-    notes: tuple[str, ...]  #: what should be said of their units
+    notes: tuple[str, ...]  #: notes on their units
 
 
 def open_scan(names: Names, unit: str = "", selection: Selection | None = None) -> OpenScan:
-    """Return what the headers of the files of a scan say, how their points are taken, and what should be said of both.
+    """Return the headers of the files of a scan, how their points are read, and notes on both.
 
     Parameters
     ----------
     names : str, Path or several of them
         Files or patterns.
     unit : str
-        What the user says of the unit.
+        The unit given by the user.
     selection : Selection, optional
         Which points are taken; all by default.
     """

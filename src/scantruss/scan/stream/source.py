@@ -19,15 +19,15 @@ class Source:
     kind: str  #: las, rows (of fixed size), text, or whole
     points: int  #: points that the header promises; a guess for text, or for a file that is read whole
     begin: int = 0  #: byte at which points begin: rows, text
-    end: int = 0  #: byte behind the points: text
+    end: int = 0  #: byte after the points: text
     rows: np.dtype[np.void] | None = None  #: layout of a row
     columns: tuple[int, ...] = ()  #: of the coordinates, or of the number of a point and them: text
     layout: Layout | None = None  #: of a text
-    metres: float | None = None  #: metres a unit of x and y; None where the file does not say it
+    metres: float | None = None  #: metres per unit of x and y; None if the file does not state it
     z_metres: float | None = None  #: ... of z
     system: str = ""  #: reference system
     degrees: bool = False  #: x and y are longitude and latitude
-    in_one: bool = False  #: it is read from its beginning to its end, as nobody finds a point in its middle
+    in_one: bool = False  #: it is read from beginning to end, because it cannot be entered in the middle
     notes: tuple[str, ...] = ()  #: what a user should know
 
     @property
@@ -36,7 +36,7 @@ class Source:
         return self.kind == "whole"
 
     def said_of(self, content: Content) -> Content:
-        """Return some of its points with what the header says of their units."""
+        """Return some of its points with the units of the header."""
         said = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
         return replace(said, notes=(*content.notes, *self.notes)) if self.notes else said
 

@@ -24,7 +24,7 @@ from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_
 from .tiles import TILE, tiles_of
 
 KEEP = ("mean", "nearest")
-SMALLEST = 500_000  # points of a tile that is worth a worker
+SMALLEST = 500_000  # fewest points of a tile that are worth a worker
 TILES = 4  # for each worker at least, so that all end at about the same time
 
 
@@ -37,7 +37,7 @@ class Thinned:
     read: int  #: points that were taken
     dropped: int  #: of these, points left out because a coordinate was NaN or infinite
     boundary: int  #: points that stand for the boundary, the last of `points`
-    unit: str = ""  #: of the coordinates; "" where neither a file nor the user says it
+    unit: str = ""  #: of the coordinates; "" if neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
 
 
@@ -54,7 +54,7 @@ def thin_scan(
 ) -> Thinned:
     """Return one point for each box of a scan in one or more files, with memory for the result only.
 
-    The same to the byte for any order of the files (of one unit), and for any number of workers.
+    The result is the same to the byte for any order of the files (of one unit) and any number of workers.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def thin_scan(
     unit, selection
         As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
     workers : Workers, optional
-        Who does it; this process by default.
+        The workers to use; this process by default.
     progress : callable, optional
         ``progress(stage, share)``.
 
@@ -78,7 +78,7 @@ def thin_scan(
     FormatError
         A file is missing, damaged or no scan.
     InputError
-        The spacing does not do; the units do not; nothing is selected.
+        The spacing or the units are not accepted, or nothing is selected.
     """
     scan = open_scan(names, unit, selection)
     return thin_open_scan(scan, spacing, keep=keep, boundary=boundary, workers=workers, progress=progress)
@@ -121,14 +121,14 @@ class Share:
         self._done = 0
 
     def __call__(self, points: int) -> None:
-        """So many more points are done."""
+        """Report more points as done."""
         self._done += points
         if self._progress:
             self._progress(self._stage, min(self._done / self._total, 1.0))
 
 
 class ReadSummary:
-    """What the chunks of a scan, or of a part of it, tell beside their points."""
+    """What the chunks of a scan, or of a part of it, report besides their points."""
 
     def __init__(self) -> None:
         self.read = 0  #: points that were read
@@ -140,7 +140,7 @@ class ReadSummary:
         self.extent = extent_of(np.empty((0, 3)))  #: (2, 3) about where the points are
 
     def add(self, other: ReadSummary | Chunk) -> None:
-        """Add what another chunk or part tells."""
+        """Add the report of another chunk or part."""
         self.read += other.read
         self.left_out = add_counts([self.left_out, other.left_out])
         self.notes = (*self.notes, *other.notes)
@@ -178,7 +178,7 @@ def _all_rows(
 
 
 def _check_counts(source: Source, summary: ReadSummary) -> None:
-    """Refuse a text with fewer points than its count lines promise; say of one with more that they are read."""
+    """Refuse a text with fewer points than its count lines promise; note one with more."""
     if source.kind == "text" and source.layout and source.layout.promised is not None:
         promised = source.layout.promised + summary.promised
         if summary.read < promised:
@@ -203,7 +203,7 @@ class _Tiles:
 
 
 def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
-    """Return tiles for several workers, who may not be where we are."""
+    """Return tiles for several workers, which may run on other machines."""
     there = [replace(source, path=source.path.absolute()) for source in sources]
     total = sum(source.points for source in sources)
     return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
@@ -249,10 +249,10 @@ def _nearest_of(tile: Tile, shared: tuple[Reading, np.ndarray, float]) -> Neares
 
 
 def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
-    """Yield the chunks of a tile; say which machine does not have it."""
+    """Yield the chunks of a tile; an error names the machine on which its file is missing."""
     path = tile.source.path
     if not path.exists():
-        raise FormatError(f"{path} is not there on {socket.gethostname()}; all workers need the files under one name")
+        raise FormatError(f"{path} is missing on {socket.gethostname()}; all workers need the files under one name")
     return read_chunks(tile, reading, alone=False)
 
 

@@ -1,4 +1,4 @@
-"""Thinning to one point a search box, with memory for the boxes only: in one go, in parts, or by several workers.
+"""Thinning to one point per search box, with memory for the boxes only: at once, in parts, or by several workers.
 
 Sums are whole numbers and ties are settled by the coordinates, so the result is the same to the byte for any order and size of the
 parts.
@@ -28,13 +28,13 @@ from ...kernels.scan.thinning import (
 from ...runtime.parallel import in_parts
 from ..checks import CAUSE
 
-FIRST_ROWS = 4096  # room of a new table
-GROWTH = 1.5  # of a table that is full
-BOXES_PER_THREAD = 20_000  # boxes that are worth a thread
+FIRST_ROWS = 4096  # rows of a new table
+GROWTH = 1.5  # factor by which a full table grows
+BOXES_PER_THREAD = 20_000  # fewest boxes that are worth a thread
 
 
 class Rows(NamedTuple):
-    """The boxes of a part of a scan, in the order of their numbers: what workers hand on."""
+    """The boxes of a part of a scan, in the order of their numbers; the result of a worker."""
 
     rows: np.ndarray  #: (C, 7) int64, see `BoxTable`
     extremes: np.ndarray  #: (C, 18) float64, or (0, 18)
@@ -43,7 +43,7 @@ class Rows(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """The nearest points that a part of a scan has for some boxes."""
+    """The points of a part of a scan nearest to the means of some boxes."""
 
     row: np.ndarray  #: (K,) int64 numbers of the boxes
     best: np.ndarray  #: (K, 4) float64 squared distance, x, y, z
@@ -92,7 +92,7 @@ class Thinning:
         self.points += len(points)
 
     def add_rows(self, part: Rows) -> None:
-        """Add what another worker has found."""
+        """Add the boxes of another worker."""
         begin = 0
         while (begin := add_rows(self._table, part.rows, part.extremes, begin)) < len(part.rows):
             self._grow()
@@ -100,7 +100,7 @@ class Thinning:
         self.points += part.points
 
     def _grow(self) -> None:
-        """Make room for more boxes; what is old is let go of as soon as can be."""
+        """Make room for more boxes; old arrays are released as early as possible."""
         slots, rows, extremes, counters = self._table
         del self._table
         count, capacity = int(counters[ROWS]), int(GROWTH * len(rows))
@@ -115,11 +115,11 @@ class Thinning:
         self._table = BoxTable(slots, rows, extremes, counters)
 
     def take_rows(self) -> Rows:
-        """Return all boxes by their numbers i, j, k, the same for any order in which points came; none are left here."""
+        """Return all boxes sorted by their numbers i, j, k, the same for any order of the points; none are left here."""
         table, count = self._table, int(self._table.counters[ROWS])
         rows, extremes = table.rows[:count], table.extremes[:count]
         order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
-        for column in (*rows.T, *extremes.T):  # in their place: they may fill the memory
+        for column in (*rows.T, *extremes.T):  # in place: they may fill the memory
             column[:] = column[order] if len(column) else 0
         found = Rows(rows, extremes, self.points, self.dropped)
         self._table, self.points = _new_table(FIRST_ROWS, self.boundary), 0
@@ -151,7 +151,7 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", bound
 
 
 def check_spacing(spacing: float) -> float:
-    """Return a spacing that can be thinned to."""
+    """Return the spacing, or refuse it."""
     if not (isinstance(spacing, int | float) and math.isfinite(spacing) and spacing > 0):
         raise InputError(f"spacing must be a positive number in the scan's unit, got {spacing}")
     return float(spacing)
@@ -165,7 +165,7 @@ def means_of(rows: np.ndarray, spacing: float) -> np.ndarray:
 
 
 def points_at_boundary(rows: Rows, spacing: float) -> np.ndarray:
-    """Return the points that stand for the boundary of the scan, each once, (R, 3) [scan unit].
+    """Return the points that represent the boundary of the scan, each once, (R, 3) [scan unit].
 
     The mean of a box at the boundary lies up to half a box inside; its outermost points do not.
     """

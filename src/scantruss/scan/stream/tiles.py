@@ -1,4 +1,4 @@
-"""Tiles: files, or ranges of files, that can be read by themselves and by anybody.
+"""Tiles: files, or ranges of files, that any worker can read by itself.
 
 A file that cannot be entered in its middle (faces before points, lists, compressed text, E57, PCD) is one tile that is read whole;
 a COPC file is one tile too, but read a million points at a time, and only near what is cropped.
@@ -32,7 +32,7 @@ from ..units import metres_of
 from .source import Source, Tile
 
 TILE = 8_000_000  # points of a tile
-TEXT_POINT = 24  # bytes; a line of a text file has about as many, or more
+TEXT_POINT = 24  # bytes of a line of a text file, about, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
 BYTES_LOOKED_AT = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
@@ -70,7 +70,7 @@ def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
 
 
 def _metres(path: Path) -> tuple[float | None, float | None]:
-    """Return the metres a unit of x and y, and of z, that a file that is read whole says."""
+    """Return the metres per unit of x and y, and of z, of a file that is read whole."""
     suffix, head = path.suffix.lower(), read_head(path)
     if suffix == ".ply" and PLY.match(head):
         return metres_of(read_header(path).unit), None
@@ -87,7 +87,7 @@ def _metres(path: Path) -> tuple[float | None, float | None]:
 
 
 def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
-    """Yield the tiles of some files, of about so many points each."""
+    """Yield the tiles of some files, of about `points` points each."""
     for source in sources:
         if source.whole or source.in_one:
             yield Tile(source, 0, source.points)
@@ -148,9 +148,7 @@ def _ply(path: Path) -> Source | None:
     lower = [name.lower() for name in own]
     if not {"x", "y", "z"} <= set(lower):
         return None
-    first = {
-        lower.index(axis): axis for axis in "xyz"
-    }  # X and x may both be there; the first is read, as by `read_ply`
+    first = {lower.index(axis): axis for axis in "xyz"}  # X and x may both exist; the first is read, as by `read_ply`
     rows.names = tuple(first.get(i, f"other {i}" if name in "xyz" else name) for i, name in enumerate(rows.names or ()))
     return replace(_rows(path, vertex.count, header.start, rows), metres=metres_of(header.unit))
 
@@ -161,7 +159,7 @@ def _npy(path: Path) -> Source | None:
         with path.open("rb") as file:
             shape, by_columns, kind = read_array_header(file)
             start = file.tell()
-    except Exception:  # a damaged header ends in many ways; who reads it whole says in which
+    except Exception:  # a damaged header raises many kinds of errors; reading the file reports which
         return None
     if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
         needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(NAMES)).values())]
@@ -182,7 +180,7 @@ def _rows(path: Path, count: int, start: int, rows: np.dtype[np.void]) -> Source
 
 
 def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
-    """Return a text file in which a line is a point wherever one enters it."""
+    """Return a text file that can be entered at any line."""
     layout = find_layout(path, wanted)
     if layout.encoding == "utf-16" or layout.separator == ANY or b"\r" in head.replace(b"\r\n", b""):
         return None
