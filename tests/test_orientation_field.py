@@ -49,9 +49,9 @@ def test_the_nearest_node_is_that_of_a_search_through_all(
 ) -> None:
     start, wanted = (*node, 0.0), (*place, 0.0)
     found = kernels.nearest_node(start, direction(angle), UP, wanted, 2.0)
-    every = lattice(node, angle, 2.0, 12)
-    least = np.linalg.norm(every - place, axis=1).min()
-    assert np.linalg.norm(np.subtract(found, place)) == pytest.approx(least, abs=1e-9)
+    every = lattice(start, angle, 2.0, 12)
+    least = np.linalg.norm(every - wanted, axis=1).min()
+    assert np.linalg.norm(np.subtract(found, wanted)) == pytest.approx(least, abs=1e-9)
     assert np.linalg.norm(every - found, axis=1).min() < 1e-9
 
 
