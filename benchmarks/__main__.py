@@ -52,15 +52,16 @@ def _scans(options: argparse.Namespace, command: str) -> Section | None:
 
 
 def _peers(options: argparse.Namespace, command: str) -> Section:
-    from .peers import clouds, section, ways
+    from .peers import clouds, runs, section, ways
 
     if options.quick:
-        chosen, some, limit = section.QUICK_CLOUDS, section.QUICK_WAYS, section.QUICK_LIMIT
+        chosen: tuple[clouds.Cloud, ...] = section.QUICK_CLOUDS
+        some, limit = section.QUICK_WAYS, section.QUICK_LIMIT
     else:
         chosen = tuple(clouds.clouds(options.shapes, options.points, options.nodes, options.noises))
         some = tuple(way for way in ways.WAYS if not options.ways or any(part in way.name for part in options.ways))
         limit = section.LIMIT
-    repeats = section.QUICK_REPEATS if options.quick else section.REPEATS
+    repeats = section.QUICK_REPEATS if options.quick else runs.REPEATS
     rows = section.measured(chosen, some, limit=options.limit or limit, repeats=repeats, fresh=options.fresh)
     return section.section(rows, command, *([options.page.parent] if options.page else []))
 
@@ -142,8 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.part == "compare":
         if len(options.files) != 2:
             whole.error("compare needs two files: OLD NEW")
+        old, new = options.files
         try:
-            return own.compare(*options.files, options.tolerance)
+            return own.compare(old, new, options.tolerance)
         except (OSError, ValueError) as error:
             whole.error(str(error))
     if (options.files and options.part != "own") or len(options.files) > 1:

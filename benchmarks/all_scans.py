@@ -77,7 +77,7 @@ def rows_of(scan: Scan, ways: Iterable[str] = WAYS) -> list[str]:
     before: list[str] = []
     rows = []
     for way in ways:
-        own = {"method": "paper"} if way == "paper" else {"effort": way}
+        own: dict[str, Any] = {"method": "paper"} if way == "paper" else {"effort": way}
         started = perf_counter()
         try:
             grid = st.grid_from_points(cloud.points + cloud.origin, st.Settings(length=scan.length, **own))

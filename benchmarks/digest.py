@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -102,10 +103,10 @@ def real_cases() -> Iterator[Case]:
     for name, length in REAL.items():
         path = SHARED / "real" / name
         if path.exists():
-            yield f"real {name}", lambda path=path: path, {"length": length, "effort": "quick"}
+            yield f"real {name}", partial(str, path), {"length": length, "effort": "quick"}
     for path in sorted((SHARED / "twins").glob("nasty_*.laz")):
         length = 0.94 if "utm" in path.name else 4.7
-        yield f"twin {path.name}", lambda path=path: path, {"length": length}
+        yield f"twin {path.name}", partial(str, path), {"length": length}
 
 
 def digest_of(points: Any, settings: dict[str, Any]) -> str:

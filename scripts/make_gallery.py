@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def terrain(count: int = 120_000) -> np.ndarray:
     return np.column_stack([x, y, z]) + rng.normal(0, 0.05, (count, 3))
 
 
-SCANS = {
+SCANS: dict[str, Callable[[], np.ndarray]] = {
     "roof.npy": roof,
     "terrain.npy": terrain,
     "cloth.npy": lambda: make("cloth").points,

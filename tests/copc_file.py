@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+from collections.abc import Sequence
 
 import laspy
 import lazrs
@@ -15,7 +16,12 @@ Boxes = list[tuple[tuple[int, ...], np.ndarray]]
 
 
 def copc(
-    points: np.ndarray, *, levels: int = 3, pages: bool = False, records: tuple = (), **fields: np.ndarray
+    points: np.ndarray,
+    *,
+    levels: int = 3,
+    pages: bool = False,
+    records: Sequence[tuple[bytes, int, bytes]] = (),
+    **fields: np.ndarray,
 ) -> tuple[bytes, np.ndarray]:
     """Return a file of (N, 3) points with attributes, and the order in which it holds them, (N,).
 

@@ -19,7 +19,7 @@ SMOOTH = ("scallop", "limpet", "cloth", "stadium", "saddle", "pantheon", "torus"
 def _smooth(seed: int, count: int, **more: float) -> Shape:
     """One of the smooth shapes, another for each seed, in any pose."""
     name = SMOOTH[seed % len(SMOOTH)]
-    return make(name, count, seed=seed, pose=name not in ("terrain",), **more)  # type: ignore[arg-type]
+    return make(name, count, seed=seed, pose=name not in ("terrain",), **more)
 
 
 def _made(truth: Truth, seed: int, pose: bool = True) -> Shape:

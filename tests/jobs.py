@@ -2,20 +2,22 @@
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Never
 
 from scantruss.errors import FormatError
 
 
-def add(job, shared):
+def add(job: int, shared: int | None) -> int:
     return job + (shared or 0)
 
 
-def refuse(job, shared):
+def refuse(job: int, shared: Any) -> Never:
     raise FormatError(f"job {job} is refused")
 
 
-def leave_once(job, folder):
+def leave_once(job: int, folder: str) -> int:
     """End the first worker of a cluster within this process that is asked for job 2."""
     from distributed import get_worker
 
@@ -28,12 +30,12 @@ def leave_once(job, folder):
     return job
 
 
-def die(job, shared):
+def die(job: int, shared: Any) -> None:
     os._exit(1)
 
 
 class Deadly:
     """What ends the process that is told of it."""
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Callable[[int], Never], tuple[int]]:
         return os._exit, (1,)

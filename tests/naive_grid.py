@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import combinations
 
 import numpy as np
 
+from scantruss import Grid
 
-def shape(a, b, c):
+
+def shape(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
     """G of one triangle."""
     squares = ((b - a) ** 2).sum() + ((c - b) ** 2).sum() + ((a - c) ** 2).sum()
     return 2 * 3**0.5 * np.linalg.norm(np.cross(b - a, c - a)) / squares
 
 
-def angles(a, b, c):
+def angles(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[float, float, float]:
     """Three angles of one triangle [degree]."""
 
-    def at(p, q, r):
+    def at(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> float:
         u, w = q - p, r - p
         return np.degrees(np.arccos(np.clip(u @ w / np.linalg.norm(u) / np.linalg.norm(w), -1, 1)))
 
     return at(a, b, c), at(b, c, a), at(c, a, b)
 
 
-def neighbors(grid):
+def neighbors(grid: Grid) -> dict[int, set[int]]:
     """Node to its neighbours."""
-    found = {v: set() for v in range(len(grid.nodes))}
+    found: dict[int, set[int]] = {v: set() for v in range(len(grid.nodes))}
     for triangle in grid.triangles.tolist():
         for a, b in combinations(triangle, 2):
             found[a].add(b)
@@ -33,16 +36,16 @@ def neighbors(grid):
     return found
 
 
-def wings(grid):
+def wings(grid: Grid) -> dict[tuple[int, int], list[int]]:
     """Edge (a, b), a < b, to the third nodes of its triangles."""
-    found = {}
+    found: dict[tuple[int, int], list[int]] = {}
     for a, b, c in grid.triangles.tolist():
         for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
             found.setdefault((min(p, q), max(p, q)), []).append(r)
     return found
 
 
-def flips_that_pay(grid):
+def flips_that_pay(grid: Grid) -> dict[tuple[int, int], float]:
     """Edges whose flip would make the smallest angle of their two triangles larger, by how many degrees."""
     found = {}
     around = neighbors(grid)
@@ -56,26 +59,26 @@ def flips_that_pay(grid):
     return found
 
 
-def energy(grid, length, weight):
+def energy(grid: Grid, length: float, weight: float) -> float:
     """Members, triangles and folds."""
     total = 0.0
     for (a, b), third in wings(grid).items():
         p, q = grid.nodes[a], grid.nodes[b]
-        total += weight * (np.linalg.norm(q - p) / length - 1) ** 2
+        total += weight * (float(np.linalg.norm(q - p)) / length - 1) ** 2
         if len(third) == 2:
             r, s = grid.nodes[third[0]], grid.nodes[third[1]]
             total += float(np.cross(q - p, r - p) @ np.cross(s - p, q - p) < 0)
     return total + sum(1 - shape(*grid.nodes[t]) for t in grid.triangles)
 
 
-def middle(nodes, around, v, factor):
+def middle(nodes: np.ndarray, around: Iterable[int], v: int, factor: float) -> np.ndarray:
     """Node v moved towards the middle of its neighbours, each with the weight of its distance."""
     arms = np.array([nodes[u] - nodes[v] for u in around])
     weights = np.linalg.norm(arms, axis=1)
     return nodes[v] + factor * (weights[:, None] * arms).sum(axis=0) / weights.sum()
 
 
-def nearest_on_polyline(points, place, samples=2000):
+def nearest_on_polyline(points: np.ndarray, place: np.ndarray, samples: int = 2000) -> float:
     """Distance of a place from a closed polyline, by sampling its segments."""
     t = np.linspace(0, 1, samples)[:, None]
     nxt = np.roll(points, -1, axis=0)

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def random_rotation(rng):
+def random_rotation(rng: np.random.Generator) -> np.ndarray:
     """A rotation (3, 3), all alike likely."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.sign(np.linalg.det(q))
 
 
-def random_pose(rng, far=3.0):
+def random_pose(rng: np.random.Generator, far: float = 3.0) -> np.ndarray:
     """A pose (4, 4)."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = random_rotation(rng), far * rng.normal(size=3)
     return pose
 
 
-def body(seed, bumps=14, height=0.3):
+def body(seed: int, bumps: int = 14, height: float = 0.3) -> Callable[[np.ndarray], np.ndarray]:
     """A star-shaped body about the origin: a function from directions (N, 3) to radii (N,)."""
     rng = np.random.default_rng(seed)
     centre = rng.normal(size=(bumps, 3))
@@ -28,7 +31,7 @@ def body(seed, bumps=14, height=0.3):
     return lambda u: 1.0 + (size * np.exp(-(((u[:, None] - centre) / width[:, None]) ** 2).sum(axis=2))).sum(axis=1)
 
 
-def surface(radius, u):
+def surface(radius: Callable[[np.ndarray], np.ndarray], u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) and outward normals of a body in given directions (N, 3)."""
     u = u / np.linalg.norm(u, axis=1)[:, None]
     a = np.linalg.svd(u[:, :, None], full_matrices=True)[0][:, :, 1:]
@@ -43,12 +46,19 @@ def surface(radius, u):
     return points, normal / np.linalg.norm(normal, axis=1)[:, None]
 
 
-def scans_of(radius, views, rng, count=12_000, noise=0.0, scale=1.0):
+def scans_of(
+    radius: Callable[[np.ndarray], np.ndarray],
+    views: Iterable[ArrayLike],
+    rng: np.random.Generator,
+    count: int = 12_000,
+    noise: float = 0.0,
+    scale: float = 1.0,
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Scans [(N, 3)] of a body from view directions, and the poses (4, 4) from the frame of each into that of the body."""
     scans, poses = [], []
     for view in views:
         points, normal = surface(radius, rng.normal(size=(count, 3)))
-        seen = points[normal @ (view / np.linalg.norm(view)) > 0.3]
+        seen = points[normal @ (np.asarray(view) / np.linalg.norm(view)) > 0.3]
         spacing = np.sqrt(4 * np.pi / count) * 0.5
         pose = random_pose(rng)
         world = scale * (seen + noise * spacing * rng.normal(size=seen.shape))
@@ -58,13 +68,15 @@ def scans_of(radius, views, rng, count=12_000, noise=0.0, scale=1.0):
     return scans, poses
 
 
-def around(count, rng):
+def around(count: int, rng: np.random.Generator) -> np.ndarray:
     """View directions (count, 3) around a body, some from above and some from below."""
     turn = 2 * np.pi * np.arange(count) / count
     return np.stack([np.cos(turn), np.sin(turn), rng.uniform(-0.5, 0.5, count)], axis=1)
 
 
-def errors_of(found, true, scans, names):
+def errors_of(
+    found: Mapping[str, np.ndarray], true: Sequence[np.ndarray], scans: Sequence[np.ndarray], names: Sequence[str]
+) -> tuple[float, float]:
     """Largest rotation [degree] and mean displacement [scan unit] of poses by name against true ones, in the frame of the first."""
     home_found, home_true = (np.linalg.inv(p) for p in (found[names[0]], true[0]))
     turned, moved = [], []

@@ -33,7 +33,7 @@ def no_boundary() -> Curves:
     return Curves(np.zeros((0, 3)), np.zeros(0), np.zeros(1, np.int64), np.zeros(0))
 
 
-def curve_of(points):
+def curve_of(points: np.ndarray) -> Curves:
     """One closed polyline as the kernels see it."""
     points = np.asarray(points, float)
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -41,12 +41,12 @@ def curve_of(points):
     return Curves(points, arc, np.array([0, len(points)]), np.array([steps.sum()]))
 
 
-def lift(xy, bulge):
+def lift(xy: np.ndarray, bulge: float) -> np.ndarray:
     """Places over the plane: a paraboloid of that height over a disc of radius 1."""
     return np.column_stack([xy, bulge * (1.0 - (xy**2).sum(axis=1))])
 
 
-def hexagonal(length, size):
+def hexagonal(length: float, size: float) -> np.ndarray:
     """Places of a triangular pattern that covers a square of half width `size`."""
     rows = np.arange(-size, size, length * 3**0.5 / 2)
     return np.concatenate(
@@ -59,7 +59,14 @@ def hexagonal(length, size):
     )
 
 
-def rough_disc(length=0.22, jitter=0.25, bulge=0.4, seed=0, corners=False, points=6000):
+def rough_disc(
+    length: float = 0.22,
+    jitter: float = 0.25,
+    bulge: float = 0.4,
+    seed: int = 0,
+    corners: bool = False,
+    points: int = 6000,
+) -> Rough:
     """A disc, or with corners a square plate, of half width 1, lifted onto a paraboloid."""
     rng = np.random.default_rng(seed)
     if corners:
@@ -94,11 +101,11 @@ def rough_disc(length=0.22, jitter=0.25, bulge=0.4, seed=0, corners=False, point
     return Rough(cloud, grid, curve, at, Settings(length=length))
 
 
-def rough_sphere(count=160, seed=0, points=6000):
+def rough_sphere(count: int = 160, seed: int = 0, points: int = 6000) -> Rough:
     """A sphere of radius 1."""
     rng = np.random.default_rng(seed)
 
-    def spread(number, jitter):
+    def spread(number: int, jitter: float) -> np.ndarray:
         k = np.arange(number) + 0.5
         z, angle = 1 - 2 * k / number, np.pi * (1 + 5**0.5) * k
         places = np.column_stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z])
@@ -115,7 +122,7 @@ def rough_sphere(count=160, seed=0, points=6000):
     return Rough(cloud, grid, no_boundary(), np.zeros((0, 3)), Settings(length=float(grid.lengths.mean())))
 
 
-def strip_of(count, half_turns=0):
+def strip_of(count: int, half_turns: int = 0) -> Grid:
     """A closed strip of triangles around an axis; with one half turn a Moebius strip."""
     angle = 2 * np.pi * np.arange(count) / count
     tilt = half_turns * angle / 2
@@ -131,7 +138,7 @@ def strip_of(count, half_turns=0):
     return Grid(nodes, np.array(triangles, np.int64), np.zeros(2 * count, bool), np.zeros(3))
 
 
-def same_topology(a: Grid, b: Grid):
+def same_topology(a: Grid, b: Grid) -> bool:
     """Whether two grids have the same topology and all triangles of the second face one way."""
     ends = np.concatenate([b.triangles[:, [0, 1]], b.triangles[:, [1, 2]], b.triangles[:, [2, 0]]])
     return a.topology == b.topology and len(np.unique(ends, axis=0)) == len(ends)

@@ -1,5 +1,8 @@
 """Small clouds made by hand, the scan prepared of them, and fronts laid on them segment by segment."""
 
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
 import numpy as np
 
 from scantruss import PointCloud, Settings
@@ -7,10 +10,18 @@ from scantruss.front.advance import new_front
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.fits import near_nodes
 from scantruss.kernels.surface.local_surface import PATCH
-from scantruss.surface.samples import sample_surface
+from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 
-def sheet(width, depth, spacing, *, keep=None, noise=0.0, seed=0):
+def sheet(
+    width: float,
+    depth: float,
+    spacing: float,
+    *,
+    keep: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    noise: float = 0.0,
+    seed: int = 0,
+) -> np.ndarray:
     """Points of a plate [-width/2, width/2] x [-depth/2, depth/2], on a jittered lattice that reaches the rim."""
     rng = np.random.default_rng(seed)
     x, y = (np.linspace(-e / 2, e / 2, round(e / spacing) + 1) for e in (width, depth))
@@ -23,7 +34,7 @@ def sheet(width, depth, spacing, *, keep=None, noise=0.0, seed=0):
     return rng.permutation(points)
 
 
-def ring(inner, outer, spacing, *, seed=0):
+def ring(inner: float, outer: float, spacing: float, *, seed: int = 0) -> np.ndarray:
     """Points between two circles, both rims dense; `inner` 0 gives a disc."""
     body = sheet(2 * outer, 2 * outer, spacing, seed=seed)
     away = np.hypot(body[:, 0], body[:, 1])
@@ -35,7 +46,7 @@ def ring(inner, outer, spacing, *, seed=0):
     return np.random.default_rng(seed).permutation(np.concatenate(parts))
 
 
-def ball(radius, count, *, noise=0.0, seed=0):
+def ball(radius: float, count: int, *, noise: float = 0.0, seed: int = 0) -> np.ndarray:
     """Points of a sphere, evenly on a spiral."""
     rng = np.random.default_rng(seed)
     z = 1 - (2 * np.arange(count) + 1) / count
@@ -45,7 +56,7 @@ def ball(radius, count, *, noise=0.0, seed=0):
     return rng.permutation(points + noise * rng.normal(size=points.shape))
 
 
-def tire(radius, tube, spacing, *, seed=0):
+def tire(radius: float, tube: float, spacing: float, *, seed: int = 0) -> np.ndarray:
     """Points of a torus around z."""
     rng = np.random.default_rng(seed)
     m, n = round(2 * np.pi * (radius + tube) / spacing), round(2 * np.pi * tube / spacing)
@@ -55,7 +66,7 @@ def tire(radius, tube, spacing, *, seed=0):
     return rng.permutation(np.stack([away * np.cos(a), away * np.sin(a), tube * np.sin(b)], axis=1))
 
 
-def cap(radius, opening, spacing, *, seed=0):
+def cap(radius: float, opening: float, spacing: float, *, seed: int = 0) -> np.ndarray:
     """Points of a dome around z, down to `opening` [radian] from its top, its rim dense."""
     flat = ring(0.0, radius * opening, spacing, seed=seed)
     away = np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-12)
@@ -63,14 +74,14 @@ def cap(radius, opening, spacing, *, seed=0):
     return np.stack([side * flat[:, 0], side * flat[:, 1], radius * np.cos(away / radius)], axis=1)
 
 
-def turn_of(seed):
+def turn_of(seed: int) -> np.ndarray:
     """A random rotation matrix."""
     turn, upper = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     turn = turn * np.sign(np.diag(upper))
     return turn * [1, 1, np.sign(np.linalg.det(turn))]
 
 
-def samples_of(points, length=1.0, **settings):
+def samples_of(points: np.ndarray, length: float = 1.0, **settings: Any) -> SurfaceSamples:
     """The scan prepared for a member length."""
     return sample_surface(PointCloud.from_array(points), Settings(length=length, **settings))
 
@@ -78,7 +89,15 @@ def samples_of(points, length=1.0, **settings):
 class HandFront:
     """A front on the plane z = 0, laid segment by segment; the unmeshed area is on the left."""
 
-    def __init__(self, *loops, points=None, inner=(), state=(), length=1.0, **settings):
+    def __init__(
+        self,
+        *loops: Iterable[Sequence[float]],
+        points: np.ndarray | None = None,
+        inner: Sequence[int] = (),
+        state: Sequence[int] = (),
+        length: float = 1.0,
+        **settings: Any,
+    ) -> None:
         """loops: places (H, 2) of closed loops. inner: numbers of the nodes that are not of a boundary."""
         points = sheet(8.0, 8.0, 0.125) if points is None else points
         self.settings = Settings(length=length, **settings)
@@ -97,7 +116,7 @@ class HandFront:
             self.segments.append(own)
         self.front.on_boundary[list(inner)] = False
 
-    def add_node(self, x, y, z=0.0, *, boundary=False):
+    def add_node(self, x: float, y: float, z: float = 0.0, *, boundary: bool = False) -> int:
         place = (float(x), float(y), float(z))
         sample = int(((self.surface.mean - place) ** 2).sum(axis=1).argmin())
         up = (0.0, 0.0, 1.0) if self.surface.normals[sample, 2] > 0 else (0.0, 0.0, -1.0)
@@ -106,28 +125,28 @@ class HandFront:
         lists.add_node(self.front)
         return n
 
-    def near(self, s, reach=2.4):
+    def near(self, s: int, reach: float = 2.4) -> int:
         """Number of nodes near a segment, in `found`."""
         return near_nodes(self.surface, self.front, s, reach, self.settings.length, self.found)
 
     @property
-    def triangles(self):
+    def triangles(self) -> list[frozenset[int]]:
         """Sets of the nodes of the triangles so far, in order."""
         return [frozenset(t) for t in self.front.triangles[: self.front.count[lists.TRIANGLES]].tolist()]
 
     @property
-    def alive(self):
+    def alive(self) -> dict[tuple[int, int], int]:
         """(tail, head) of the segments of the front that are left, with their states."""
         count = self.front.count[lists.SEGMENTS]
         rows = zip(self.front.tail[:count], self.front.head[:count], self.front.state[:count], strict=True)
         return {(int(t), int(h)): int(state) for t, h, state in rows if state != lists.GONE}
 
     @property
-    def nodes(self):
+    def nodes(self) -> np.ndarray:
         return self.front.nodes[: self.front.count[lists.NODES]]
 
 
-def rules_of(settings, spacing, strict=1.0):
+def rules_of(settings: Settings, spacing: float, strict: float = 1.0) -> lists.Rules:
     """What a front goes by, for the kernels."""
     return lists.Rules(
         length=settings.length,

@@ -1,20 +1,24 @@
 """Small grids made by hand, for the tests of files, solids and pictures."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from scantruss import Grid, GridQuality, PointCloud, Settings
 
 
-def make_grid(nodes, triangles, fixed=(), **others):
+def make_grid(nodes: ArrayLike, triangles: ArrayLike, fixed: Iterable[int] = (), **others: Any) -> Grid:
     """Return a grid of lists."""
     nodes = np.asarray(nodes, np.float64).reshape(-1, 3)
     marked = np.zeros(len(nodes), bool)
     marked[list(fixed)] = True
-    others = {"origin": np.zeros(3), "unit": "mm"} | others
-    return Grid(nodes=nodes, triangles=np.asarray(triangles, np.int64).reshape(-1, 3), fixed=marked, **others)
+    given: dict[str, Any] = {"origin": np.zeros(3), "unit": "mm"} | others
+    return Grid(nodes=nodes, triangles=np.asarray(triangles, np.int64).reshape(-1, 3), fixed=marked, **given)
 
 
-def fan(length=10.0, **others):
+def fan(length: float = 10.0, **others: Any) -> Grid:
     """Six equilateral triangles around node 0: V 7, E 12, T 6, one loop."""
     angle = np.arange(6) * np.pi / 3
     rim = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) * length
@@ -22,10 +26,10 @@ def fan(length=10.0, **others):
     return make_grid([(0, 0, 0), *rim], triangles, **others)
 
 
-def icosahedron(length=10.0, **others):
+def icosahedron(length: float = 10.0, **others: Any) -> Grid:
     """Closed: V 12, E 30, T 20, no loop."""
     g = (1 + 5**0.5) / 2
-    nodes = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g)]
+    nodes: list[tuple[float, float, float]] = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g)]
     nodes += [(0, -1, -g), (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]
     triangles = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2)]
     triangles += [(10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5)]
@@ -33,14 +37,14 @@ def icosahedron(length=10.0, **others):
     return make_grid(np.array(nodes) * length / 2, triangles, **others)
 
 
-def two_pieces(length=10.0, **others):
+def two_pieces(length: float = 10.0, **others: Any) -> Grid:
     """A fan and an icosahedron far from each other, and a node that belongs to neither."""
     a, b = fan(length), icosahedron(length)
     nodes = [*a.nodes, *(b.nodes + np.array([5 * length, 0, 0])), (0, 0, 9 * length)]
     return make_grid(nodes, [*a.triangles, *(b.triangles + len(a.nodes))], **others)
 
 
-def dome(count=12, length=4.0, **others):
+def dome(count: int = 12, length: float = 4.0, **others: Any) -> Grid:
     """A shallow dome with `count` nodes along each side."""
     i, j = np.divmod(np.arange(count * count), count)
     x, y = (i + 0.5 * (j % 2)) * length, j * length * 3**0.5 / 2
@@ -53,10 +57,10 @@ def dome(count=12, length=4.0, **others):
     return make_grid(nodes, triangles, **others)
 
 
-def rich(**others):
+def rich(**others: Any) -> Grid:
     """A fan with everything a grid can carry."""
     before = GridQuality(0.9, 0.1, 0.5, 9.7, 1 / 3, 0.1, 31.0, 99.0, 0.8, 0.01, 0.02, "mm")
-    values = {
+    values: dict[str, Any] = {
         "fixed": (0, 3),
         "origin": np.array([500000.1, 4500000.2, 100.3]),
         "deviation": np.array([0.1, 1 / 3, np.nan, 0.0, 1e-300, 2.0, -0.0]),
@@ -66,7 +70,7 @@ def rich(**others):
     return fan(**(values | others))
 
 
-def cloud_over(grid, count=3000):
+def cloud_over(grid: Grid, count: int = 3000) -> PointCloud:
     """Return points on the triangles of a grid, in another local frame."""
     rng = np.random.default_rng(5)
     corners = grid.nodes[grid.triangles[rng.integers(len(grid.triangles), size=count)]]

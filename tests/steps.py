@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from typed import known
+
 from scantruss import (
     Grid,
     PointCloud,
@@ -55,7 +57,7 @@ def front_of(cloud: PointCloud, settings: Settings, way: FieldStart | None = Non
 def rows_of(steps: Steps, length: float, way: FieldStart) -> CandidateNodes:
     """Return the nodes of rows laid in a way."""
     (field,) = orientation_fields(steps.samples, steps.boundary, Settings(length=length), [way])
-    return field.nodes
+    return known(field.nodes)
 
 
 def optimized(grid: Grid, cloud: PointCloud, settings: Settings, places: Any = ()) -> Grid:

@@ -11,6 +11,7 @@ import sys
 import warnings
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -306,7 +307,7 @@ def damaged(data: bytes, edits: list[tuple[str, float, int, int]]) -> bytes:
 @pytest.mark.parametrize("name", sorted(FILES))
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(edits=st.lists(edit, min_size=1, max_size=4))
-def test_a_damaged_file_is_read_or_refused(name: str, edits: list, tmp_path: Path) -> None:
+def test_a_damaged_file_is_read_or_refused(name: str, edits: list[Any], tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_bytes(damaged(FILES[name], edits))
     read_or_refuse(path)
@@ -314,7 +315,9 @@ def test_a_damaged_file_is_read_or_refused(name: str, edits: list, tmp_path: Pat
 
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(edits=st.lists(edit, min_size=1, max_size=4), name=st.sampled_from(["a.e57", "b.e57"]))
-def test_an_e57_file_damaged_under_its_checksums_is_read_or_refused(edits: list, name: str, tmp_path: Path) -> None:
+def test_an_e57_file_damaged_under_its_checksums_is_read_or_refused(
+    edits: list[Any], name: str, tmp_path: Path
+) -> None:
     path = tmp_path / name
     path.write_bytes(to_pages(damaged(bytes(pages(FILES[name])), edits)).tobytes())
     read_or_refuse(path)

@@ -3,8 +3,10 @@
 import copy
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +23,13 @@ from shapes import make  # noqa: E402
 CLOUD = Cloud("flat_plate", 2_000, 200, 0.0)
 
 
-def plate_net(across, up, corners=((-30.0, -20.0), (30.0, 20.0))):
+def nothing(scan: Any) -> Any:
+    """A way that gives no mesh."""
+
+
+def plate_net(
+    across: int, up: int, corners: Sequence[tuple[float, float]] = ((-30.0, -20.0), (30.0, 20.0))
+) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes and triangles of a plate divided into rectangles, each into two triangles."""
     (left, low), (right, high) = corners
     x, y = np.meshgrid(np.linspace(left, right, across + 1), np.linspace(low, high, up + 1), indexing="ij")
@@ -30,7 +38,7 @@ def plate_net(across, up, corners=((-30.0, -20.0), (30.0, 20.0))):
     return nodes, np.concatenate([np.stack([a, a + up + 1, a + up + 2], 1), np.stack([a, a + up + 2, a + 1], 1)])
 
 
-def row(way, seconds=1.0, right=True, cloud=CLOUD, **found):
+def row(way: str, seconds: float = 1.0, right: bool = True, cloud: Cloud = CLOUD, **found: Any) -> runs.Row:
     known = {
         "right": right,
         "manifold": True,
@@ -50,7 +58,7 @@ def row(way, seconds=1.0, right=True, cloud=CLOUD, **found):
     )
 
 
-def test_a_net_of_right_triangles_has_the_figures_known_by_hand():
+def test_a_net_of_right_triangles_has_the_figures_known_by_hand() -> None:
     shape = replace(make("flat_plate", 2_000), length=10.0)
     found = figures.figures(shape, *plate_net(6, 4))
     legs, slants = 6 * 5 + 7 * 4, 6 * 4
@@ -67,7 +75,7 @@ def test_a_net_of_right_triangles_has_the_figures_known_by_hand():
     )
 
 
-def test_a_net_that_lies_off_is_seen_in_deviation_rim_and_cover():
+def test_a_net_that_lies_off_is_seen_in_deviation_rim_and_cover() -> None:
     shape = replace(make("flat_plate", 20_000), length=2.0)
     nodes, triangles = plate_net(20, 20, ((-30.0, -20.0), (10.0, 20.0)))  # ends 20 before the rim of x = 30
     found = figures.figures(shape, nodes + [0, 0, 0.5], triangles)
@@ -76,7 +84,7 @@ def test_a_net_that_lies_off_is_seen_in_deviation_rim_and_cover():
     assert found.uncovered == pytest.approx((20 - np.sqrt(1 - 0.25)) / 60, abs=0.01)
 
 
-def test_a_hole_and_a_leaf_make_a_net_wrong():
+def test_a_hole_and_a_leaf_make_a_net_wrong() -> None:
     shape = replace(make("flat_plate", 2_000), length=10.0)
     nodes, triangles = plate_net(6, 4)
     holed = figures.figures(shape, nodes, np.delete(triangles, [9, 9 + 24], axis=0))
@@ -87,8 +95,10 @@ def test_a_hole_and_a_leaf_make_a_net_wrong():
     assert not leaf.right and not leaf.manifold
 
 
-def test_a_way_that_is_missing_crashes_or_never_ends_leaves_a_row_that_says_so(tmp_path, monkeypatch):
-    gone = ways.Way("gone", (), ("no_such_package",), "", "", lambda scan: None)
+def test_a_way_that_is_missing_crashes_or_never_ends_leaves_a_row_that_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = ways.Way("gone", (), ("no_such_package",), "", "", nothing)
     monkeypatch.setattr(ways, "WAYS", (gone,))
     job = {key: str(tmp_path / key) for key in ("points", "grid", "answer", "log")} | {"way": "gone"}
     from benchmarks.peers.child import measured
@@ -104,11 +114,13 @@ def test_a_way_that_is_missing_crashes_or_never_ends_leaves_a_row_that_says_so(t
     assert tables.losses([row("ScanTruss normal"), missing]) == []
 
 
-def test_rows_are_kept_and_what_ran_out_of_time_is_not_tried_on_more(tmp_path, monkeypatch):
-    way = ways.Way("slow", (), (), "", "", lambda scan: None)
+def test_rows_are_kept_and_what_ran_out_of_time_is_not_tried_on_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    way = ways.Way("slow", (), (), "", "", nothing)
     asked = []
 
-    def run(cloud, way, limit, repeats):
+    def run(cloud: Any, way: Any, limit: float, repeats: int) -> runs.Row:
         asked.append(cloud)
         return runs.Row(cloud, way.name, "out of time" if cloud.points > 50 else "failed", "", {}, {})
 
@@ -124,9 +136,9 @@ def test_rows_are_kept_and_what_ran_out_of_time_is_not_tried_on_more(tmp_path, m
 @pytest.mark.parametrize(
     "name", ["child.py", "clouds.py", "figures.py", "measure.py", "shapes.py", "scans.py", "surfaces.py", "truths.py"]
 )
-def test_rows_measured_otherwise_are_not_kept(monkeypatch, name):
+def test_rows_measured_otherwise_are_not_kept(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     runs.yardstick.cache_clear()
-    way = ways.Way("slow", (), (), "", "", lambda scan: None)
+    way = ways.Way("slow", (), (), "", "", nothing)
     before = runs.key_of(CLOUD, way, 1.0, 1)
     assert runs.key_of(CLOUD, way, 1.0, 1) == before
     runs.yardstick.cache_clear()
@@ -145,21 +157,21 @@ def test_rows_measured_otherwise_are_not_kept(monkeypatch, name):
         ("loops 2/1, and/or 3 m/s", "loops 2/1, and/or 3 m/s"),
     ],
 )
-def test_the_words_of_a_way_name_no_folder(said, kept):
+def test_the_words_of_a_way_name_no_folder(said: str, kept: str) -> None:
     assert runs.without_folders(said) == kept
 
 
-def test_a_way_that_crashes_is_told_without_our_folders(tmp_path, monkeypatch):
-    def refuse(job, limit):
+def test_a_way_that_crashes_is_told_without_our_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(job: Any, limit: float) -> dict[str, str]:
         assert np.load(job["points"]).shape == (2_000, 3)  # the cloud as it is made today
         return {"result": "crashed", "words": f"exit status 1 {tmp_path}/way.py"}
 
     monkeypatch.setattr(runs, "run_child", refuse)
-    found = runs.run(CLOUD, ways.Way("w", (), (), "", "", lambda scan: None), 1.0)
+    found = runs.run(CLOUD, ways.Way("w", (), (), "", "", nothing), 1.0)
     assert (found.result, found.words) == ("crashed", "exit status 1 way.py")
 
 
-def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong():
+def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong() -> None:
     other = replace(CLOUD, shape="sphere")
     rows = [
         row("ScanTruss normal"),
@@ -176,7 +188,7 @@ def test_ways_that_are_missing_or_do_not_apply_are_not_told_as_wrong():
     )
 
 
-def test_losses_name_the_way_that_is_better_and_only_where_it_is_right():
+def test_losses_name_the_way_that_is_better_and_only_where_it_is_right() -> None:
     rows = [
         row("ScanTruss quick", 1.0),
         row("ScanTruss normal", 2.0),
@@ -196,7 +208,7 @@ def test_losses_name_the_way_that_is_better_and_only_where_it_is_right():
     assert "**wrong**" in tables.full_table(rows)
 
 
-def test_a_section_is_written_anew_and_the_others_stay():
+def test_a_section_is_written_anew_and_the_others_stay() -> None:
     one = page.Section("Speed", "speed", "**1**", "earlier text", ("slow.",))
     text = page.with_section(
         page.with_section("", one), page.Section("Random surfaces", "random", "**2**", "other", ())
@@ -213,8 +225,10 @@ def test_a_section_is_written_anew_and_the_others_stay():
 
 
 @pytest.mark.parametrize("given", [["scans", "--data", "{folder}"], ["scans", "--data={folder}"]])
-def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
-    def measured(options, command):
+def test_the_page_tells_no_path_of_the_machine(
+    given: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measured(options: Any, command: str) -> page.Section:
         assert options.data == str(tmp_path)
         return page.Section("Simulated and real scans", command, "**1**", "rows", ())
 
@@ -230,7 +244,9 @@ def test_the_page_tells_no_path_of_the_machine(given, tmp_path, monkeypatch):
     "given, written",
     [(["own", "--page", "{folder}/page.md"], "numbers.json"), (["own", "{folder}/new.json"], "new.json")],
 )
-def test_our_own_figures_are_written_beside_the_page_or_where_it_is_said(given, written, tmp_path, monkeypatch):
+def test_our_own_figures_are_written_beside_the_page_or_where_it_is_said(
+    given: list[str], written: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     saved = []
     monkeypatch.setattr(own, "record", lambda quick: {"quick": quick})
     monkeypatch.setattr(own, "save", lambda figures, file: saved.append((figures, file)))
@@ -238,15 +254,17 @@ def test_our_own_figures_are_written_beside_the_page_or_where_it_is_said(given, 
     assert saved == [({"quick": False}, tmp_path / written)]
 
 
-def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys):
-    old = {
+def test_compare_marks_what_is_slower_or_worse_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old: dict[str, Any] = {
         "format": 1, "machine": "m", "times": {"a": {"ratio": 1.0, "low": 0.9, "high": 1.1}},
         "quality": {"a": {"cv": 0.05, "right": True, "angle_min": 40.0}},
     }  # fmt: skip
     own.save(old, tmp_path / "old")
     assert own.compare(tmp_path / "old", tmp_path / "old") == 0
 
-    def changed(time=None, **quality):
+    def changed(time: dict[str, float] | None = None, **quality: Any) -> tuple[int, str]:
         new = copy.deepcopy(old)
         new["times"]["a"].update(time or {})
         new["quality"]["a"].update(quality)
@@ -262,7 +280,7 @@ def test_compare_marks_what_is_slower_or_worse_and_nothing_else(tmp_path, capsys
     assert changed(cv=0.06)[0] == 1 and changed(right=False)[0] == 1 and changed(cv=0.0505)[0] == 0
 
 
-def test_a_row_of_another_version_takes_the_place_of_the_old_one(tmp_path):
+def test_a_row_of_another_version_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     path = tmp_path / "runs" / "rows.jsonl"
     keys = [json.dumps([{"shape": "scallop"}, way, version, "yard", 1.0, 3]) for way, version in ("a1", "b1", "a2")]
     for key in keys:

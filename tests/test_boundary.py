@@ -1,23 +1,26 @@
 """Boundary loops of clouds whose rim is known: number, length, side, corners, nodes (Sec. 3.3)."""
 
+from typing import Any, Never
+
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from shapes import make
 from small_clouds import ball, cap, ring, sheet, tire, turn_of
 from steps import boundary_of
 
 import scantruss as st
+from scantruss.boundary.find import Loop, characteristic_points
 from scantruss.boundary.find import _onwards as onwards
-from scantruss.boundary.find import characteristic_points
 
 
-def found(points, length=1.0, **settings):
+def found(points: np.ndarray, length: float = 1.0, **settings: Any) -> tuple[st.Boundary, np.ndarray]:
     """Boundary of points, and the origin its places are relative to."""
     cloud = st.PointCloud.from_array(points)
     return boundary_of(cloud, st.Settings(length=length, **settings)), cloud.origin
 
 
-def in_hole(x, y):
+def in_hole(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.hypot(x, y) < 2.0
 
 
@@ -26,7 +29,7 @@ ELL = [(-6, -6), (6, -6), (6, 0), (0, 0), (0, 6), (-6, 6)]
 RHOMBUS = [(-6, 0), (0, -6 * 3**0.5 / 3), (6, 0), (0, 6 * 3**0.5 / 3)]  # 60 and 120 degrees
 
 
-def polygon(corners, spacing=0.12, seed=0):
+def polygon(corners: ArrayLike, spacing: float = 0.12, seed: int = 0) -> np.ndarray:
     """Points of a plate over a polygon, its rim dense."""
     corners = np.array(corners, float)
     after = np.roll(corners, -1, axis=0)
@@ -47,12 +50,14 @@ def polygon(corners, spacing=0.12, seed=0):
     return np.random.default_rng(seed).permutation(np.column_stack([flat, np.zeros(len(flat))]))
 
 
-def perimeter(corners):
+def perimeter(corners: np.ndarray) -> float:
     corners = np.array(corners, float)
     return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum()
 
 
-def assert_surface_on_the_left(boundary, origin, points, length=1.0):
+def assert_surface_on_the_left(
+    boundary: st.Boundary, origin: np.ndarray, points: np.ndarray, length: float = 1.0
+) -> None:
     """0.3 members to the left of the loops there are points, to the right there are none; but for places near a corner."""
     cloud = st.PointCloud.from_array(points)
     surface = st.sample_surface(cloud, st.Settings(length=length)).surface
@@ -72,7 +77,7 @@ def assert_surface_on_the_left(boundary, origin, points, length=1.0):
 
 @pytest.mark.parametrize("corners", [RECTANGLE, ELL, RHOMBUS], ids=["rectangle", "ell", "rhombus"])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_corners_of_a_plate_are_found_within_a_tenth_of_a_member(corners, seed):
+def test_corners_of_a_plate_are_found_within_a_tenth_of_a_member(corners: np.ndarray, seed: int) -> None:
     points = polygon(corners, seed=seed)
     boundary, origin = found(points)
     (loop,) = boundary.loops
@@ -86,7 +91,7 @@ def test_corners_of_a_plate_are_found_within_a_tenth_of_a_member(corners, seed):
 
 
 @pytest.mark.parametrize("corners", [RECTANGLE, ELL, RHOMBUS], ids=["rectangle", "ell", "rhombus"])
-def test_nodes_divide_every_side_equally_and_corners_are_nodes(corners):
+def test_nodes_divide_every_side_equally_and_corners_are_nodes(corners: np.ndarray) -> None:
     boundary, _ = found(polygon(corners))
     nodes, is_corner = characteristic_points(boundary.loops[0], 1.0)
     assert is_corner.sum() == len(corners)
@@ -103,7 +108,7 @@ def test_nodes_divide_every_side_equally_and_corners_are_nodes(corners):
 
 
 @pytest.mark.parametrize("length", [0.8, 1.0, 1.7])
-def test_a_disc_has_one_loop_without_corners(length):
+def test_a_disc_has_one_loop_without_corners(length: float) -> None:
     points = ring(0.0, 6.0, 0.12)
     boundary, origin = found(points, length)
     (loop,) = boundary.loops
@@ -117,7 +122,7 @@ def test_a_disc_has_one_loop_without_corners(length):
     assert_surface_on_the_left(boundary, origin, points, length)
 
 
-def test_an_annulus_has_an_external_and_an_internal_boundary():
+def test_an_annulus_has_an_external_and_an_internal_boundary() -> None:
     points = ring(2.0, 6.0, 0.12)
     boundary, origin = found(points)
     (outer,), (inner,) = boundary.external, boundary.internal
@@ -129,13 +134,13 @@ def test_an_annulus_has_an_external_and_an_internal_boundary():
     assert_surface_on_the_left(boundary, origin, points)
 
 
-def area_enclosed(loop):
+def area_enclosed(loop: Loop) -> float:
     """Signed area of a loop seen from above."""
     x, y = loop.points[:, 0], loop.points[:, 1]
     return 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
 
 
-def test_external_boundaries_run_anticlockwise_internal_ones_clockwise():
+def test_external_boundaries_run_anticlockwise_internal_ones_clockwise() -> None:
     """Seen from above, where the normals of a plate point."""
     boundary, _ = found(ring(2.0, 6.0, 0.12))
     assert area_enclosed(boundary.external[0]) == pytest.approx(36 * np.pi, rel=0.02)
@@ -143,7 +148,7 @@ def test_external_boundaries_run_anticlockwise_internal_ones_clockwise():
 
 
 @pytest.mark.parametrize("radius", [1.0, 1.5])
-def test_holes_shorter_than_the_smallest_are_closed_over(radius):
+def test_holes_shorter_than_the_smallest_are_closed_over(radius: float) -> None:
     """A rim of 2 pi r counts from `fill_holes` on."""
     around = 2 * np.pi * radius
     points = ring(radius, 6.0, 0.12)
@@ -152,7 +157,7 @@ def test_holes_shorter_than_the_smallest_are_closed_over(radius):
     assert len(found(points, fill_holes=1.15 * around)[0].external) == 1
 
 
-def test_missing_points_here_and_there_make_no_hole():
+def test_missing_points_here_and_there_make_no_hole() -> None:
     points = sheet(12, 8, 0.12)
     keep = np.random.default_rng(0).random(len(points)) < 0.6
     for centre in ((2.0, 1.0), (-3.0, -1.0)):
@@ -161,13 +166,13 @@ def test_missing_points_here_and_there_make_no_hole():
 
 
 @pytest.mark.parametrize("points", [ball(4.0, 12_000, noise=0.01), tire(5.0, 2.0, 0.15)], ids=["ball", "torus"])
-def test_closed_clouds_have_no_boundary(points):
+def test_closed_clouds_have_no_boundary(points: np.ndarray) -> None:
     boundary, _ = found(points)
     assert boundary.loops == () and boundary.corners.shape == (0, 3)
     assert boundary.curves.start.tolist() == [0] and boundary.curves.points.shape == (0, 3)
 
 
-def test_every_piece_has_an_external_boundary():
+def test_every_piece_has_an_external_boundary() -> None:
     a, b = ring(2.0, 5.0, 0.15), ring(0.0, 3.0, 0.15) + np.array([12.0, 0, 0])
     boundary, _ = found(np.concatenate([a, b]))
     assert len(boundary.external) == 2 and len(boundary.internal) == 1
@@ -176,19 +181,19 @@ def test_every_piece_has_an_external_boundary():
     assert [round(loop.length) for loop in boundary.loops] == [31, 19, 13]  # external ones first, then by length
 
 
-def test_debris_beside_the_scan_has_no_boundary():
+def test_debris_beside_the_scan_has_no_boundary() -> None:
     points = np.concatenate([sheet(12, 8, 0.15), sheet(0.8, 0.8, 0.15) + np.array([9.0, 0, 0])])
     assert len(found(points)[0].loops) == 1
 
 
-def test_pieces_that_are_all_smaller_than_a_member_are_refused():
+def test_pieces_that_are_all_smaller_than_a_member_are_refused() -> None:
     dome = cap(8.0, 1.0, 0.5)
     with pytest.raises(st.InputError, match="each piece of the scan is smaller than length 4000; use a shorter one"):
         found(np.concatenate([dome, dome + np.array([1e5, 0.0, 0.0])]), 4000.0)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.03])
-def test_the_rim_of_a_dome_is_a_circle(noise):
+def test_the_rim_of_a_dome_is_a_circle(noise: float) -> None:
     points = cap(8.0, 1.0, 0.15)
     points += noise * np.random.default_rng(0).normal(size=points.shape)
     boundary, origin = found(points)
@@ -200,7 +205,7 @@ def test_the_rim_of_a_dome_is_a_circle(noise):
 
 
 @pytest.mark.parametrize("name", ["scallop", "cloth", "gable", "flat_plate", "two_holes", "great_court", "pantheon"])
-def test_rims_of_known_shapes(name):
+def test_rims_of_known_shapes(name: str) -> None:
     shape = make(name, seed=1)
     boundary, _ = found(shape.points, shape.length)
     assert len(boundary.loops) == len(shape.loops)
@@ -211,7 +216,7 @@ def test_rims_of_known_shapes(name):
 @pytest.mark.parametrize(
     "name", ["scallop", "cloth", "gable", "flat_plate", "l_plate", "two_holes", "great_court", "saddle"]
 )
-def test_corners_of_known_shapes(name):
+def test_corners_of_known_shapes(name: str) -> None:
     """Every corner is found within a tenth of a member of its true place, also re-entrant ones, and none besides."""
     for seed in range(3):
         shape = make(name, seed=seed)
@@ -221,7 +226,7 @@ def test_corners_of_known_shapes(name):
         assert len(boundary.external[0].corners) == len(shape.corners)
 
 
-def test_boundary_points_do_not_go_back_and_forth():
+def test_boundary_points_do_not_go_back_and_forth() -> None:
     a, b, c, d = np.eye(4)[:, :3]
     assert onwards(np.array([a, b, c, d])) == [0, 1, 2, 3]
     assert onwards(np.array([a, b, a, c, d, c])) == [0, 3]
@@ -234,7 +239,7 @@ def test_boundary_points_do_not_go_back_and_forth():
 
 
 @pytest.mark.parametrize("seed", [1, 4, 8, 10])
-def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed):
+def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed: int) -> None:
     """With ten points for a node the disc touches some in another order than they have along the rim."""
     shape = make("great_court", 20_000, seed=seed)
     length = float(np.sqrt(4 / np.sqrt(3) * shape.area / 2 / 2_000))
@@ -246,7 +251,7 @@ def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed):
             assert ((between < 0.45 * length) | (between < 3.0 * straight)).all()
 
 
-def test_the_rim_for_the_kernels_is_made_of_the_loops():
+def test_the_rim_for_the_kernels_is_made_of_the_loops() -> None:
     boundary, _ = found(ring(2.0, 6.0, 0.15))
     curves = boundary.curves
     assert curves.start.tolist() == [0, *np.cumsum([len(loop.points) for loop in boundary.loops])]
@@ -260,14 +265,14 @@ def test_the_rim_for_the_kernels_is_made_of_the_loops():
         assert arc[0] == 0 and np.diff(arc) == pytest.approx(steps[:-1])
 
 
-def test_corners_follow_the_angle_that_is_asked():
+def test_corners_follow_the_angle_that_is_asked() -> None:
     """The rim of a rhombus turns by 120 degrees at two corners and by 60 at the others."""
     points = polygon(RHOMBUS)
     assert [len(found(points, corner_angle=angle)[0].corners) for angle in (40.0, 90.0, 150.0)] == [4, 2, 0]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_turned_and_shifted_cloud_has_the_same_boundary(seed):
+def test_a_turned_and_shifted_cloud_has_the_same_boundary(seed: int) -> None:
     """Up to rounding: places to a millionth of a member."""
     points = polygon(ELL)
     points[:, 2] = 0.01 * (points[:, 0] ** 2 + points[:, 1] ** 2)
@@ -279,7 +284,7 @@ def test_a_turned_and_shifted_cloud_has_the_same_boundary(seed):
 
 
 @pytest.mark.kernels
-def test_a_larger_cloud_has_the_same_boundary_larger():
+def test_a_larger_cloud_has_the_same_boundary_larger() -> None:
     """Twice as large is the same to the last bit: powers of two do not round."""
     points = polygon([(-3, -2), (3, -2), (3, 2), (-3, 2)], 0.25)
     (a, _), (b, _) = found(points), found(4.0 * points, 4.0)
@@ -289,7 +294,7 @@ def test_a_larger_cloud_has_the_same_boundary_larger():
 
 
 @pytest.mark.kernels
-def test_small_plates_without_and_with_a_hole():
+def test_small_plates_without_and_with_a_hole() -> None:
     rectangle, _ = found(polygon([(-3, -2), (3, -2), (3, 2), (-3, 2)], 0.25))
     assert [len(loop.corners) for loop in rectangle.loops] == [4]
     assert rectangle.loops[0].length == pytest.approx(20, rel=0.02)
@@ -298,12 +303,12 @@ def test_small_plates_without_and_with_a_hole():
 
 
 @pytest.mark.kernels
-def test_a_small_closed_cloud_has_no_boundary():
+def test_a_small_closed_cloud_has_no_boundary() -> None:
     assert found(ball(2.0, 500))[0].loops == ()
 
 
 @pytest.mark.kernels
-def test_same_cloud_same_bytes():
+def test_same_cloud_same_bytes() -> None:
     points = ring(1.2, 3.2, 0.25)
     a, b = found(points)[0], found(points.copy())[0]
     for p, q in zip(a.loops, b.loops, strict=True):
@@ -314,7 +319,7 @@ class Cancelled(Exception):
     pass
 
 
-def test_progress_is_reported_and_may_stop_the_search():
+def test_progress_is_reported_and_may_stop_the_search() -> None:
     said = []
     cloud, settings = st.PointCloud.from_array(sheet(6, 4, 0.2)), st.Settings(length=1.0)
     samples = st.sample_surface(cloud, settings)
@@ -322,7 +327,7 @@ def test_progress_is_reported_and_may_stop_the_search():
     assert {stage for stage, _ in said} == {"boundary"}
     assert [share for _, share in said] == sorted(share for _, share in said) and said[-1][1] == 1.0
 
-    def stop(stage, share):
+    def stop(stage: str, share: float) -> Never:
         raise Cancelled
 
     with pytest.raises(Cancelled):
@@ -330,7 +335,7 @@ def test_progress_is_reported_and_may_stop_the_search():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_disc_that_is_caught_on_its_way_rolls_the_other_way_round(seed):
+def test_a_disc_that_is_caught_on_its_way_rolls_the_other_way_round(seed: int) -> None:
     """The rim of what is seen from one side is over a hundred members long; rolled one way only, the disc never comes round.
 
     There is one hole, and a bay whose mouth is about as wide as the disc: with seed 2 it is closed, a second hole.

@@ -1,17 +1,20 @@
 """Search boxes find exactly what looking at every point finds (Sec. 3.2)."""
 
+from collections.abc import Iterable
+
 import naive
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from typed import xyz
 
-from scantruss.kernels.geometry.boxes import box_index, new_boxes, put, search, take
+from scantruss.kernels.geometry.boxes import SearchBoxes, box_index, new_boxes, put, search, take
 
 pytestmark = pytest.mark.kernels
 
 
-def filled(points, box):
+def filled(points: np.ndarray, box: float) -> SearchBoxes:
     """Boxes that hold all points."""
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), box, len(points), len(points))
     for i, p in enumerate(points):
@@ -19,13 +22,13 @@ def filled(points, box):
     return boxes
 
 
-def found_in(boxes, points, place, reach):
+def found_in(boxes: SearchBoxes, points: np.ndarray, place: Iterable[float], reach: float) -> list[int]:
     room = np.empty(len(points) + 1, np.int64)
-    return sorted(room[: search(boxes, points, *place, reach, room)].tolist())
+    return sorted(room[: search(boxes, points, *xyz(place), reach, room)].tolist())
 
 
 @st.composite
-def clouds(draw):
+def clouds(draw: st.DrawFn) -> np.ndarray:
     """Points in a box of any place and proportion, thin and flat ones too; some points twice."""
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     count = draw(st.integers(1, 60))
@@ -36,7 +39,7 @@ def clouds(draw):
 
 
 @given(clouds(), st.floats(0.05, 3.0), st.floats(0.0, 4.0), st.integers(0, 1000))
-def test_boxes_find_exactly_what_brute_force_finds(points, box, reach, seed):
+def test_boxes_find_exactly_what_brute_force_finds(points: np.ndarray, box: float, reach: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = filled(points, box)
     places = [points[0], points.mean(axis=0), points.min(axis=0) - 3.0, points.max(axis=0) + 0.5 * reach]
@@ -46,7 +49,7 @@ def test_boxes_find_exactly_what_brute_force_finds(points, box, reach, seed):
 
 
 @given(clouds(), st.floats(0.05, 3.0), st.integers(0, 1000))
-def test_what_was_taken_out_is_no_longer_found_and_can_come_back(points, box, seed):
+def test_what_was_taken_out_is_no_longer_found_and_can_come_back(points: np.ndarray, box: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     boxes = filled(points, box)
     gone = rng.permutation(len(points))[: len(points) // 2]
@@ -60,19 +63,19 @@ def test_what_was_taken_out_is_no_longer_found_and_can_come_back(points, box, se
     assert found_in(boxes, points, centre, 1e3) == list(range(len(points)))
 
 
-def test_taking_out_what_is_not_there_changes_nothing():
+def test_taking_out_what_is_not_there_changes_nothing() -> None:
     points = np.array([[0.0, 0, 0], [0.1, 0, 0], [5, 5, 5]])
     boxes = filled(points, 1.0)
     take(boxes, 2, 0.0, 0.0, 0.0)  # it is in another box
     assert found_in(boxes, points, (0.0, 0.0, 0.0), 10.0) == [0, 1, 2]
 
 
-def test_put_says_whether_the_box_was_new():
+def test_put_says_whether_the_box_was_new() -> None:
     boxes = new_boxes(np.zeros(3), np.full(3, 4.0), 1.0, 4, 4)
     assert [put(boxes, i, *p) for i, p in enumerate([(0.1, 0, 0), (0.2, 0, 0), (3.5, 0, 0)])] == [1, 0, 1]
 
 
-def test_no_more_is_returned_than_there_is_room_for():
+def test_no_more_is_returned_than_there_is_room_for() -> None:
     points = np.random.default_rng(0).random((50, 3))
     room = np.empty(7, np.int64)
     assert search(filled(points, 0.3), points, 0.5, 0.5, 0.5, 9.0, room) == 7
@@ -80,7 +83,7 @@ def test_no_more_is_returned_than_there_is_room_for():
 
 
 @given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
-def test_the_size_of_a_box_lies_between_half_of_what_was_asked_and_that(extent, box):
+def test_the_size_of_a_box_lies_between_half_of_what_was_asked_and_that(extent: float, box: float) -> None:
     boxes = new_boxes(np.full(3, -1.0), np.array([-1.0 + extent, -1.0, -1.0]), box, 1, 1)
     assume(extent < 1e5 * box)  # beyond that boxes grow, so that their number stays a number
     assert (boxes.size <= box * (1 + 1e-12)).all()
@@ -90,7 +93,7 @@ def test_the_size_of_a_box_lies_between_half_of_what_was_asked_and_that(extent, 
 
 
 @given(clouds(), st.floats(0.05, 3.0))
-def test_every_point_lies_in_the_box_of_its_index(points, box):
+def test_every_point_lies_in_the_box_of_its_index(points: np.ndarray, box: float) -> None:
     boxes = filled(points, box)
     for p in points:
         for axis in range(3):
@@ -101,7 +104,7 @@ def test_every_point_lies_in_the_box_of_its_index(points, box):
             assert 0 <= i < boxes.counts[axis]
 
 
-def test_places_outside_the_bounds_belong_to_the_outermost_box():
+def test_places_outside_the_bounds_belong_to_the_outermost_box() -> None:
     boxes = new_boxes(np.zeros(3), np.full(3, 4.0), 1.0, 1, 1)
     assert box_index(boxes, 0, -1e6) == 0
     assert box_index(boxes, 0, -1e-12) == 0
@@ -109,12 +112,12 @@ def test_places_outside_the_bounds_belong_to_the_outermost_box():
 
 
 @pytest.mark.parametrize("thickness", [1e-12, 1e-20, 1e-200])
-def test_a_hair_of_thickness_hides_no_point(thickness):
+def test_a_hair_of_thickness_hides_no_point(thickness: float) -> None:
     points = np.array([[0.0, 0, 0], [1, 0, thickness], [2, 1, 0], [2, 2, thickness]])
     assert found_in(filled(points, 1.0), points, (1.0, 0.0, 0.0), 5.0) == [0, 1, 2, 3]
 
 
-def test_very_many_boxes_cost_no_memory():
+def test_very_many_boxes_cost_no_memory() -> None:
     """Two clusters very far apart: only occupied boxes are kept."""
     points = np.array([[0.0, 0, 0], [1e6, 1e6, 1e6], [1e6 + 0.5, 1e6, 1e6]])
     boxes = filled(points, 1.0)

@@ -1,44 +1,48 @@
 """Multi-start: the flat list of attempts, which of them is kept, and what more effort leaves."""
 
+from collections.abc import Callable
 from itertools import pairwise, product
+from typing import Any, Never
 
 import numpy as np
 import pytest
-from shapes import make
+from shapes import Shape, make
 from small_clouds import cap, sheet
 from steps import steps_of
+from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.candidates import LENGTHS, attempts
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.equalize import grid_energy
+from scantruss.improve.optimize import improve_last
 
 
 @pytest.fixture(scope="module")
-def shape():
+def shape() -> Shape:
     return make("scallop", 20_000)
 
 
-def grid_of(shape, effort, **others):
+def grid_of(shape: Shape, effort: str, **others: Any) -> st.Grid:
     return st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, effort=effort), **others)
 
 
 # ---- attempts
 
 
-def size_of(settings):
+def size_of(settings: st.Settings) -> float | None:
     return settings.box_size and round(settings.box_size, 3)
 
 
-def listed(points, **settings):
+def listed(points: np.ndarray, **settings: Any) -> list[tuple[float, float | None, str]]:
     """What the attempts at a scan differ in: ridges, samples, method; each kind once."""
     cloud, asked = st.PointCloud.from_array(points), st.Settings(length=1.0, **settings)
     kinds = [(a.settings.ridge_angle, size_of(a.settings), a.settings.method) for a in attempts(cloud, asked)]
     return list(dict.fromkeys(kinds))
 
 
-def test_what_is_tried_in_which_order():
+def test_what_is_tried_in_which_order() -> None:
     ridge, coarser = st.Settings(length=1.0).ridge_angle, [0.22, 0.24, 0.26]
     rough, smooth = cap(4.0, 1.0, 0.25), sheet(8, 8, 0.04)
     folded = make("gable", 20_000).points / 5.0
@@ -52,9 +56,9 @@ def test_what_is_tried_in_which_order():
     assert listed(rough, method="paper") == [(ridge, None, "paper")]
 
 
-def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without():
+def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without() -> None:
     cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
-    by_kind: dict[tuple[object, ...], list[object]] = {}
+    by_kind: dict[tuple[object, ...], list[Any]] = {}
     for attempt in attempts(cloud, st.Settings(length=1.0)):
         by_kind.setdefault((attempt.settings.box_size, attempt.settings.method), []).append(attempt.starts)
     for (_, method), starts in by_kind.items():
@@ -63,11 +67,11 @@ def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without():
         assert [(way.scale, way.laid) for (way,) in lone] == [(share, False) for share in LENGTHS]
 
 
-def refusing(monkeypatch, passes):
+def refusing(monkeypatch: pytest.MonkeyPatch, passes: Callable[[Any], bool]) -> list[Any]:
     """Let only some attempts be made; returns those that were begun."""
     begun, make_grid = [], pipeline.make_grid
 
-    def chosen(cloud, attempt, **others):
+    def chosen(cloud: st.PointCloud, attempt: Any, **others: Any) -> st.Grid:
         begun.append(attempt)
         if not passes(attempt):
             raise FrontError(f"fault {len(begun)}")
@@ -78,14 +82,16 @@ def refusing(monkeypatch, passes):
 
 
 @pytest.mark.parametrize(("size", "method"), [(0.22, "default"), (0.26, "default"), (None, "paper")])
-def test_the_first_that_passes_is_the_grid_and_its_settings_say_so(monkeypatch, size, method):
+def test_the_first_that_passes_is_the_grid_and_its_settings_say_so(
+    monkeypatch: pytest.MonkeyPatch, size: float | None, method: str
+) -> None:
     refusing(monkeypatch, lambda a: (size_of(a.settings), a.settings.method) == (size, method))
     grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
-    assert (size_of(grid.settings), grid.settings.method) == (size, method)
-    assert grid.certificate.passed
+    assert (size_of(known(grid.settings)), known(grid.settings).method) == (size, method)
+    assert known(grid.certificate).passed
 
 
-def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch):
+def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     begun = refusing(monkeypatch, lambda _: False)
     with pytest.raises(FrontError, match="fault 1"):
         st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
@@ -93,18 +99,17 @@ def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_a_front_of_another_length_is_taken_where_the_first_fails(monkeypatch, method):
+def test_a_front_of_another_length_is_taken_where_the_first_fails(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
     refusing(monkeypatch, lambda a: a.starts is not None and a.starts[0].scale == LENGTHS[2])
     grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0, method=method))
-    assert grid.certificate.passed and grid.settings == st.Settings(length=1.0, method=method)
+    assert known(grid.certificate).passed and grid.settings == st.Settings(length=1.0, method=method)
 
 
-def test_a_grid_that_fails_its_check_comes_with_the_error_or_is_kept(monkeypatch):
+def test_a_grid_that_fails_its_check_comes_with_the_error_or_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """All grids lose a half: what is raised is the failed certificate of the first."""
-    finish = candidates.improve_last
 
-    def half(*arguments):
-        grid = finish(*arguments)
+    def half(*arguments: Any) -> st.Grid:
+        grid = improve_last(*arguments)
         left = grid.nodes[grid.triangles].mean(axis=1)[:, 0] < np.median(grid.nodes[:, 0])
         return grid.replace(triangles=grid.triangles[left])
 
@@ -115,13 +120,13 @@ def test_a_grid_that_fails_its_check_comes_with_the_error_or_is_kept(monkeypatch
     assert refused.value.where == refused.value.grid.certificate.faults[0].where
     assert not refused.value.grid.certificate.passed
     kept = st.grid_from_points(points, asked, keep_failed=True)
-    assert not kept.certificate.passed and kept.settings == asked
+    assert not known(kept.certificate).passed and kept.settings == asked
 
 
 # ---- several fronts
 
 
-def test_more_effort_leaves_less_energy():
+def test_more_effort_leaves_less_energy() -> None:
     """On the mean of some scans of some shapes, for a node, by more than twice what chance makes of such a mean."""
     energies = []
     for effort in ("quick", "normal", "best"):
@@ -136,7 +141,7 @@ def test_more_effort_leaves_less_energy():
         assert gained.mean() > 2.0 * gained.std(ddof=1) / np.sqrt(len(gained))
 
 
-def test_lengths_or_shapes_can_be_preferred(shape):
+def test_lengths_or_shapes_can_be_preferred(shape: Shape) -> None:
     quality = {
         prefer: st.grid_from_points(shape.points, st.Settings(length=1.4 * shape.length, prefer=prefer)).quality
         for prefer in ("lengths", "balance", "shapes")
@@ -145,7 +150,7 @@ def test_lengths_or_shapes_can_be_preferred(shape):
     assert quality["lengths"].shape_mean < quality["balance"].shape_mean < quality["shapes"].shape_mean
 
 
-def test_the_number_of_processors_makes_no_difference(shape, monkeypatch):
+def test_the_number_of_processors_makes_no_difference(shape: Shape, monkeypatch: pytest.MonkeyPatch) -> None:
     grids = []
     for count in (1, 2, 5):
         monkeypatch.setattr(candidates, "processors", lambda count=count: count)
@@ -155,16 +160,16 @@ def test_the_number_of_processors_makes_no_difference(shape, monkeypatch):
         assert grid.triangles.tobytes() == grids[0].triangles.tobytes()
 
 
-def test_the_quality_before_is_that_of_the_front_and_fixed_nodes_stay(shape):
+def test_the_quality_before_is_that_of_the_front_and_fixed_nodes_stay(shape: Shape) -> None:
     place = tuple(shape.points[7])
     settings = st.Settings(length=1.4 * shape.length, effort="best", fixed=(place,))
     grid = st.grid_from_points(shape.points, settings)
-    assert grid.before.length_cv > 1.3 * grid.quality.length_cv
+    assert known(grid.before).length_cv > 1.3 * grid.quality.length_cv
     assert np.linalg.norm(grid.nodes[grid.fixed] + grid.origin - place, axis=1).min() < 1e-9 * shape.length
     assert grid.settings == settings
 
 
-def test_progress_grows_to_the_end(shape):
+def test_progress_grows_to_the_end(shape: Shape) -> None:
     seen = []
     grid_of(shape, "best", progress=lambda stage, share: seen.append((stage, share)))
     shares = [share for stage, share in seen if stage == "optimize"]
@@ -172,7 +177,7 @@ def test_progress_grows_to_the_end(shape):
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal", "best"])
-def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape, effort):
+def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape: Shape, effort: str) -> None:
     """As the README shows them: the same bytes, the certificate included."""
     place = tuple(shape.points[7])
     cloud = st.PointCloud.from_array(shape.points)
@@ -185,16 +190,18 @@ def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape, effort)
     grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)
     whole = st.grid_from_points(shape.points, settings)
     assert grid.nodes.tobytes() == whole.nodes.tobytes() and grid.triangles.tobytes() == whole.triangles.tobytes()
-    assert grid.certificate == whole.certificate and grid.certificate.passed
+    assert grid.certificate == whole.certificate and known(grid.certificate).passed
 
 
-def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_raised(shape, monkeypatch):
+def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_raised(
+    shape: Shape, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length, effort="best")
     steps = steps_of(cloud, settings)
     fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
-    refused = []
+    refused: list[st.Grid] = []
 
-    def check(grid, *_):
+    def check(grid: st.Grid, *_: Any) -> st.Grid:
         if len(refused) < 3:
             refused.append(grid)
             raise FrontError(f"fault {len(refused)}")
@@ -205,7 +212,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
     grid = st.optimize_fronts(fronts, *steps, settings)
     assert len(refused) == 3 and grid.topology.manifold
 
-    def never(grid, *_):
+    def never(grid: st.Grid, *_: Any) -> Never:
         refused.append(grid)
         raise FrontError(f"fault {len(refused)}")
 

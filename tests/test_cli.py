@@ -9,9 +9,11 @@ import time
 from dataclasses import fields, replace
 from pathlib import Path
 from textwrap import indent
+from typing import Any
 
 import numpy as np
 import pytest
+from typed import known
 
 import scantruss as st
 from scantruss.cli import demo, grid
@@ -27,14 +29,14 @@ from scantruss.scan.cloud import PointCloud, measure_gap, measure_spacing
 LENGTH = "4"
 
 
-def plate(count=8000, seed=3):
+def plate(count: int = 8000, seed: int = 3) -> np.ndarray:
     """Points on a slightly arched plate of 40 x 30."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0, 40, count), rng.uniform(0, 30, count)
     return np.stack([x, y, 0.02 * x * (40 - x)], axis=1)
 
 
-def moebius(count=12000, seed=3):
+def moebius(count: int = 12000, seed: int = 3) -> np.ndarray:
     """Points on a one-sided strip, radius 40, width 24."""
     rng = np.random.default_rng(seed)
     turn, across = rng.uniform(0, 2 * np.pi, count), rng.uniform(-12, 12, count)
@@ -42,7 +44,7 @@ def moebius(count=12000, seed=3):
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), across * np.sin(turn / 2)], axis=1)
 
 
-def hexagon():
+def hexagon() -> Grid:
     """A grid of six triangles around one node."""
     turn = np.arange(6) * np.pi / 3
     nodes = np.vstack([np.zeros(3), np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)])
@@ -51,7 +53,7 @@ def hexagon():
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder with a scan in it, which is where the command runs."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
@@ -60,7 +62,7 @@ def place(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def ready(place, monkeypatch):
+def ready(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same, with a finished grid in place of the long work."""
     for command in (grid, demo):
         monkeypatch.setattr(command, "read_scan", lambda *_: PointCloud.from_array(plate()))
@@ -68,7 +70,7 @@ def ready(place, monkeypatch):
     return place
 
 
-def refused(capsys, *words, status=2):
+def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) -> str:
     """Run a command that must be refused; return the one line that it says."""
     names = sorted(entry.name for entry in os.scandir("."))
     assert main(words) == status
@@ -116,13 +118,17 @@ def refused(capsys, *words, status=2):
         ("demo a b", "too many arguments: b"),
     ],
 )
-def test_words_that_cannot_be_understood_are_refused(place, capsys, words, line):
+def test_words_that_cannot_be_understood_are_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], words: str, line: str
+) -> None:
     assert line in refused(capsys, *words.split())
 
 
 @pytest.mark.parametrize("length", ["0", "-3", "-.5", "-1e3", "nan", "inf", "-inf"])
 @pytest.mark.parametrize("command", ["grid scan.xyz a.obj", "info scan.xyz"])
-def test_a_length_that_is_no_positive_number_is_refused(place, capsys, command, length):
+def test_a_length_that_is_no_positive_number_is_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], command: str, length: str
+) -> None:
     assert "length must be a positive number" in refused(capsys, *command.split(), "--length", length)
 
 
@@ -140,7 +146,9 @@ def test_a_length_that_is_no_positive_number_is_refused(place, capsys, command, 
         ("folder.obj", "it is a folder"),
     ],
 )
-def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(place, capsys, monkeypatch, out, line):
+def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, out: str, line: str
+) -> None:
     (place / "folder.obj").mkdir()
     monkeypatch.setattr(grid, "read_scan", lambda *_: pytest.fail("the scan was read"))
     assert line in refused(capsys, "grid", "scan.xyz", "good.obj", out, "--length", LENGTH)
@@ -157,11 +165,13 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_scan_is_read(pla
         ("a.obj a.settings.json", "is where the settings of this run are saved"),
     ],
 )
-def test_outputs_in_each_others_way_are_refused(ready, capsys, words, line):
+def test_outputs_in_each_others_way_are_refused(
+    ready: Path, capsys: pytest.CaptureFixture[str], words: str, line: str
+) -> None:
     assert line in refused(capsys, "grid", "scan.xyz", *words.split(), "--length", LENGTH)
 
 
-def test_the_scan_is_never_overwritten(ready, capsys):
+def test_the_scan_is_never_overwritten(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (ready / "scan.ply").write_bytes(b"the scan")
     assert "would overwrite the scan" in refused(capsys, "grid", "scan.ply", "scan.ply", "--length", LENGTH)
 
@@ -179,14 +189,18 @@ WRONG = {
 )
 @pytest.mark.parametrize("kind", WRONG)
 @pytest.mark.parametrize("command", ["grid {} a.obj --length 4", "info {}"])
-def test_a_scan_that_is_not_what_its_suffix_says_is_refused(place, capsys, suffix, kind, command):
+def test_a_scan_that_is_not_what_its_suffix_says_is_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], suffix: str, kind: str, command: str
+) -> None:
     (place / f"bad{suffix}").write_bytes(WRONG[kind])
     assert f"bad{suffix}" in refused(capsys, *command.format(f"bad{suffix}").split())
 
 
 @pytest.mark.parametrize("command", ["grid {} a.obj --length 4", "info {}"])
 @pytest.mark.parametrize("name", ["missing.ply", "scan.docx", "folder.ply"])
-def test_a_scan_that_is_not_there_is_refused(place, capsys, command, name):
+def test_a_scan_that_is_not_there_is_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], command: str, name: str
+) -> None:
     (place / "folder.ply").mkdir()
     (place / "scan.docx").write_bytes(b"PK")
     assert name.partition(".")[2] in refused(capsys, *command.format(name).split())
@@ -204,7 +218,9 @@ def test_a_scan_that_is_not_there_is_refused(place, capsys, command, name):
     ids=["two points", "a line", "one place", "nan", "infinite"],
 )
 @pytest.mark.parametrize("command", ["grid bad.xyz a.obj --length 4", "info bad.xyz"])
-def test_points_that_span_no_surface_are_refused(place, capsys, points, line, command):
+def test_points_that_span_no_surface_are_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], points: np.ndarray, line: str, command: str
+) -> None:
     np.savetxt("bad.xyz", points)
     assert line in refused(capsys, *command.split())
 
@@ -213,7 +229,9 @@ def test_points_that_span_no_surface_are_refused(place, capsys, points, line, co
 
 
 @pytest.mark.parametrize("command", ["grid scan.xyz a.obj", "info scan.xyz"])
-def test_a_length_larger_than_the_scan_is_refused(place, capsys, command):
+def test_a_length_larger_than_the_scan_is_refused(
+    place: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
     line = refused(capsys, *command.split(), "--length", "41")
     assert "length 41 is too large for a scan whose longest side is 40; use at most " in line
     largest = float(line.split("at most")[1])
@@ -222,7 +240,9 @@ def test_a_length_larger_than_the_scan_is_refused(place, capsys, command):
     member_length.check_length(cloud, st.Settings(length=largest))
 
 
-def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(place, capsys):
+def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
     smallest = float(line.split("at least")[1].split()[0])
     cloud = PointCloud.from_array(plate())
@@ -234,7 +254,7 @@ def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(place,
         member_length.check_length(cloud, st.Settings(length=0.999 * least))
 
 
-def test_the_gap_is_that_of_a_known_pattern():
+def test_the_gap_is_that_of_a_known_pattern() -> None:
     x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
     triangular = np.stack([(x + 0.5 * (y % 2)).ravel(), (y * np.sqrt(0.75)).ravel(), 0 * x.ravel()], axis=1)
     assert measure_gap(7 * triangular) == pytest.approx(7)
@@ -242,13 +262,13 @@ def test_the_gap_is_that_of_a_known_pattern():
 
 
 @pytest.mark.parametrize("value", [1e-7, 0.0123, 0.99, 1.0, 9.99, 12345.6, 8e9])
-def test_rounding_keeps_two_digits_and_its_direction(value):
+def test_rounding_keeps_two_digits_and_its_direction(value: float) -> None:
     assert member_length.round_length(value, "down") <= value * (1 + 1e-9)
     assert member_length.round_length(value, "up") >= value * (1 - 1e-9)
     assert member_length.round_length(value, "nearest") == pytest.approx(value, rel=0.05)
 
 
-def test_a_one_sided_surface_is_refused(place, capsys):
+def test_a_one_sided_surface_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.savetxt("moebius.xyz", moebius(), fmt="%.6f")
     assert "one-sided" in refused(capsys, "grid", "moebius.xyz", "a.obj", "--length", "5")
 
@@ -256,7 +276,7 @@ def test_a_one_sided_surface_is_refused(place, capsys):
 # ---- refused: runs that end early ----------------------------------------------------------------------------------
 
 
-def test_a_full_disk_leaves_nothing_behind(ready, capsys):
+def test_a_full_disk_leaves_nothing_behind(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
     resource = pytest.importorskip("resource")
     kept = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
@@ -268,12 +288,16 @@ def test_a_full_disk_leaves_nothing_behind(ready, capsys):
 
 
 @pytest.mark.parametrize(("stop", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-def test_a_stopped_run_leaves_nothing_behind(ready, capsys, monkeypatch, stop, status):
+def test_a_stopped_run_leaves_nothing_behind(
+    ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, stop: signal.Signals, status: int
+) -> None:
     monkeypatch.setattr("scantruss.runtime.files.SaveTogether.json", lambda *_: os.kill(os.getpid(), stop))
     refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=status)
 
 
-def test_a_failing_run_keeps_the_files_of_the_run_before(ready, capsys, monkeypatch):
+def test_a_failing_run_keeps_the_files_of_the_run_before(
+    ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     (ready / "a.obj").write_text(before := "# ScanTruss 0.1.0, of the run before")
     error = FrontError("the front stopped", where=(1.0, 2.0, 3.0))
     monkeypatch.setattr("scantruss.runtime.files.SaveTogether.json", lambda *_: (_ for _ in ()).throw(error))
@@ -285,13 +309,13 @@ def test_a_failing_run_keeps_the_files_of_the_run_before(ready, capsys, monkeypa
 
 
 @pytest.mark.parametrize("words", [["--version"], ["grid", "no-such-file.ply", "grid.obj", "--length", "1"]])
-def test_a_command_leaves_the_signals_as_they_were(words, capsys):
+def test_a_command_leaves_the_signals_as_they_were(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     kept = signal.getsignal(signal.SIGTERM)
     main(words)
     assert signal.getsignal(signal.SIGTERM) == kept
 
 
-def test_help_and_version_import_nothing_heavy():
+def test_help_and_version_import_nothing_heavy() -> None:
     heavy = "numpy numba rich scipy trimesh laspy matplotlib"
     code = (
         "import sys, scantruss.cli.main as cli\n"
@@ -305,7 +329,7 @@ def test_help_and_version_import_nothing_heavy():
     assert f"scantruss {st.__version__}\n" in done.stdout
 
 
-def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
+def test_grid_writes_all_it_was_asked_for_and_its_settings(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fixed = "20,15,8"
     words = [
         "grid",
@@ -336,18 +360,20 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place, capsys):
 
 
 @pytest.fixture
-def failing(place, monkeypatch):
+def failing(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """No grid can pass."""
     monkeypatch.setattr("scantruss.check.defects.UNEVEN_LENGTHS", 0.0)
     return place
 
 
-def test_a_grid_that_fails_its_certificate_is_not_written(failing, capsys):
+def test_a_grid_that_fails_its_certificate_is_not_written(failing: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = refused(capsys, "grid", "scan.xyz", "a.json", "--length", LENGTH, status=3)
     assert "members whose lengths are" in line and "(near " in line
 
 
-def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(failing, capsys):
+def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(
+    failing: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = ["grid", "scan.xyz", "a.json", "a.obj", "--length", LENGTH, "--report", "r.json", "--keep-failed"]
     assert main(words) == 3
     said = capsys.readouterr()
@@ -357,10 +383,10 @@ def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(failing, c
     for name in ("a.json", "r.json"):
         certificate = json.loads((failing / name).read_text())["certificate"]
         assert certificate["passed"] is False and certificate["faults"][0]["kind"] == "uneven"
-    assert st.read_grid("a.json").certificate.faults[0].kind == "uneven"
+    assert known(st.read_grid("a.json").certificate).faults[0].kind == "uneven"
 
 
-def test_the_report_holds_every_figure(place):
+def test_the_report_holds_every_figure(place: Path) -> None:
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
     report = json.loads((place / "r.json").read_text())
     figures = (
@@ -386,7 +412,7 @@ def test_the_report_holds_every_figure(place):
     assert report["certificate"]["passed"] and report["certificate"]["faults"] == []
 
 
-def test_saved_settings_repeat_a_run_to_the_byte(place):
+def test_saved_settings_repeat_a_run_to_the_byte(place: Path) -> None:
     words = "--length 4 --merge-angle 85 --case3 quadrangle --fixed 20,15,8".split()
     assert main(["grid", "scan.xyz", "a.obj", "a.json", *words]) == 0
     assert main(["grid", "scan.xyz", "b.obj", "b.json", "--settings", "a.settings.json"]) == 0
@@ -396,7 +422,7 @@ def test_saved_settings_repeat_a_run_to_the_byte(place):
     assert st.Settings.read("c.settings.json") == st.Settings.read("a.settings.json").replace(length=5.0)
 
 
-def test_a_few_bad_points_are_left_out_and_counted(place, capsys):
+def test_a_few_bad_points_are_left_out_and_counted(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     points = plate()
     points[[5, 50]] = np.nan
     np.savetxt("scan.xyz", points)
@@ -405,7 +431,7 @@ def test_a_few_bad_points_are_left_out_and_counted(place, capsys):
     assert json.loads((place / "r.json").read_text())["points"] == 7998
 
 
-def test_pieces_that_are_too_small_are_counted(place, capsys):
+def test_pieces_that_are_too_small_are_counted(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     patch = 0.1 * plate() + np.array([200.0, 0.0, 0.0])
     np.savetxt("scan.xyz", np.concatenate([plate(), patch]))
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH]) == 0
@@ -413,7 +439,7 @@ def test_pieces_that_are_too_small_are_counted(place, capsys):
     assert "1 piece, " in said and " % of the scanned surface, left out" in said
 
 
-def test_info_says_what_a_length_can_be(place, capsys):
+def test_info_says_what_a_length_can_be(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "scan.xyz", "--unit", "mm"]) == 0
     said = capsys.readouterr().out
     for word in ("points   8000", "extent   ", "spacing  ", "unit     mm", "length   ", "external", "4"):
@@ -425,7 +451,7 @@ def test_info_says_what_a_length_can_be(place, capsys):
     assert "members of 3:" in capsys.readouterr().out
 
 
-def test_print_makes_a_watertight_solid_of_a_saved_grid(ready, capsys):
+def test_print_makes_a_watertight_solid_of_a_saved_grid(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import trimesh
 
     assert main(["grid", "scan.xyz", "a.json", "--length", LENGTH]) == 0
@@ -455,19 +481,21 @@ def test_print_makes_a_watertight_solid_of_a_saved_grid(ready, capsys):
         ("mm", "a.stl", ""),
     ],
 )
-def test_print_says_which_unit_a_printer_will_assume(place, capsys, unit, name, words):
+def test_print_says_which_unit_a_printer_will_assume(
+    place: Path, capsys: pytest.CaptureFixture[str], unit: str, name: str, words: str
+) -> None:
     write(replace(hexagon(), unit=unit), "a.json")
     assert main(["print", "a.json", name, "--member-diameter", "0.1", "--node-diameter", "0.2"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert len(said) == (2 if words else 1) and said[0].startswith(words)
 
 
-def test_places_of_national_grids_are_told_to_a_thousandth():
+def test_places_of_national_grids_are_told_to_a_thousandth() -> None:
     assert words_of_place((500052.25, 5400012.3456, 299.0621)) == "500052.25, 5400012.346, 299.062"
     assert words_of_place((0.00012345678, -12.5, -1000.0)) == "0.000123457, -12.5, -1000"
 
 
-def test_the_demo_makes_all_of_it(tmp_path, capsys):
+def test_the_demo_makes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", str(tmp_path / "deep" / "demo")]) == 0
     names = ["grid.json", "grid.obj", "grid.png", "grid.settings.json", "model.3mf", "report.json"]
     assert sorted(entry.name for entry in (tmp_path / "deep" / "demo").iterdir()) == names
@@ -476,14 +504,18 @@ def test_the_demo_makes_all_of_it(tmp_path, capsys):
     assert report["topology"]["boundary_loops"] == 0
 
 
-def test_a_demo_that_fails_takes_its_folder_away(ready, capsys, monkeypatch):
+def test_a_demo_that_fails_takes_its_folder_away(
+    ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(
         "scantruss.export.solid.print_model", lambda *_, **__: (_ for _ in ()).throw(OSError(28, "No space"))
     )
     assert "No space" in refused(capsys, "demo", "deep/demo")
 
 
-def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
+def test_a_fault_of_ours_is_one_line_too(
+    ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
     monkeypatch.setattr(grid, "make_grid", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
@@ -504,8 +536,10 @@ def test_a_fault_of_ours_is_one_line_too(ready, capsys, monkeypatch):
         (cli._Stopped(), 143),
     ],
 )
-def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(error, status, monkeypatch, capsys):
-    def run(_):
+def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(
+    error: BaseException | None, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(_: Any) -> None:
         if error is not None:
             raise error
 
@@ -520,7 +554,7 @@ def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(error, status
     assert indent(listed, "  ") in readme.read_text(encoding="utf-8")
 
 
-def test_the_command_itself_refuses_with_status_two(place):
+def test_the_command_itself_refuses_with_status_two(place: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "scantruss", "grid", "no.ply", "a.obj", "--length", "-3"], capture_output=True, text=True
     )
@@ -529,7 +563,9 @@ def test_the_command_itself_refuses_with_status_two(place):
     assert done.stdout == ""
 
 
-def test_the_second_file_of_a_table_overwrites_nothing(tmp_path, monkeypatch, capsys):
+def test_the_second_file_of_a_table_overwrites_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """grid.csv comes with grid_nodes.csv: that is neither the scan nor another output."""
     monkeypatch.chdir(tmp_path)
     scan = tmp_path / "shell_nodes.csv"
@@ -542,7 +578,7 @@ def test_the_second_file_of_a_table_overwrites_nothing(tmp_path, monkeypatch, ca
     assert "would overwrite the table of nodes" in capsys.readouterr().err
 
 
-def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised():
+def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised() -> None:
     points = plate() + [450_000.0, 5_400_000.0, 300.0]
     odd = points.copy()
     odd[np.random.default_rng(0).random(len(odd)) < 0.01] = 0.0
@@ -551,10 +587,12 @@ def test_points_for_no_echo_have_no_say_in_the_lengths_that_are_advised():
     assert member_length.length_range(with_zeros)[1] == pytest.approx(member_length.length_range(as_it_is)[1], rel=0.05)
 
 
-def test_a_stop_that_another_error_hides_is_still_a_stop(monkeypatch, capsys):
+def test_a_stop_that_another_error_hides_is_still_a_stop(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """A compiler that is interrupted ends with an error of its own."""
 
-    def interrupted(words):
+    def interrupted(words: Any) -> None:
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(10)

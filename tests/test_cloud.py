@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -65,8 +66,8 @@ def test_a_cloud_near_zero_keeps_its_coordinates() -> None:
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, np.longdouble, np.int16, np.int64, np.uint8])
 @pytest.mark.parametrize("order", ["C", "F"])
-def test_any_number_type_becomes_ordered_float64(dtype: type, order: str) -> None:
-    points = np.array([[0, 0, 0], [100, 0, 0], [0, 90, 0], [9, 9, 80]], dtype=dtype, order=order)
+def test_any_number_type_becomes_ordered_float64(dtype: type, order: Literal["C", "F"]) -> None:
+    points: np.ndarray = np.array([[0, 0, 0], [100, 0, 0], [0, 90, 0], [9, 9, 80]], dtype=dtype, order=order)
     cloud = PointCloud.from_array(points, unit="cm", name="a.ply")
     assert cloud.points.dtype == np.float64
     assert cloud.points.flags.c_contiguous

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import laspy
 import lazrs
@@ -49,7 +50,7 @@ DATA, ORDER = copc(P, levels=4)
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["one page", "pages"])
-def both(request, tmp_path_factory) -> tuple[Path, Path]:
+def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A COPC file with points that are withheld, and the same without its table, which is read whole."""
     tmp_path = tmp_path_factory.mktemp("both")
     data, _ = copc(P, levels=4, pages=request.param, classification=CLASS, withheld=WITHHELD, return_number=RETURN)
@@ -60,7 +61,9 @@ def both(request, tmp_path_factory) -> tuple[Path, Path]:
 
 @pytest.mark.parametrize("name", CROPS)
 @pytest.mark.parametrize("more", [{}, {"classes": (6,)}, {"returns": "first"}], ids=str)
-def test_points_and_their_order_are_those_of_the_whole_file(both, name: str, more: dict) -> None:
+def test_points_and_their_order_are_those_of_the_whole_file(
+    both: tuple[Path, Path], name: str, more: dict[str, Any]
+) -> None:
     selection = Selection(crop=CROPS[name], **more)
     found, wanted = (read_points(path, selection=selection) for path in both)
     assert len(found.points) > 10 and np.array_equal(found.points + found.origin, wanted.points + wanted.origin)
@@ -91,12 +94,12 @@ def test_points_in_a_box_are_those_that_another_reader_finds(tmp_path: Path) -> 
     assert np.allclose(cloud.points + cloud.origin, np.column_stack([record.x, record.y, record.z]), rtol=0, atol=1e-9)
 
 
-def test_only_what_lies_near_is_unpacked(tmp_path: Path, monkeypatch) -> None:
+def test_only_what_lies_near_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, selection, unpacked = tmp_path / "a.copc.laz", Selection(crop=(SMALL,), z_unit="m"), []
     path.write_bytes(DATA)
     real = lazrs.decompress_points_with_chunk_table
 
-    def spy(packed, described, out, chunks, *more):
+    def spy(packed: Any, described: Any, out: Any, chunks: Any, *more: Any) -> Any:
         unpacked.append((sum(points for points, _ in chunks), len(packed)))
         return real(packed, described, out, chunks, *more)
 
@@ -128,7 +131,9 @@ METRES, HEIGHTS_IN_FEET, FEET = units((3076, 9001)), units((3076, 9001), (4099, 
         (METRES, "foot", "", (1, 1, 1)),
     ],
 )
-def test_a_crop_is_in_the_unit_of_the_scan(tmp_path: Path, record, unit: str, z_unit: str, scale) -> None:
+def test_a_crop_is_in_the_unit_of_the_scan(
+    tmp_path: Path, record: tuple[bytes, int, bytes], unit: str, z_unit: str, scale: tuple[float, float, float]
+) -> None:
     path = tmp_path / "a.copc.laz"
     data, order = copc(P, levels=4, records=(record,))
     path.write_bytes(data)
@@ -251,13 +256,13 @@ def test_where_nothing_is_left_the_scan_is_described(tmp_path: Path) -> None:
         thin_scan(path, 1.0, selection=crop)
 
 
-def test_the_thinned_scan_is_that_of_the_whole_file(both) -> None:
+def test_the_thinned_scan_is_that_of_the_whole_file(both: tuple[Path, Path]) -> None:
     selection = Selection(crop=CROPS["polygon"])
     found, wanted = (thin_scan(path, 2.0, boundary=True, selection=selection) for path in both)
     assert found.points.tobytes() == wanted.points.tobytes() and found.read == wanted.read
 
 
-def test_points_that_are_not_read_take_no_memory(tmp_path: Path, monkeypatch) -> None:
+def test_points_that_are_not_read_take_no_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scantruss.scan.stream.fit.NEVER_TOO_MANY_POINTS", 100)
     path = tmp_path / "a.copc.laz"
     path.write_bytes(DATA)

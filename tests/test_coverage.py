@@ -9,6 +9,7 @@ from hypothesis import strategies as some
 from scipy.spatial import cKDTree
 from small_grids import dome
 from surfaces import distance_to_triangles
+from typed import xyz
 
 from scantruss.check.distances import boxes_of, distances_to_grid
 from scantruss.kernels.geometry.triangles import distance_to_triangle
@@ -47,7 +48,7 @@ def test_the_nearest_of_all_places_is_found(seed: int, spread: float) -> None:
 def test_the_distance_to_a_triangle_is_that_of_the_slow_twin(seed: int) -> None:
     rng = np.random.default_rng(seed)
     p, a, b, c = rng.integers(-3, 4, size=(4, 3)).astype(float)  # now and then flat, or one place
-    found = distance_to_triangle(*(tuple(map(float, x)) for x in (p, a, b, c)))
+    found = distance_to_triangle(xyz(p), xyz(a), xyz(b), xyz(c))
     assert found == pytest.approx(float(distance_to_triangles(p, a, b, c)), abs=1e-12)
 
 

@@ -3,6 +3,7 @@
 import importlib
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,7 +20,7 @@ def exists(name: str) -> bool:
         if (SOURCE.joinpath(*parts[:end])).with_suffix(".py").exists() or (
             SOURCE.joinpath(*parts[:end]) / "__init__.py"
         ).exists():
-            found = importlib.import_module(".".join(["scantruss", *parts[:end]]))
+            found: Any = importlib.import_module(".".join(["scantruss", *parts[:end]]))
             for part in parts[end:]:
                 found = getattr(found, part, None)
             return found is not None
@@ -27,7 +28,7 @@ def exists(name: str) -> bool:
 
 
 @pytest.mark.parametrize("page", ["paper-to-code.md", "api.md", "architecture.md", "choices.md", "limits.md"])
-def test_what_a_page_names_exists(page):
+def test_what_a_page_names_exists(page: str) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     packages = "|".join(path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py") and path.stem[0] != "_")
     names = set(re.findall(rf"`((?:{packages})\.[\w.]+)`", text)) - {"pipeline.py", "candidates.py", "settings.py"}
@@ -38,7 +39,7 @@ def test_what_a_page_names_exists(page):
 
 
 @pytest.mark.parametrize("page", sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")))
-def test_the_options_of_each_command_that_is_shown_exist(page):
+def test_the_options_of_each_command_that_is_shown_exist(page: str) -> None:
     for line in re.findall(r"^ +(scantruss \w+ .*)$", (DOCS / page).read_text(encoding="utf-8"), re.MULTILINE):
         words = line.split("#")[0].split()
         if words[1] in COMMANDS:
@@ -47,13 +48,13 @@ def test_the_options_of_each_command_that_is_shown_exist(page):
                 assert re.search(rf"(^|[\s,]){re.escape(option)}\b", known), f"{page}: {line}: {option}"
 
 
-def test_each_message_in_the_page_on_troubles_is_one_of_ours():
+def test_each_message_in_the_page_on_troubles_is_one_of_ours() -> None:
     said = " ".join(re.sub(r'"\s*\n\s*f?"', "", path.read_text(encoding="utf-8")) for path in SOURCE.rglob("*.py"))
     heads = re.findall(r'\*\*"([^"]+)"\*\*', (DOCS / "troubleshooting.md").read_text(encoding="utf-8"))
     assert len(heads) > 20
     assert [head for head in heads if head not in said] == []
 
 
-def test_every_page_is_in_the_navigation():
+def test_every_page_is_in_the_navigation() -> None:
     named = set(re.findall(r"([\w/-]+\.md)", (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")))
     assert {str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")} == named

@@ -1,5 +1,8 @@
 """Surfaces with edges: the front ends on all of them, because its segments are closed loops from the start on."""
 
+from collections.abc import Callable, Iterable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,16 +10,21 @@ from hypothesis import strategies as strategies
 from marks import compiled_only
 from small_clouds import HandFront, sheet
 from steps import steps_of
+from typed import known
 
 import scantruss as st
 from scantruss.constraints.embedded_lines import add_half_edges, check_links, link_around
 from scantruss.errors import FrontError
 from scantruss.front import advance as driver
+from scantruss.kernels.front import advance as kernels
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front import gaps
+from scantruss.kernels.front.front import Front
+from scantruss.kernels.surface.local_surface import Surface
+from scantruss.surface.samples import SurfaceSamples
 
 
-def groin_vault(rise, noise=0.02, half=36.0, count=60_000, seed=0):
+def groin_vault(rise: float, noise: float = 0.02, half: float = 36.0, count: int = 60_000, seed: int = 0) -> np.ndarray:
     """Two barrels that cross over a square: creases along both diagonals."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-half, half, (2, count))
@@ -25,7 +33,9 @@ def groin_vault(rise, noise=0.02, half=36.0, count=60_000, seed=0):
     return np.column_stack([x, y, z]) + noise * rng.normal(size=(count, 3))
 
 
-def folded(step, height, saw=0.5, noise=0.05, count=40_000, seed=0):
+def folded(
+    step: float, height: float, saw: float = 0.5, noise: float = 0.05, count: int = 40_000, seed: int = 0
+) -> np.ndarray:
     """A plate of parallel folds; with saw near 0 or 1 a sawtooth roof."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0, 60, count), rng.uniform(0, 40, count)
@@ -34,7 +44,7 @@ def folded(step, height, saw=0.5, noise=0.05, count=40_000, seed=0):
     return np.column_stack([x, y, z]) + noise * rng.normal(size=(count, 3))
 
 
-SURFACES = {
+SURFACES: dict[str, tuple[Callable[[], np.ndarray], float]] = {
     "groin vault 30": (lambda: groin_vault(30.0), 5.0),
     "groin vault 36": (lambda: groin_vault(36.0), 6.0),
     "groin vault 20": (lambda: groin_vault(20.0), 4.0),
@@ -43,7 +53,7 @@ SURFACES = {
 }
 
 
-def initial_front(name):
+def initial_front(name: str) -> tuple[Front, SurfaceSamples, st.Settings]:
     points, length = SURFACES[name]
     settings = st.Settings(length=length)
     samples, boundary, constraints = steps_of(st.PointCloud.from_array(points()), settings)
@@ -54,7 +64,7 @@ def initial_front(name):
     )
 
 
-def assert_closed_loops(front):
+def assert_closed_loops(front: Front) -> None:
     """Each segment is followed by one that begins where it ends, and no two by the same; each is listed at its tail."""
     count = int(front.count[lists.SEGMENTS])
     live = np.flatnonzero(front.state[:count] != lists.GONE)
@@ -69,20 +79,20 @@ def assert_closed_loops(front):
 
 
 @pytest.mark.parametrize("name", SURFACES)
-def test_the_segments_of_an_initial_front_are_closed_loops(name):
+def test_the_segments_of_an_initial_front_are_closed_loops(name: str) -> None:
     front, _, _ = initial_front(name)
     assert_closed_loops(front)
     check_links(front)
 
 
-def test_an_initial_front_that_is_not_closed_is_refused():
+def test_an_initial_front_that_is_not_closed_is_refused() -> None:
     front, _, _ = initial_front("folded plate")
     lists.link(front, 0, int(front.next[int(front.next[0])]))
     with pytest.raises(FrontError, match="two lines meet"):
         check_links(front)
 
 
-def test_each_gap_that_is_closed_or_cut_out_leaves_fewer_segments_in_closed_loops():
+def test_each_gap_that_is_closed_or_cut_out_leaves_fewer_segments_in_closed_loops() -> None:
     """The whole number that falls until nothing is left."""
     front, _, settings = initial_front("groin vault 30")
     loop, left = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64), np.inf
@@ -99,36 +109,38 @@ def test_each_gap_that_is_closed_or_cut_out_leaves_fewer_segments_in_closed_loop
 @compiled_only
 @pytest.mark.parametrize("effort", ["quick", "normal"])
 @pytest.mark.parametrize("name", SURFACES)
-def test_a_grid_comes_of_it_or_a_clear_refusal(name, effort):
+def test_a_grid_comes_of_it_or_a_clear_refusal(name: str, effort: str) -> None:
     points, length = SURFACES[name]
     try:
         grid = st.grid_from_points(points(), st.Settings(length=length, effort=effort))
     except FrontError as error:
         assert "the grid" in str(error)
     else:
-        assert grid.certificate.passed
+        assert known(grid.certificate).passed
 
 
 @compiled_only
 @pytest.mark.parametrize("name", SURFACES)
-def test_the_segments_are_closed_loops_from_the_start_to_the_last_gap(name, monkeypatch):
+def test_the_segments_are_closed_loops_from_the_start_to_the_last_gap(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """After each slice of the front, and before each gap, of which each leaves fewer segments."""
     points, length = SURFACES[name]
     settings = st.Settings(length=length)
     steps = steps_of(st.PointCloud.from_array(points()), settings)
-    advance, find, left = driver.kernels.advance, gaps.gap_loop, []
+    advance, find, left = kernels.advance, gaps.gap_loop, []
 
-    def look_after_a_slice(surface, front, *others):
+    def look_after_a_slice(surface: Surface, front: Front, *others: Any) -> int:
         status = advance(surface, front, *others)
         assert_closed_loops(front)
         return status
 
-    def look_before_a_gap(front, *others):
+    def look_before_a_gap(front: Front, *others: Any) -> int:
         assert_closed_loops(front)
         left.append(int((front.state[: front.count[lists.SEGMENTS]] != lists.GONE).sum()))
         return find(front, *others)
 
-    monkeypatch.setattr(driver.kernels, "advance", look_after_a_slice)
+    monkeypatch.setattr(kernels, "advance", look_after_a_slice)
     monkeypatch.setattr(gaps, "gap_loop", look_before_a_gap)
     try:
         st.advance_front(*steps, settings)
@@ -140,7 +152,7 @@ def test_the_segments_are_closed_loops_from_the_start_to_the_last_gap(name, monk
 PLATE = sheet(8.0, 8.0, 0.25)
 
 
-def add_lines_from(front, node, places):
+def add_lines_from(front: Front, node: int, places: Iterable[int]) -> None:
     """Add lines of one member each from a node to new nodes, these linked, the node not yet."""
     for far in places:
         add_half_edges(front, [node, far])
@@ -148,7 +160,7 @@ def add_lines_from(front, node, places):
 
 
 @given(strategies.lists(strategies.integers(0, 23), min_size=1, max_size=6), strategies.booleans())
-def test_lines_in_any_directions_leave_closed_loops(turns, on_boundary):
+def test_lines_in_any_directions_leave_closed_loops(turns: list[int], on_boundary: bool) -> None:
     """Lines from one node: several in one direction, some of them across the rim."""
     hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0)], points=PLATE)
     x, y = (0.0, 0.0) if on_boundary else (1.5, 1.5)
@@ -165,7 +177,7 @@ def test_lines_in_any_directions_leave_closed_loops(turns, on_boundary):
 
 
 @given(strategies.lists(strategies.integers(1, 11), min_size=1, max_size=5, unique=True))
-def test_the_rim_goes_out_and_back_along_each_line_in_the_order_in_which_they_stand(turns):
+def test_the_rim_goes_out_and_back_along_each_line_in_the_order_in_which_they_stand(turns: list[int]) -> None:
     """What comes along the rim turns into the line that is nearest, back from it into the next, and goes on along the rim."""
     hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (-3.0, 0.0)], points=PLATE)
     front, rim = hand.front, hand.segments[0]

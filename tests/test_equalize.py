@@ -1,12 +1,15 @@
 """Equalizing: one energy that falls, members of one length, a topology that stays; curves on which the rim slides."""
 
+from collections.abc import Callable
+
 import naive_grid as naive
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 from marks import compiled_only
-from rough import curve_of, rough_disc, rough_sphere, same_topology
+from rough import Rough, curve_of, rough_disc, rough_sphere, same_topology
+from typed import known, xyz
 
 from scantruss.improve.equalize import (
     LAST_RELAXATION,
@@ -19,36 +22,45 @@ from scantruss.improve.equalize import (
     search_once,
     settle,
 )
+from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.kernels.boundary import curves
 from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search
 from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
+<<<<<<< HEAD
 from scantruss.kernels.mesh.trial import total_energy
 from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
+=======
+from scantruss.kernels.mesh.trial import Scratch, total_energy
+>>>>>>> wc
 
-MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda **other: rough_disc(corners=True, **other)}
+MAKERS: dict[str, Callable[..., Rough]] = {
+    "disc": rough_disc,
+    "sphere": rough_sphere,
+    "plate": lambda **other: rough_disc(corners=True, **other),
+}
 
 
 @pytest.fixture(params=sorted(MAKERS))
-def rough(request):
+def rough(request: pytest.FixtureRequest) -> Rough:
     return MAKERS[request.param]()
 
 
-def test_the_slope_of_the_energy_agrees_with_differences():
+def test_the_slope_of_the_energy_agrees_with_differences() -> None:
     rough = rough_disc()
     mesh = rough.mesh()
     net, length = mesh.net, rough.settings.length
     for v in range(0, len(rough.grid.nodes), 5):
         place = net.nodes[v].copy()
-        slope = np.array(kernels.star_energy(net, mesh.patches, v, *place, length, 1.7, True)[1:])
+        slope = np.array(kernels.star_energy(net, mesh.patches, v, *xyz(place), length, 1.7, True)[1:])
         for c in range(3):
             step = np.eye(3)[c] * 1e-6
-            up = kernels.star_energy(net, mesh.patches, v, *(place + step), length, 1.7, False)[0]
-            down = kernels.star_energy(net, mesh.patches, v, *(place - step), length, 1.7, False)[0]
+            up = kernels.star_energy(net, mesh.patches, v, *xyz(place + step), length, 1.7, False)[0]
+            down = kernels.star_energy(net, mesh.patches, v, *xyz(place - step), length, 1.7, False)[0]
             assert slope[c] == pytest.approx((up - down) / 2e-6, abs=1e-4 / length)
 
 
-def test_the_energy_agrees_with_plain_loops(rough):
+def test_the_energy_agrees_with_plain_loops(rough: Rough) -> None:
     mesh = rough.mesh()
     scratch = new_scratch(mesh)
     energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, rough.settings.length, 1.7)
@@ -56,7 +68,7 @@ def test_the_energy_agrees_with_plain_loops(rough):
     assert mean == pytest.approx(rough.grid.lengths.mean()) and count == len(rough.grid.nodes)
 
 
-def test_a_fold_counts(rough):
+def test_a_fold_counts(rough: Rough) -> None:
     mesh = rough.mesh()
     net, length = mesh.net, rough.settings.length
     v = int(np.flatnonzero((net.degree > 0) & (net.kind == INTERIOR))[0])
@@ -69,7 +81,7 @@ def test_a_fold_counts(rough):
     assert naive.energy(healed, length, 0.0) < 0.2 * len(healed.triangles)
 
 
-def test_settling_never_raises_the_energy(rough):
+def test_settling_never_raises_the_energy(rough: Rough) -> None:
     mesh = rough.mesh()
     scratch, length = new_scratch(mesh), rough.settings.length
     at_rest = mesh.net.nodes[mesh.net.kind >= REST].copy()
@@ -82,7 +94,7 @@ def test_settling_never_raises_the_energy(rough):
     assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= REST])
 
 
-def test_a_move_that_does_not_pay_leaves_no_trace(rough):
+def test_a_move_that_does_not_pay_leaves_no_trace(rough: Rough) -> None:
     mesh = rough.mesh()
     net, scratch, length = mesh.net, new_scratch(mesh), rough.settings.length
     settle(mesh, LENGTH_WEIGHT, 1e-4, 20)
@@ -110,13 +122,13 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough):
     assert rings == [net.ring[v, : net.degree[v]].tolist() for v in np.flatnonzero(live)]
 
 
-def stated_energy(mesh, scratch):
+def stated_energy(mesh: WorkingMesh, scratch: Scratch) -> float:
     """The energy that the search lowers, but for the share of each node."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
     return energy + PRICE * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
 
 
-def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
+def test_the_search_lowers_the_energy_and_keeps_the_topology(rough: Rough) -> None:
     mesh = rough.mesh()
     settle(mesh, LENGTH_WEIGHT, 1e-4, 30)
     scratch = new_scratch(mesh)
@@ -128,7 +140,7 @@ def test_the_search_lowers_the_energy_and_keeps_the_topology(rough):
 
 @compiled_only
 @pytest.mark.parametrize("seed", range(4))
-def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
+def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed: int) -> None:
     """Also where much is folded: else neighbours could lower their own energies in turn for ever."""
     mesh = rough_sphere(count=160, seed=seed).mesh()
     net, rng = mesh.net, np.random.default_rng(seed)
@@ -148,7 +160,7 @@ def test_each_kept_move_lowers_the_energy_of_the_whole_grid(seed):
 
 
 @compiled_only
-def test_members_become_equal_and_triangles_regular(rough):
+def test_members_become_equal_and_triangles_regular(rough: Rough) -> None:
     mesh = rough.mesh()
     equalize(mesh)
     finish(mesh)
@@ -160,7 +172,7 @@ def test_members_become_equal_and_triangles_regular(rough):
     assert quality.length_cv < min(0.12, rough.grid.quality.length_cv)
     assert abs(quality.length_mean / length - 1) < 0.04
     assert quality.angle_min > 30
-    assert quality.node_deviation_mean < 0.01 * length
+    assert known(quality.node_deviation_mean) < 0.01 * length
     for corner in rough.corners:
         assert np.abs(after.nodes - corner).max(axis=1).min() == 0.0
     if len(rough.curves.total):
@@ -171,7 +183,7 @@ def test_members_become_equal_and_triangles_regular(rough):
 
 @compiled_only
 @pytest.mark.parametrize("stretch", [0.8, 1.25])
-def test_the_mean_length_comes_to_the_desired_one(stretch):
+def test_the_mean_length_comes_to_the_desired_one(stretch: float) -> None:
     rough = rough_disc(length=0.16)
     rough = rough._replace(settings=rough.settings.replace(length=0.16 * stretch))
     mesh = rough.mesh()
@@ -183,7 +195,7 @@ def test_the_mean_length_comes_to_the_desired_one(stretch):
 
 
 @compiled_only
-def test_the_same_grid_comes_out_twice(rough):
+def test_the_same_grid_comes_out_twice(rough: Rough) -> None:
     found = []
     for _ in range(2):
         mesh = rough.mesh()
@@ -194,7 +206,7 @@ def test_the_same_grid_comes_out_twice(rough):
     assert found[0].triangles.tobytes() == found[1].triangles.tobytes()
 
 
-def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough):
+def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough: Rough) -> None:
     mesh = rough.mesh()
     equalize(mesh)
     closed = mesh.close(rough.grid)
@@ -205,7 +217,7 @@ def test_a_grid_closed_while_it_settles_is_the_one_closed_when_it_has(rough):
         assert getattr(early, name).tobytes() == getattr(late, name).tobytes()
 
 
-def test_a_grid_in_disorder_is_mended():
+def test_a_grid_in_disorder_is_mended() -> None:
     rough = rough_disc(jitter=0.1)
     rng = np.random.default_rng(0)
     nodes = rough.grid.nodes.copy()
@@ -225,7 +237,7 @@ LOOP = np.array([(0, 0, 0), (1, 0, 0.2), (1.5, 1, 0), (0.5, 1.7, -0.3), (-0.4, 0
 
 
 @given(some.floats(-7, 13), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
-def test_places_on_a_curve_agree_with_sampling(arc, place):
+def test_places_on_a_curve_agree_with_sampling(arc: float, place: tuple[float, float, float]) -> None:
     rim = curve_of(LOOP)
     curve, at, distance = curves.nearest_on_curves(rim, *place)
     assert curve == 0 and distance == pytest.approx(naive.nearest_on_polyline(LOOP, np.array(place)), abs=2e-3)
@@ -236,7 +248,7 @@ def test_places_on_a_curve_agree_with_sampling(arc, place):
 
 
 @given(some.integers(0, 10_000), some.tuples(some.floats(-3, 3), some.floats(-3, 3), some.floats(-1, 1)))
-def test_no_place_on_a_long_curve_is_nearer_than_the_one_found(seed, place):
+def test_no_place_on_a_long_curve_is_nearer_than_the_one_found(seed: int, place: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(seed)
     angle = np.sort(rng.uniform(0, 2 * np.pi, 300))
     wide = 1.0 + 0.6 * np.cos(rng.integers(2, 9) * angle) + rng.normal(0, 0.03, 300)
@@ -246,7 +258,9 @@ def test_no_place_on_a_long_curve_is_nearer_than_the_one_found(seed, place):
 
 
 @given(some.floats(0, 5), some.floats(0.01, 1), some.tuples(some.floats(-1, 2), some.floats(-1, 2), some.floats(-1, 1)))
-def test_sliding_stays_within_reach_and_never_leads_away(arc, reach, place):
+def test_sliding_stays_within_reach_and_never_leads_away(
+    arc: float, reach: float, place: tuple[float, float, float]
+) -> None:
     rim = curve_of(LOOP)
     total = rim.total[0]
     arc, *start = curves.at_arc(rim, 0, arc)
@@ -256,13 +270,13 @@ def test_sliding_stays_within_reach_and_never_leads_away(arc, reach, place):
     assert np.linalg.norm(np.subtract(there, place)) <= np.linalg.norm(np.subtract(start, place)) + 1e-9
 
 
-def test_no_curve_is_nearest_where_there_is_none():
+def test_no_curve_is_nearest_where_there_is_none() -> None:
     from rough import no_boundary
 
     assert curves.nearest_on_curves(no_boundary(), 0.0, 0.0, 0.0)[0] == -1
 
 
-def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_length(rough):
+def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_length(rough: Rough) -> None:
     for share in (0.8, 1.0, 1.3):
         length = share * rough.settings.length
         stretch = np.mean(
@@ -274,8 +288,13 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
         assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
 
 
+<<<<<<< HEAD
 @pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.PATCH_REACH - 0.01, False)])
 def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
+=======
+@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
+def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away: float, moves: bool) -> None:
+>>>>>>> wc
     rough = rough_disc()
     mesh, length = rough.mesh(), rough.settings.length
     net = mesh.net
@@ -294,10 +313,10 @@ def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, m
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
 
 
-def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough):
+def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough: Rough) -> None:
     """Successive over-relaxation: what is uneven in the large goes slowly, node by node."""
 
-    def energy_after(sweeps, stride):
+    def energy_after(sweeps: int, stride: float) -> float:
         mesh = rough.mesh()
         settle(mesh, LENGTH_WEIGHT, 0.0, sweeps, stride)
         return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)[0]

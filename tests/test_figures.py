@@ -13,7 +13,7 @@ from scantruss.kernels.geometry.components import component_labels
 @pytest.mark.kernels
 @example(np.array([[1.0, 1, 1]] * 5 + [[0.0, 0, 0]]))
 @given(arrays.arrays(np.float64, (6, 3), elements=st.floats(-5, 5, width=16)))
-def test_angles_are_those_of_textbooks(nodes):
+def test_angles_are_those_of_textbooks(nodes: np.ndarray) -> None:
     triangles = np.array([(0, 1, 2), (3, 4, 5), (2, 5, 1)])
     for t, angles in zip(
         triangles, Grid(nodes, triangles, np.zeros(len(nodes), bool), np.zeros(3)).angles, strict=True
@@ -26,7 +26,7 @@ def test_angles_are_those_of_textbooks(nodes):
 
 @pytest.mark.kernels
 @given(st.integers(1, 30), st.lists(st.tuples(st.integers(0, 29), st.integers(0, 29)), max_size=40))
-def test_things_joined_by_links_have_the_lowest_of_them_as_label(count, links):
+def test_things_joined_by_links_have_the_lowest_of_them_as_label(count: int, links: list[tuple[int, int]]) -> None:
     pairs = np.array([(a % count, b % count) for a, b in links], np.int64).reshape(-1, 2)
     groups = {thing: {thing} for thing in range(count)}
     for a, b in pairs.tolist():

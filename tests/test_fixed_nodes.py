@@ -1,31 +1,37 @@
 """Fixed nodes: exactly in place, good triangles around them, refused in words where that is impossible."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from marks import compiled_only
-from rough import rough_disc, rough_sphere, same_topology
+from rough import Rough, rough_disc, rough_sphere, same_topology
 from steps import boundary_of, optimized
 
-from scantruss import InputError, Settings
+from scantruss import Grid, InputError, Settings
 
-MAKERS = {"disc": rough_disc, "sphere": rough_sphere, "plate": lambda: rough_disc(corners=True)}
+MAKERS: dict[str, Callable[[], Rough]] = {
+    "disc": rough_disc,
+    "sphere": rough_sphere,
+    "plate": lambda: rough_disc(corners=True),
+}
 
 
 @pytest.fixture(scope="module", params=sorted(MAKERS))
-def scene(request):
+def scene(request: pytest.FixtureRequest) -> Rough:
     rough = MAKERS[request.param]()
     return rough
 
 
-def angle_around(grid):
+def angle_around(grid: Grid) -> float:
     """Smallest angle of the triangles at fixed nodes [degree]."""
     return grid.angles[grid.fixed[grid.triangles].any(axis=1)].min()
 
 
-def spread_out(points, count, gap, seed):
+def spread_out(points: np.ndarray, count: int, gap: float, seed: int) -> np.ndarray:
     """Points of a cloud that keep a distance from each other."""
     rng = np.random.default_rng(seed)
-    chosen = []
+    chosen: list[np.ndarray] = []
     while len(chosen) < count:
         place = points[rng.integers(len(points))]
         if all(np.linalg.norm(place - other) >= gap for other in chosen):
@@ -36,7 +42,7 @@ def spread_out(points, count, gap, seed):
 @compiled_only
 @pytest.mark.parametrize("method", ["default", "paper"])
 @pytest.mark.parametrize("seed", range(2))
-def test_ten_fixed_nodes_anywhere(scene, method, seed):
+def test_ten_fixed_nodes_anywhere(scene: Rough, method: str, seed: int) -> None:
     rough = scene
     length = rough.settings.length
     places = spread_out(rough.cloud.points, 10, 1.3 * length, seed) + rough.cloud.origin
@@ -51,7 +57,7 @@ def test_ten_fixed_nodes_anywhere(scene, method, seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_two_fixed_nodes_half_a_member_apart(scene, seed):
+def test_two_fixed_nodes_half_a_member_apart(scene: Rough, seed: int) -> None:
     rough = scene
     points, length = rough.cloud.points, rough.settings.length
     rng = np.random.default_rng(seed)
@@ -65,7 +71,7 @@ def test_two_fixed_nodes_half_a_member_apart(scene, seed):
     assert angle_around(grid) > 18
 
 
-def test_positions_are_in_the_frame_of_the_scan():
+def test_positions_are_in_the_frame_of_the_scan() -> None:
     rough = rough_disc()
     far = rough.cloud.points + rough.cloud.origin + [5e5, 4e6, 100.0]
     from scantruss import PointCloud
@@ -79,7 +85,7 @@ def test_positions_are_in_the_frame_of_the_scan():
     assert np.abs(done.nodes[done.fixed] + done.origin - place).max() < 1e-8
 
 
-def test_a_corner_may_be_fixed_and_stays_one_node():
+def test_a_corner_may_be_fixed_and_stays_one_node() -> None:
     rough = rough_disc(corners=True)
     boundary = boundary_of(rough.cloud, rough.settings)
     nodes = rough.grid.nodes.copy()
@@ -92,7 +98,7 @@ def test_a_corner_may_be_fixed_and_stays_one_node():
     assert np.array_equal(done.nodes[done.fixed][0], boundary.corners[0])
 
 
-def test_settings_hold_the_positions_too():
+def test_settings_hold_the_positions_too() -> None:
     rough = rough_disc()
     place = (rough.cloud.points[5] + rough.cloud.origin).tolist()
     grid = optimized(rough.grid, rough.cloud, rough.settings.replace(fixed=(tuple(place),)))
@@ -100,7 +106,7 @@ def test_settings_hold_the_positions_too():
 
 
 @compiled_only
-def test_an_improved_grid_keeps_its_fixed_nodes_when_it_is_improved_again():
+def test_an_improved_grid_keeps_its_fixed_nodes_when_it_is_improved_again() -> None:
     rough = rough_disc()
     place = rough.cloud.points[5] + rough.cloud.origin
     once = optimized(rough.grid, rough.cloud, rough.settings, [place])
@@ -126,13 +132,13 @@ def test_an_improved_grid_keeps_its_fixed_nodes_when_it_is_improved_again():
         ([(1.3, 0, 0)], "away from the scan"),
     ],
 )
-def test_positions_that_cannot_be_are_refused(places, words):
+def test_positions_that_cannot_be_are_refused(places: list[tuple[float, float, float]], words: str) -> None:
     rough = rough_disc()
     with pytest.raises(InputError, match=words):
         optimized(rough.grid, rough.cloud, rough.settings, places)
 
 
-def test_a_refusal_names_the_unit():
+def test_a_refusal_names_the_unit() -> None:
     rough = rough_disc()
     from dataclasses import replace
 

@@ -9,17 +9,21 @@ import pytest
 
 import scantruss as st
 from scantruss.kernels.surface import folds
+<<<<<<< HEAD
 from scantruss.kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, fit_patch
+=======
+from scantruss.kernels.surface.local_surface import PATCH, Surface, fit_patch
+>>>>>>> wc
 
 pytestmark = pytest.mark.kernels
 
 
-def surface_of(points):
+def surface_of(points: np.ndarray) -> Surface:
     """Return the surface of points for members of length 1."""
     return st.sample_surface(st.PointCloud(points, np.zeros(3)), st.Settings(length=1.0)).surface
 
 
-def patch_at(surface, place, strength=1.0):
+def patch_at(surface: Surface, place: np.ndarray, strength: float = 1.0) -> tuple[np.ndarray, Surface]:
     """Return a patch fitted at a place, in two rows, and the surface."""
     patches = np.zeros((2, PATCH))
     sample = int(np.argmin(np.linalg.norm(surface.mean - place, axis=1)))
@@ -30,14 +34,14 @@ def patch_at(surface, place, strength=1.0):
 
 
 @cache
-def roof(rise):
+def roof(rise: float) -> Surface:
     """Return the surface of a gable of length 6 along y whose flanks rise by `rise` per unit."""
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
     return surface_of(np.column_stack([x, y, -rise * np.abs(x)]))
 
 
-def test_the_slope_is_that_of_the_energy_of_a_place():
+def test_the_slope_is_that_of_the_energy_of_a_place() -> None:
     patches, _ = patch_at(roof(1.0), np.array([0.2, 0.1, -0.2]))
     for place in np.random.default_rng(1).uniform(-0.3, 0.3, (20, 3)):
         change = [
@@ -47,7 +51,7 @@ def test_the_slope_is_that_of_the_energy_of_a_place():
         np.testing.assert_allclose(folds.fold_slope(patches, 0, *place), change, atol=1e-5)
 
 
-def test_the_middle_of_a_member_off_the_surface_falls_down_its_slope():
+def test_the_middle_of_a_member_off_the_surface_falls_down_its_slope() -> None:
     patches, _ = patch_at(roof(1.0), np.array([0.2, 0.1, -0.2]))
     for place in np.random.default_rng(1).uniform(-0.3, 0.3, (20, 3)) - [0.0, 0.0, 0.5]:
         slope = np.array(folds.chord_slope(patches, 0, 1, *place))
@@ -56,7 +60,7 @@ def test_the_middle_of_a_member_off_the_surface_falls_down_its_slope():
 
 
 @pytest.mark.parametrize("rise", [1.0, 1.5])
-def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise):
+def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise: float) -> None:
     patches, surface = patch_at(roof(rise), np.array([0.2, 0.0, -0.2 * rise]))
     energies = [folds.fold_energy(patches, 0, x, 0.0, -rise * abs(x)) for x in np.linspace(-0.4, 0.4, 81)]
     assert abs(np.linspace(-0.4, 0.4, 81)[np.argmin(energies)]) < 0.15  # from 0.2
@@ -67,7 +71,7 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise):
     assert np.hypot(crest[0], crest[2]) < np.hypot(beside[0], beside[2])
 
 
-def test_a_gentle_bend_is_no_fold():
+def test_a_gentle_bend_is_no_fold() -> None:
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
     patches, surface = patch_at(surface_of(np.column_stack([x, y, -0.1 * (x * x + y * y)])), np.zeros(3))

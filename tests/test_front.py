@@ -1,6 +1,8 @@
 """The advancing front leaves a right grid behind: manifold, of the right topology, facing outwards, from rim to rim."""
 
+from collections.abc import Callable, Iterable
 from functools import cache
+from typing import Any, Never
 
 import naive
 import numpy as np
@@ -18,24 +20,26 @@ from scantruss.kernels.front import front as lists
 from scantruss.kernels.front import gaps
 from scantruss.kernels.front.cases import choose_by_case
 from scantruss.kernels.front.fits import near_nodes
+from scantruss.kernels.front.front import Front
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.geometry.triangles import shape_quality
+from scantruss.surface.samples import SurfaceSamples
 
 METHODS = ("default", "paper")
 
 
-def advanced(points, length=1.0, **others):
+def advanced(points: np.ndarray, length: float = 1.0, **others: Any) -> tuple[st.Grid, st.Boundary]:
     """Grid and boundary of points; the nodes of the grid relative to its origin."""
     cloud, own = st.PointCloud.from_array(points), st.Settings(length=length, **others)
     return front_of(cloud, own, FieldStart() if own.method == "default" else None), boundary_of(cloud, own)
 
 
-def jittered(points, amount=0.02, seed=7):
+def jittered(points: np.ndarray, amount: float = 0.02, seed: int = 7) -> np.ndarray:
     """No two distances alike, so that rounding decides nothing."""
     return points + amount * np.random.default_rng(seed).uniform(-1, 1, points.shape)
 
 
-CLOUDS = {  # points, components, loops, Euler number
+CLOUDS: dict[str, tuple[Callable[[], np.ndarray], int, int, int]] = {  # points, components, loops, Euler number
     "plate": (lambda: sheet(9, 7, 0.2), 1, 1, 1),
     "annulus": (lambda: ring(2.0, 6.0, 0.2), 1, 2, 0),
     "dome": (lambda: cap(5.0, 1.2, 0.2), 1, 1, 1),
@@ -47,7 +51,7 @@ CLOUDS = {  # points, components, loops, Euler number
 
 
 @cache
-def example(name, method):
+def example(name: str, method: str) -> tuple[st.Grid, st.Boundary, np.ndarray]:
     """Grid, boundary and cloud of one of the clouds."""
     points = CLOUDS[name][0]()
     return *advanced(points, method=method), points
@@ -55,7 +59,7 @@ def example(name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
-def test_the_grid_is_manifold_and_its_topology_that_of_the_cloud(name, method):
+def test_the_grid_is_manifold_and_its_topology_that_of_the_cloud(name: str, method: str) -> None:
     grid, _, _ = example(name, method)
     assert naive.faults(grid.triangles) == []
     assert naive.topology(grid.triangles) == CLOUDS[name][1:]
@@ -64,7 +68,7 @@ def test_the_grid_is_manifold_and_its_topology_that_of_the_cloud(name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("tube", [0.55, 0.7])
-def test_a_thin_tube_stays_open(tube, method):
+def test_a_thin_tube_stays_open(tube: float, method: str) -> None:
     """Three or four members round: what faces a triangle from across the tube does not stop it."""
     grid, _ = advanced(tire(5.0, tube, 0.15), method=method)
     assert naive.faults(grid.triangles) == []
@@ -73,7 +77,7 @@ def test_a_thin_tube_stays_open(tube, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
-def test_the_whole_cloud_is_covered_once(name, method):
+def test_the_whole_cloud_is_covered_once(name: str, method: str) -> None:
     """No point is farther from the nearest node than 1.2 members, and the areas of the triangles add up to that of the cloud."""
     grid, _, points = example(name, method)
     area = {"plate": 63.0, "annulus": 32 * np.pi, "dome": 50 * np.pi * (1 - np.cos(1.2)), "ball": 64 * np.pi,
@@ -86,7 +90,7 @@ def test_the_whole_cloud_is_covered_once(name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
-def test_triangles_are_anticlockwise_seen_from_outside(name, method):
+def test_triangles_are_anticlockwise_seen_from_outside(name: str, method: str) -> None:
     grid, _, _ = example(name, method)
     a, b, c = (grid.nodes[grid.triangles[:, k]] + grid.origin for k in range(3))
     face, middle = np.cross(b - a, c - a), (a + b + c) / 3
@@ -104,7 +108,7 @@ def test_triangles_are_anticlockwise_seen_from_outside(name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
-def test_every_boundary_segment_is_an_edge_with_one_triangle(name, method):
+def test_every_boundary_segment_is_an_edge_with_one_triangle(name: str, method: str) -> None:
     """And nothing else is open: the rim of the grid is the divided boundary."""
     grid, boundary, _ = example(name, method)
     edges = naive.directed_edges(grid.triangles)
@@ -120,7 +124,7 @@ def test_every_boundary_segment_is_an_edge_with_one_triangle(name, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
-def test_members_are_about_as_long_as_desired(name, method):
+def test_members_are_about_as_long_as_desired(name: str, method: str) -> None:
     grid, _, _ = example(name, method)
     assert grid.lengths.mean() == pytest.approx(1.0, abs=0.15)
     assert grid.lengths.max() < 2.5
@@ -132,7 +136,7 @@ def test_members_are_about_as_long_as_desired(name, method):
 @pytest.mark.parametrize(
     "points", [sheet(4, 3, 0.25), ring(1.2, 3.0, 0.25), ball(1.5, 450)], ids=["plate", "ring", "ball"]
 )
-def test_small_clouds(points, method):
+def test_small_clouds(points: np.ndarray, method: str) -> None:
     grid, boundary = advanced(points, method=method)
     assert naive.faults(grid.triangles) == []
     loops = len(boundary.loops)
@@ -141,14 +145,14 @@ def test_small_clouds(points, method):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("method", METHODS)
-def test_same_cloud_same_bytes(method):
+def test_same_cloud_same_bytes(method: str) -> None:
     a, b = (advanced(sheet(4, 3, 0.25), method=method)[0] for _ in range(2))
     assert a.nodes.tobytes() == b.nodes.tobytes() and a.triangles.tobytes() == b.triangles.tobytes()
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("budget", [1, 7, 1_000_000])
-def test_the_step_budget_makes_no_difference(budget, method, monkeypatch):
+def test_the_step_budget_makes_no_difference(budget: int, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     grid, _, points = example("annulus", method)
     monkeypatch.setattr(driver, "BUDGET", budget)
     again, _ = advanced(points, method=method)
@@ -157,21 +161,21 @@ def test_the_step_budget_makes_no_difference(budget, method, monkeypatch):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["annulus", "ball", "torus", "pieces"])
-def test_the_growth_of_the_arrays_makes_no_difference(name, method, monkeypatch):
+def test_the_growth_of_the_arrays_makes_no_difference(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A front with hardly more room than its boundary needs grows on the way."""
     grid, boundary, points = example(name, method)
     need = 6 + sum(len(characteristic_points(loop, 1.0)[0]) for loop in boundary.loops)
     large, grow, grown = driver.new_front, driver.grown, []
 
-    def small(samples, own):
+    def small(samples: SurfaceSamples, own: st.Settings) -> lists.Front:
         front = large(samples, own)
         room = len(front.nodes)
         arrays = [a[: len(a) * need // room].copy() for a in front[:-2]]
         mean = samples.surface.mean
         boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), own.length, need, need)
-        return lists.Front(*arrays, front.count, boxes)
+        return lists.Front._make([*arrays, front.count, boxes])
 
-    def count(front):
+    def count(front: Front) -> lists.Front:
         grown.append(len(front.nodes))
         return grow(front)
 
@@ -183,7 +187,7 @@ def test_the_growth_of_the_arrays_makes_no_difference(name, method, monkeypatch)
 
 
 @pytest.mark.kernels
-def test_a_grown_front_keeps_what_it_holds():
+def test_a_grown_front_keeps_what_it_holds() -> None:
     """Nodes that were merged away do not come back into the boxes."""
     places = [(0, 0), (1, 0), (0.8, 0.95), (3.2, 1), (3.2, 2.6), (0.5, 3.2), (-2.2, 2.6), (-2.2, 1), (0.2, 0.95)]
     hand = HandFront(places, inner=(2, 8), method="paper")
@@ -199,7 +203,7 @@ def test_a_grown_front_keeps_what_it_holds():
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["dome", "torus"])
-def test_a_turned_shifted_scaled_cloud_has_the_same_grid(name, method):
+def test_a_turned_shifted_scaled_cloud_has_the_same_grid(name: str, method: str) -> None:
     """The same triangles, and nodes that differ by rounding (a millionth of a member).
 
     This holds where no two distances of the cloud are alike, so that rounding decides nothing, and where the outside is
@@ -224,7 +228,7 @@ def test_a_turned_shifted_scaled_cloud_has_the_same_grid(name, method):
 # Rubbish
 
 
-def rubbish(seed):
+def rubbish(seed: int) -> np.ndarray:
     """A few hundred random points: a ball of chance, a thick or crumpled sheet, or several of them through each other."""
     rng = np.random.default_rng(seed)
     parts = []
@@ -236,7 +240,7 @@ def rubbish(seed):
     return np.concatenate(parts)
 
 
-def assert_sound_or_refused(points, length, method):
+def assert_sound_or_refused(points: np.ndarray, length: float, method: str) -> None:
     """No edge has more than two triangles, none is used twice in one direction; nothing but our own errors is raised."""
     try:
         grid, _ = advanced(points, length, method=method)
@@ -248,21 +252,21 @@ def assert_sound_or_refused(points, length, method):
 
 @settings(max_examples=150)
 @given(strategies.integers(0, 1_000_000), strategies.sampled_from([0.4, 0.7, 1.2]), strategies.sampled_from(METHODS))
-def test_rubbish_leaves_no_edge_with_three_triangles_or_is_refused(seed, length, method):
+def test_rubbish_leaves_no_edge_with_three_triangles_or_is_refused(seed: int, length: float, method: str) -> None:
     assert_sound_or_refused(rubbish(seed), length, method)
 
 
 @pytest.mark.kernels
 @settings(max_examples=6)
 @given(strategies.integers(0, 1_000_000), strategies.sampled_from(METHODS))
-def test_rubbish_leaves_no_kernel_out_of_bounds(seed, method):
+def test_rubbish_leaves_no_kernel_out_of_bounds(seed: int, method: str) -> None:
     assert_sound_or_refused(rubbish(seed), 0.7, method)
 
 
 # Gaps
 
 
-def polygon(count, seed):
+def polygon(count: int, seed: int) -> np.ndarray:
     """A wavy polygon, star-shaped and anticlockwise."""
     rng = np.random.default_rng(seed)
     turn = 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
@@ -271,11 +275,11 @@ def polygon(count, seed):
 
 
 @cache
-def plate_points():
+def plate_points() -> np.ndarray:
     return sheet(8, 8, 0.5)
 
 
-def gap_of(hand, s=0):
+def gap_of(hand: HandFront, s: int = 0) -> tuple[np.ndarray, int]:
     loop = np.empty(200, np.int64)
     return loop, gaps.gap_loop(hand.front, s, loop)
 
@@ -283,7 +287,7 @@ def gap_of(hand, s=0):
 @pytest.mark.kernels
 @settings(max_examples=30)
 @given(strategies.integers(3, 12), strategies.integers(0, 1000))
-def test_a_gap_is_filled_with_two_triangles_fewer_than_it_has_nodes(count, seed):
+def test_a_gap_is_filled_with_two_triangles_fewer_than_it_has_nodes(count: int, seed: int) -> None:
     hand = HandFront(polygon(count, seed), points=plate_points(), length=2.0)
     loop, found = gap_of(hand)
     assert found == count
@@ -299,10 +303,10 @@ def test_a_gap_is_filled_with_two_triangles_fewer_than_it_has_nodes(count, seed)
 @pytest.mark.kernels
 @settings(max_examples=20)
 @given(strategies.integers(4, 8), strategies.integers(0, 1000))
-def test_no_other_way_of_filling_a_gap_costs_less(count, seed):
+def test_no_other_way_of_filling_a_gap_costs_less(count: int, seed: int) -> None:
     hand = HandFront(polygon(count, seed), points=plate_points(), length=2.0)
 
-    def cost(way):
+    def cost(way: Iterable[tuple[int, int, int]]) -> float:
         return sum(gaps.triangle_cost(hand.front, i, k, j, 2.0) for i, k, j in way)
 
     best = min(cost(way) for way in naive.triangulations(count))
@@ -312,7 +316,7 @@ def test_no_other_way_of_filling_a_gap_costs_less(count, seed):
 
 
 @pytest.mark.kernels
-def test_the_cost_of_a_triangle_grows_as_it_gets_worse():
+def test_the_cost_of_a_triangle_grows_as_it_gets_worse() -> None:
     """Worse shape, a side of more than one and a half members, facing downwards."""
     hand = HandFront([(0, 0), (1, 0), (0.5, 0.866), (0.5, 0.2), (0, 3)], points=plate_points())
     best = gaps.triangle_cost(hand.front, 0, 1, 2, 1.0)
@@ -324,13 +328,13 @@ def test_the_cost_of_a_triangle_grows_as_it_gets_worse():
 
 
 @pytest.mark.kernels
-def test_a_gap_never_repeats_an_edge():
+def test_a_gap_never_repeats_an_edge() -> None:
     """The diagonal of this square is an edge of the grid already: the other diagonal is taken."""
     corners = [(0, 0), (2, 0), (2.2, 2.2), (0, 2)]
     free = HandFront(corners, points=plate_points(), length=2.0)
     loop, count = gap_of(free)
     gaps.close_gap(free.front, loop, count, 2.0)
-    (taken,) = {tuple(sorted(e)) for e in naive.directed_edges(free.front.triangles[:2])} & {(0, 2), (1, 3)}
+    (taken,) = {(min(e), max(e)) for e in naive.directed_edges(free.front.triangles[:2])} & {(0, 2), (1, 3)}
     hand = HandFront(corners, points=plate_points(), length=2.0)
     lists.add_triangle(hand.front, *taken, hand.add_node(-3, -3))
     loop, count = gap_of(hand)
@@ -341,7 +345,7 @@ def test_a_gap_never_repeats_an_edge():
 
 
 @pytest.mark.kernels
-def test_triangles_at_the_nodes_of_a_gap_do_not_forbid_its_diagonals():
+def test_triangles_at_the_nodes_of_a_gap_do_not_forbid_its_diagonals() -> None:
     corners = [(0, 0), (2, 0), (2.2, 2.2), (0, 2)]
     free, hand = (HandFront(corners, points=plate_points(), length=2.0) for _ in range(2))
     for n in range(4):
@@ -353,7 +357,7 @@ def test_triangles_at_the_nodes_of_a_gap_do_not_forbid_its_diagonals():
 
 
 @pytest.mark.kernels
-def test_every_edge_of_every_triangle_exists():
+def test_every_edge_of_every_triangle_exists() -> None:
     """Of a fan around node 0 and of the front; nothing else does."""
     angles = np.arange(5) * 2 * np.pi / 5
     hand = HandFront([(-2, -2), (2, -2), (2, 2), (-2, 2)], points=plate_points(), length=2.0)
@@ -362,7 +366,7 @@ def test_every_edge_of_every_triangle_exists():
     for k in range(5):
         a, b, c = ids[0], ids[k + 1], ids[(k + 1) % 5 + 1]
         lists.add_triangle(hand.front, a, b, c)
-        edges |= {tuple(sorted(e)) for e in ((a, b), (b, c), (c, a))}
+        edges |= {(min(e), max(e)) for e in ((a, b), (b, c), (c, a))}
     for a in range(10):
         for b in range(10):
             if a != b:
@@ -370,7 +374,7 @@ def test_every_edge_of_every_triangle_exists():
 
 
 @pytest.mark.kernels
-def test_a_gap_that_no_triangles_fit_stays_open():
+def test_a_gap_that_no_triangles_fit_stays_open() -> None:
     """Both diagonals are edges already."""
     hand = HandFront([(0, 0), (2, 0), (2, 2), (0, 2)], points=plate_points(), length=2.0)
     lists.add_triangle(hand.front, 0, 2, hand.add_node(-3, -3))
@@ -381,7 +385,7 @@ def test_a_gap_that_no_triangles_fit_stays_open():
 
 
 @pytest.mark.kernels
-def test_a_loop_that_meets_a_node_twice_is_taken_apart_there():
+def test_a_loop_that_meets_a_node_twice_is_taken_apart_there() -> None:
     """Two triangles that touch at node 2: the gap is the part between two visits of it."""
     hand = HandFront([(0, 0), (2, -1), (2, 1)], [(3, 0), (4, -1), (4, 1)], points=plate_points(), length=2.0)
     front, (a, b) = hand.front, hand.segments
@@ -403,7 +407,7 @@ class Cancelled(Exception):
     pass
 
 
-def test_progress_is_reported_and_may_stop_the_front():
+def test_progress_is_reported_and_may_stop_the_front() -> None:
     said = []
     cloud, own = st.PointCloud.from_array(sheet(9, 7, 0.2)), st.Settings(length=1.0)
     steps = steps_of(cloud, own)
@@ -411,7 +415,7 @@ def test_progress_is_reported_and_may_stop_the_front():
     assert {stage for stage, _ in said} == {"front"}
     assert all(0 <= share <= 1 for _, share in said)
 
-    def stop(stage, share):
+    def stop(stage: str, share: float) -> Never:
         raise Cancelled
 
     with pytest.raises(Cancelled):

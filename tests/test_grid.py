@@ -1,20 +1,28 @@
 """The net of rings and its three moves: the topology of a grid never changes."""
 
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from rough import rough_disc, rough_sphere, same_topology, strip_of
+from rough import Rough, rough_disc, rough_sphere, same_topology, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
+from scantruss import Grid
 from scantruss.improve.working_mesh import close_net, join_again, open_net
 from scantruss.kernels.mesh import grid as kernels
+from scantruss.kernels.mesh.grid import Net
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.2), (2, 1, 0), (3, 0, 1)]
-SOUND = {"fan": fan, "icosahedron": icosahedron, "dome": lambda: dome(6), "ring": lambda: strip_of(9)}
-BROKEN = {
+SOUND: dict[str, Callable[[], Grid]] = {
+    "fan": fan,
+    "icosahedron": icosahedron,
+    "dome": lambda: dome(6),
+    "ring": lambda: strip_of(9),
+}
+BROKEN: dict[str, Callable[[], Grid]] = {
     "pinched": lambda: make_grid(CORNERS, [(0, 1, 2), (2, 3, 4)]),
     "three at an edge": lambda: make_grid(CORNERS, [(0, 1, 2), (1, 0, 3), (0, 1, 4)]),
     "moebius": lambda: strip_of(9, 1),
@@ -28,12 +36,12 @@ BROKEN = {
 }
 
 
-def facing(grid):
+def facing(grid: Grid) -> Counter[tuple[int, ...]]:
     """Triangles, each from its smallest node on."""
     return Counter(tuple(np.roll(t, -int(np.argmin(t))).tolist()) for t in grid.triangles)
 
 
-def test_edges_and_their_triangles():
+def test_edges_and_their_triangles() -> None:
     grid = fan()
     assert grid.edges.tolist() == sorted(grid.edges.tolist()) and len(grid.edges) == 12
     for (a, b), (one, other) in zip(grid.edges.tolist(), grid.edge_triangles.tolist(), strict=True):
@@ -46,7 +54,7 @@ OF_TRIANGLES = "edges", "edge_uses", "edge_triangles", "boundary_loops", "topolo
 
 
 @pytest.mark.parametrize("name", [*SOUND, *BROKEN])
-def test_what_follows_from_the_triangles_alone_goes_along_with_them(name):
+def test_what_follows_from_the_triangles_alone_goes_along_with_them(name: str) -> None:
     grid = (SOUND | BROKEN)[name]()
     before = [getattr(grid, each) for each in OF_TRIANGLES]
     moved = grid.replace(nodes=grid.nodes + grid.nodes[::-1] ** 2)
@@ -59,7 +67,7 @@ def test_what_follows_from_the_triangles_alone_goes_along_with_them(name):
         assert other.edge_uses.sum() == 3 * len(other.triangles)
 
 
-def test_boundary_loops_run_with_their_triangles():
+def test_boundary_loops_run_with_their_triangles() -> None:
     (loop,) = fan().boundary_loops
     assert sorted(loop.tolist()) == [1, 2, 3, 4, 5, 6]
     assert all((b - a) % 6 == 1 for a, b in zip(loop, np.roll(loop, -1), strict=True))
@@ -68,7 +76,7 @@ def test_boundary_loops_run_with_their_triangles():
 
 
 @pytest.mark.parametrize("name", [*SOUND, *BROKEN])
-def test_a_net_closes_to_the_grid_it_was_opened_from(name):
+def test_a_net_closes_to_the_grid_it_was_opened_from(name: str) -> None:
     grid = (SOUND | BROKEN)[name]()
     net, source = open_net(grid)
     back = close_net(net, source, grid)
@@ -78,7 +86,7 @@ def test_a_net_closes_to_the_grid_it_was_opened_from(name):
 
 
 @pytest.mark.parametrize("name", [*SOUND, *BROKEN])
-def test_a_net_that_was_closed_before_its_nodes_came_to_rest_is_the_same_grid(name):
+def test_a_net_that_was_closed_before_its_nodes_came_to_rest_is_the_same_grid(name: str) -> None:
     grid = (SOUND | BROKEN)[name]()
     net, source = open_net(grid)
     closed, kept = join_again(net, source, grid)
@@ -88,7 +96,7 @@ def test_a_net_that_was_closed_before_its_nodes_came_to_rest_is_the_same_grid(na
     assert later.triangles.tobytes() == at_once.triangles.tobytes()
 
 
-def test_nodes_without_a_triangle_are_dropped():
+def test_nodes_without_a_triangle_are_dropped() -> None:
     grid = two_pieces(fixed=(1, 12))
     back = close_net(*open_net(grid), grid)
     assert len(back.nodes) == len(grid.nodes) - 1
@@ -96,7 +104,7 @@ def test_nodes_without_a_triangle_are_dropped():
 
 
 @pytest.mark.parametrize("name", sorted(BROKEN))
-def test_nothing_changes_at_a_defect(name):
+def test_nothing_changes_at_a_defect(name: str) -> None:
     grid = BROKEN[name]()
     net, source = open_net(grid)
     locked = source[: net.used][net.kind[: net.used] == kernels.LOCKED]
@@ -110,7 +118,7 @@ def test_nothing_changes_at_a_defect(name):
                 assert not kernels.may_split(net, v, u)
 
 
-def slid(net):
+def slid(net: Net) -> Net:
     """Every boundary node on one curve, all free to move: the moves of the rim become possible."""
     net.kind[:] = net.is_open
     net.curve[:] = np.where(net.is_open == 1, 0, -1)
@@ -122,7 +130,7 @@ def slid(net):
     some.sampled_from(sorted(SOUND)),
     some.lists(some.tuples(some.integers(0, 2), some.integers(0, 999), some.integers(0, 99)), max_size=25),
 )
-def test_no_sequence_of_moves_changes_the_topology(name, moves):
+def test_no_sequence_of_moves_changes_the_topology(name: str, moves: list[tuple[int, int, int]]) -> None:
     grid = SOUND[name]()
     net, source = open_net(grid)
     slid(net)
@@ -147,7 +155,7 @@ def test_no_sequence_of_moves_changes_the_topology(name, moves):
 
 
 @pytest.mark.parametrize("make", [rough_disc, rough_sphere])
-def test_a_move_and_its_opposite_leave_the_grid_as_it_was(make):
+def test_a_move_and_its_opposite_leave_the_grid_as_it_was(make: Callable[..., Rough]) -> None:
     grid = make(points=500).grid
     net, source = open_net(grid)
     slid(net)
@@ -165,11 +173,11 @@ def test_a_move_and_its_opposite_leave_the_grid_as_it_was(make):
     assert facing(close_net(net, source, grid)) == facing(grid)
 
 
-def test_corners_and_fixed_nodes_are_never_drawn_in():
+def test_corners_and_fixed_nodes_are_never_drawn_in() -> None:
     grid = dome(5, fixed=(12,))
     net, _ = open_net(grid)
     assert not any(
         kernels.may_collapse(net, u, v)
-        for v in np.flatnonzero(net.kind == kernels.REST)
-        for u in net.ring[v, : net.degree[v]]
+        for v in np.flatnonzero(net.kind == kernels.REST).tolist()
+        for u in net.ring[v, : net.degree[v]].tolist()
     )

@@ -11,7 +11,7 @@ import scantruss as st
 @compiled_only
 @pytest.mark.parametrize("method", ["default", "paper"])
 @pytest.mark.parametrize("name", HARD)
-def test_topology_and_distance(name, method):
+def test_topology_and_distance(name: str, method: str) -> None:
     """Nodes off the rim lie within half the noise of the true surface on average (.003 members where there is hardly any)."""
     shape = hard(name, 0)
     settings = st.Settings(length=shape.length, effort="quick", method=method)

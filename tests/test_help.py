@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -12,7 +13,7 @@ from scantruss.cli.main import main
 from scantruss.cli.options import EVERY_DAY, PAPER_ONLY, option_of
 
 
-def test_the_options_of_a_grid_come_in_three_parts_each_once(capsys):
+def test_the_options_of_a_grid_come_in_three_parts_each_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["grid", "--help"]) == 0
     said = capsys.readouterr().out
     parts = {
@@ -28,7 +29,7 @@ def test_the_options_of_a_grid_come_in_three_parts_each_once(capsys):
         assert [name for name, text in parts.items() if f"\n{option} " in text or f"\n{option}," in text] == [where]
 
 
-def completed(script, words):
+def completed(script: str, words: list[str]) -> set[str]:
     """Return what bash offers for the last of some words."""
     place = (
         f"COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; _scantruss; printf '%s\\n' \"${{COMPREPLY[@]}}\""
@@ -38,7 +39,9 @@ def completed(script, words):
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-def test_bash_completes_commands_options_and_values(tmp_path, monkeypatch, capsys):
+def test_bash_completes_commands_options_and_values(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "shell.ply").touch()
     assert main(["completion", "bash"]) == 0
@@ -51,13 +54,13 @@ def test_bash_completes_commands_options_and_values(tmp_path, monkeypatch, capsy
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_get_a_script_with_all_commands(shell, capsys):
+def test_other_shells_get_a_script_with_all_commands(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", shell]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in COMMANDS) and "fixed-line" in said
 
 
-def test_no_script_for_a_shell_that_is_not_known(capsys):
+def test_no_script_for_a_shell_that_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", "csh"]) == 2
     assert "choose from" in capsys.readouterr().err
 
@@ -78,7 +81,9 @@ def test_no_script_for_a_shell_that_is_not_known(capsys):
         (["grid", "a.xyz", "b.obj", "--length", "1", "--obj", "points"], "an OBJ file holds faces, lines, both"),
     ],
 )
-def test_absurd_values_ask_back(words, said, tmp_path, monkeypatch, capsys):
+def test_absurd_values_ask_back(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.xyz").write_text("".join(f"{x} {y} 0\n" for x in range(20) for y in range(20)))
     assert main(words) == 2
@@ -86,7 +91,7 @@ def test_absurd_values_ask_back(words, said, tmp_path, monkeypatch, capsys):
     assert said in line and line.count("\n") == 1
 
 
-def test_a_scale_at_which_members_are_hairs_asks_back():
+def test_a_scale_at_which_members_are_hairs_asks_back() -> None:
     from small_grids import dome
 
     from scantruss.export.solid import build_solid

@@ -20,7 +20,7 @@ pytest.importorskip("hatchling")
 
 
 @pytest.fixture
-def project(tmp_path):
+def project(tmp_path: Path) -> Path:
     """What a build needs of the project, where a command compiles little."""
     folder = tmp_path / "project"
     nothing_made = shutil.ignore_patterns("__pycache__", "machine_code")
@@ -31,7 +31,7 @@ def project(tmp_path):
     return folder
 
 
-def with_commands(project, *commands):
+def with_commands(project: Path, *commands: str) -> None:
     """Let an installation run other commands."""
     hook = project / "hatch_build.py"
     text, count = re.subn(r"^COMMANDS = \(.*?\)$", f"COMMANDS = {commands!r}", hook.read_text(), flags=re.M | re.S)
@@ -39,7 +39,7 @@ def with_commands(project, *commands):
     hook.write_text(text)
 
 
-def build(project, kind="wheel", **environment):
+def build(project: Path, kind: str = "wheel", **environment: str) -> tuple[Path, str]:
     """Build a wheel; return it and what was said."""
     words = [sys.executable, "-c", CODE, kind]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", **environment}  # as when the tests run without compiling
@@ -49,11 +49,11 @@ def build(project, kind="wheel", **environment):
     return wheel, done.stdout + done.stderr
 
 
-def machine_code_in(folder):
+def machine_code_in(folder: Path) -> list[str]:
     return sorted(path.name for path in Path(folder).glob("scantruss/machine_code/kernels-*/*/*.nbc"))
 
 
-def clean(package, folder):
+def clean(package: Path, folder: Path) -> tuple[bool, list[str]]:
     """Run the command of a package where nothing is stored; say whether it compiled, and what it stored."""
     folder.mkdir()
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("NUMBA_", "SCANTRUSS_"))}
@@ -67,7 +67,7 @@ def clean(package, folder):
 
 
 @handed_over
-def test_a_wheel_brings_machine_code_and_its_first_run_does_not_compile(project, tmp_path):
+def test_a_wheel_brings_machine_code_and_its_first_run_does_not_compile(project: Path, tmp_path: Path) -> None:
     wheel, _ = build(project)
     assert "none-any" not in wheel.name  # it is for this system
     sample = tmp_path / "site"
@@ -79,13 +79,15 @@ def test_a_wheel_brings_machine_code_and_its_first_run_does_not_compile(project,
     assert clean(sample, tmp_path / "second") == (True, sorted(machine_code_in_wheel(wheel)))
 
 
-def machine_code_in_wheel(wheel):
+def machine_code_in_wheel(wheel: Path) -> list[str]:
     with zipfile.ZipFile(wheel) as content:
         return [name.rpartition("/")[2] for name in content.namelist() if name.endswith(".nbc")]
 
 
 @handed_over
-def test_an_editable_installation_compiles_into_the_source_in_place_of_what_is_there(project, tmp_path):
+def test_an_editable_installation_compiles_into_the_source_in_place_of_what_is_there(
+    project: Path, tmp_path: Path
+) -> None:
     old = project / "src" / "scantruss" / "machine_code" / "kernels-old"
     old.mkdir(parents=True)
     wheel, _ = build(project, "editable")
@@ -96,13 +98,13 @@ def test_an_editable_installation_compiles_into_the_source_in_place_of_what_is_t
     assert machine_code_in(project / "src")
 
 
-def test_a_wheel_for_all_machines_brings_none(project):
+def test_a_wheel_for_all_machines_brings_none(project: Path) -> None:
     wheel, _ = build(project, SCANTRUSS_COMPILE="0")
     assert wheel.name.endswith("py3-none-any.whl") and not machine_code_in_wheel(wheel)
 
 
 @pytest.mark.parametrize("commands", [("clean missing.npy clean.ply",), ()])
-def test_where_it_cannot_compile_it_says_so_and_the_first_run_does(project, commands):
+def test_where_it_cannot_compile_it_says_so_and_the_first_run_does(project: Path, commands: tuple[str, ...]) -> None:
     with_commands(project, *commands)
     wheel, said = build(project)
     assert wheel.name.endswith("py3-none-any.whl") and not machine_code_in_wheel(wheel)
@@ -111,7 +113,7 @@ def test_where_it_cannot_compile_it_says_so_and_the_first_run_does(project, comm
         assert "scantruss/runtime/jit.py" in content.namelist()
 
 
-def test_a_source_distribution_can_compile(project):
+def test_a_source_distribution_can_compile(project: Path) -> None:
     words = [sys.executable, "-c", CODE, "sdist"]
     subprocess.run(words, cwd=project, check=True, capture_output=True)
     (archive,) = (project / "out").glob("*.tar.gz")

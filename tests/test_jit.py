@@ -9,7 +9,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Never
 
 import llvmlite.binding
 import numba
@@ -24,7 +26,7 @@ KERNELS = Path(compiling.__file__).parents[1] / "kernels"
 
 
 @pytest.fixture
-def copied(tmp_path, monkeypatch):
+def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The kernel files, copied where they may be changed."""
     folder = tmp_path / "kernels"
     (tmp_path / "runtime").mkdir()
@@ -34,13 +36,13 @@ def copied(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def no_home(monkeypatch):
+def no_home(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither of the places that are tried is named by the environment."""
     for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
 
 
-def test_the_name_changes_when_any_kernel_file_changes(copied):
+def test_the_name_changes_when_any_kernel_file_changes(copied: Path) -> None:
     seen = {compiling._contents()}
     assert compiling._contents() in seen
     for path in sorted(copied.glob("*.py")):
@@ -53,35 +55,35 @@ def test_the_name_changes_when_any_kernel_file_changes(copied):
     assert compiling._contents() not in seen
 
 
-def test_a_copy_of_the_same_files_has_the_same_name(copied, monkeypatch):
+def test_a_copy_of_the_same_files_has_the_same_name(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     copy = compiling._contents()
     monkeypatch.setattr(compiling, "__file__", str(KERNELS.parent / "runtime" / "jit.py"))
     assert compiling._contents() == copy
 
 
-def test_bounds_checks_have_a_folder_of_their_own(monkeypatch):
+def test_bounds_checks_have_a_folder_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NUMBA_BOUNDSCHECK", raising=False)
     plain = compiling._contents()
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
     assert compiling._contents() != plain
 
 
-def test_another_numba_has_a_folder_of_its_own(monkeypatch):
+def test_another_numba_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = compiling._contents()
-    monkeypatch.setattr(compiling.numba, "__version__", "0.0.1")
+    monkeypatch.setattr(numba, "__version__", "0.0.1")
     assert compiling._contents() != plain
 
 
 @pytest.mark.parametrize("setting", ["CPU_NAME", "CPU_FEATURES"])
-def test_another_processor_has_a_folder_of_its_own(setting, monkeypatch):
+def test_another_processor_has_a_folder_of_its_own(setting: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(numba.config, setting, None)
     plain = compiling._contents()
     monkeypatch.setattr(numba.config, setting, "another")
     assert compiling._contents() != plain
 
 
-def test_a_processor_that_llvm_does_not_know_is_no_error(monkeypatch):
-    def unknown():
+def test_a_processor_that_llvm_does_not_know_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown() -> Never:
         raise RuntimeError("target not available")
 
     monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", unknown)
@@ -89,7 +91,9 @@ def test_a_processor_that_llvm_does_not_know_is_no_error(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["NUMBA_CACHE_DIR", "XDG_CACHE_HOME"])
-def test_the_folder_is_where_the_environment_says(name, tmp_path, no_home, monkeypatch):
+def test_the_folder_is_where_the_environment_says(
+    name: str, tmp_path: Path, no_home: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(name, str(tmp_path / "cache"))
     folder = compiling._folder()
     assert folder is not None and folder.is_dir()
@@ -97,11 +101,11 @@ def test_the_folder_is_where_the_environment_says(name, tmp_path, no_home, monke
     assert compiling._contents() in folder.name
 
 
-def refuse(*allowed):
+def refuse(*allowed: Path) -> Callable[..., Any]:
     """Return a `TemporaryFile` that fails but in the folders below `allowed`, as on a disk that cannot be written."""
     real = tempfile.TemporaryFile
 
-    def temporary_file(*args, dir=None, **others):
+    def temporary_file(*args: Any, dir: Any = None, **others: Any) -> Any:
         if not any(Path(dir).is_relative_to(a) for a in allowed):
             raise PermissionError(13, "Permission denied", str(dir))
         return real(*args, dir=dir, **others)
@@ -109,7 +113,9 @@ def refuse(*allowed):
     return temporary_file
 
 
-def test_the_temporary_folder_serves_where_home_cannot_be_written(tmp_path, no_home, monkeypatch):
+def test_the_temporary_folder_serves_where_home_cannot_be_written(
+    tmp_path: Path, no_home: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse(tmp_path / "temporary"))
@@ -117,15 +123,15 @@ def test_the_temporary_folder_serves_where_home_cannot_be_written(tmp_path, no_h
     assert folder is not None and folder.is_relative_to(tmp_path / "temporary")
 
 
-def test_no_folder_at_all_is_no_error(tmp_path, no_home, monkeypatch):
+def test_no_folder_at_all_is_no_error(tmp_path: Path, no_home: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse())
     assert compiling._folder() is None
 
 
-def test_no_home_is_no_error(tmp_path, no_home, monkeypatch):
-    def no_home_folder():
+def test_no_home_is_no_error(tmp_path: Path, no_home: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home_folder() -> Never:
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setattr(Path, "home", no_home_folder)
@@ -134,7 +140,7 @@ def test_no_home_is_no_error(tmp_path, no_home, monkeypatch):
     assert folder is not None and folder.is_relative_to(tmp_path)
 
 
-def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch):
+def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "FOLDER", None)
 
     @compiling.kernel
@@ -144,15 +150,15 @@ def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch):
     assert twice(21.0) == 42.0
 
 
-def test_the_decorator_leaves_the_settings_of_numba_alone():
-    kept = compiling.numba.config.CACHE_DIR
+def test_the_decorator_leaves_the_settings_of_numba_alone() -> None:
+    kept = numba.config.CACHE_DIR
 
     @compiling.kernel
     def one() -> float:
         return 1.0
 
     assert one() == 1.0
-    assert kept == compiling.numba.config.CACHE_DIR
+    assert kept == numba.config.CACHE_DIR
 
 
 CODE = """
@@ -163,7 +169,7 @@ print(c.FOLDER, any(c.FOLDER.rglob("vectors.norm-*.nbc")) if c.FOLDER else False
 """
 
 
-def run(**environment):
+def run(**environment: str) -> list[str]:
     """Run CODE in another process; return the words it prints."""
     kept = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
     kept.pop("NUMBA_DISABLE_JIT", None)
@@ -175,7 +181,7 @@ def run(**environment):
     return done.stdout.split()
 
 
-def test_a_fresh_process_keeps_its_machine_code_and_finds_it_again(tmp_path):
+def test_a_fresh_process_keeps_its_machine_code_and_finds_it_again(tmp_path: Path) -> None:
     first, kept = run(NUMBA_CACHE_DIR=str(tmp_path))
     files = sorted(path for path in Path(first).rglob("*.nbc"))
     assert Path(first).is_relative_to(tmp_path) and kept == "True" and files
@@ -202,7 +208,7 @@ print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 
 
 @handed_over
-def test_a_kernel_that_is_found_again_still_becomes_a_part_though_only_machine_code_is_stored(tmp_path):
+def test_a_kernel_that_is_found_again_still_becomes_a_part_though_only_machine_code_is_stored(tmp_path: Path) -> None:
     folder = run(NUMBA_CACHE_DIR=str(tmp_path))[0]
     (file,) = Path(folder).rglob("vectors.norm-*.nbc")
     (_, kind, (code, names)), *_ = pickle.loads(file.read_bytes())
@@ -227,7 +233,7 @@ print(sum(stats.cache_hits.values()), v.__file__)
 
 
 @handed_over
-def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path):
+def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path: Path) -> None:
     made = Path(run(NUMBA_CACHE_DIR=str(tmp_path / "made"))[0])
     package = tmp_path / "elsewhere" / "scantruss"
     shutil.copytree(KERNELS.parent, package, ignore=shutil.ignore_patterns("__pycache__", "machine_code"))
@@ -236,7 +242,7 @@ def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path
         shutil.copytree(room, installed / cache.room_of(room))
     stamps = {path: path.stat().st_mtime_ns for path in installed.rglob("*")}
 
-    def find(name, **environment):
+    def find(name: str, **environment: str) -> tuple[int, int]:
         """Use a kernel of that package where nothing is stored yet; say whether it was found and what was stored."""
         words = {"NUMBA_CACHE_DIR": str(tmp_path / name), "PYTHONPATH": str(package.parent)} | environment
         kept = {key: value for key, value in os.environ.items() if key != "SCANTRUSS_INSTALLED"}
@@ -255,7 +261,7 @@ def test_machine_code_that_came_with_the_package_is_found_and_only_read(tmp_path
     assert find("another kernel") == (0, 1)
 
 
-def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path):
+def test_a_process_that_can_write_nowhere_works_all_the_same(tmp_path: Path) -> None:
     """The home of the cache and the temporary folder are files: no folder can be made in them, not even by root."""
     file = tmp_path / "file"
     file.write_text("")
@@ -284,7 +290,7 @@ def add_shares(values: np.ndarray, among: float) -> float:
 
 
 @pytest.mark.kernels
-def test_a_kernel_serves_python_and_other_kernels():
+def test_a_kernel_serves_python_and_other_kernels() -> None:
     values = np.array([1.0, 2.0, 6.0])
     assert add_shares(values, 3.0) == 3.0
     assert add(1.0, 2.0) == 3.0 and share(values, 2, 3.0) == 2.0
@@ -293,15 +299,16 @@ def test_a_kernel_serves_python_and_other_kernels():
 
 
 @compiled_only
-def test_a_kernel_divides_by_zero_as_numpy_does():
+def test_a_kernel_divides_by_zero_as_numpy_does() -> None:
     assert add_shares(np.array([1.0, 2.0]), 0.0) == np.inf and np.isnan(add_shares(np.array([0.0, 2.0]), 0.0))
 
 
 @handed_over
-def test_a_part_of_a_kernel_is_no_machine_code_of_its_own():
-    @compiling.kernel
-    def part(x: float) -> float:
+def test_a_part_of_a_kernel_is_no_machine_code_of_its_own() -> None:
+    def double(x: float) -> float:
         return 2.0 * x
+
+    part: Any = compiling.kernel(double)  # a dispatcher
 
     @compiling.kernel
     def whole(x: float) -> float:
@@ -312,7 +319,7 @@ def test_a_part_of_a_kernel_is_no_machine_code_of_its_own():
     assert part(2.0) == 4.0 and len(part.alone.signatures) == 1
 
 
-def test_every_kernel_compiles_by_itself_where_numba_does_not_let_us(monkeypatch):
+def test_every_kernel_compiles_by_itself_where_numba_does_not_let_us(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cache, "HANDS_OVER", False)
 
     @compiling.kernel
@@ -327,7 +334,7 @@ def test_every_kernel_compiles_by_itself_where_numba_does_not_let_us(monkeypatch
     assert whole(np.ones(1)) == 1.0
 
 
-def test_no_kernel_returns_an_array():
+def test_no_kernel_returns_an_array() -> None:
     """Those without arrays of their own do not count who uses one, so they must not hand one on."""
     holders = "ndarray|Surface|Net|Front|Curves|Boxes|Table|Tree|Nodes|Level|Area|Scratch"
     for path in KERNELS.rglob("*.py"):

@@ -28,12 +28,12 @@ MODULES = {
 ROOT = 8  # modules that lie on the root at most
 
 
-def package_of(name):
+def package_of(name: str) -> str:
     """Return the package that a module lies in; a module of the root stands for itself."""
     return name if MODULES[name].name == "__init__.py" else name.rpartition(".")[0] or name
 
 
-def layer_of(name):
+def layer_of(name: str) -> int:
     """Return the layer of a module by its longest name in the table."""
     words = name.split(".")
     for end in range(len(words), 0, -1):
@@ -43,7 +43,7 @@ def layer_of(name):
     raise AssertionError(f"{name} has no place in the layers")
 
 
-def imports_of(name, with_types=False):
+def imports_of(name: str, with_types: bool = False) -> set[str]:
     """Return the modules of the package that a module imports, wherever it does; `with_types`: also for type checkers only."""
     path = MODULES[name]
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -69,30 +69,30 @@ def imports_of(name, with_types=False):
 
 
 @pytest.mark.parametrize("name", sorted(MODULES.keys() - {"__init__"}))
-def test_a_module_imports_only_from_its_own_layer_and_below(name):
+def test_a_module_imports_only_from_its_own_layer_and_below(name: str) -> None:
     for found in imports_of(name):
         assert layer_of(found) <= layer_of(name), f"{name} imports {found}"
 
 
-def test_kernels_import_kernels_and_runtime_only():
+def test_kernels_import_kernels_and_runtime_only() -> None:
     for name in MODULES:
         if name.startswith("kernels."):
             assert {found.split(".")[0] for found in imports_of(name)} <= {"kernels", "runtime"}, name
 
 
-def test_no_modules_import_each_other_in_a_circle():
+def test_no_modules_import_each_other_in_a_circle() -> None:
     tuple(
         TopologicalSorter({name: imports_of(name) for name in MODULES}).static_order()
     )  # else a CycleError names them
 
 
-def test_no_packages_import_each_other_in_a_circle_for_types_neither():
-    packages = {package_of(name): set() for name in MODULES}
+def test_no_packages_import_each_other_in_a_circle_for_types_neither() -> None:
+    packages: dict[str, set[str]] = {package_of(name): set() for name in MODULES}
     for name in MODULES.keys() - {"__init__"}:
         found = {package_of(found) for found in imports_of(name, with_types=True) if found != "__init__"}
         packages[package_of(name)] |= found - {package_of(name)}
     tuple(TopologicalSorter(packages).static_order())
 
 
-def test_few_modules_lie_on_the_root():
+def test_few_modules_lie_on_the_root() -> None:
     assert len(list(SOURCE.glob("*.py"))) <= ROOT

@@ -1,10 +1,13 @@
 """Length fields from the command line, from files and in settings: what is read, what is kept, what is refused."""
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from small_clouds import cap, sheet
+from typed import known
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -16,7 +19,7 @@ ROWS = ((1.0, 2.0, -3.0, 1.5), (4.0, 5.0, 6.5, 2.0))
 
 
 @pytest.fixture(scope="module")
-def plate(tmp_path_factory):
+def plate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scan of a plate of 12 x 8 with points 0.25 apart, and a file of lengths on it."""
     folder = tmp_path_factory.mktemp("plate")
     np.savetxt(folder / "plate.xyz", sheet(12.0, 8.0, 0.25))
@@ -24,7 +27,7 @@ def plate(tmp_path_factory):
     return folder
 
 
-def run(*words):
+def run(*words: Any) -> int:
     """Run a command; return its exit status."""
     return main([str(word) for word in words])
 
@@ -42,7 +45,7 @@ def run(*words):
         "\ufeffx;y;z;l\n1;2;-3;1.5\n4;5;6.5;2\n",
     ],
 )
-def test_lengths_are_read_from_any_text(tmp_path, text):
+def test_lengths_are_read_from_any_text(tmp_path: Path, text: str) -> None:
     (tmp_path / "lengths.csv").write_text(text, encoding="utf-8")
     assert read_lengths(tmp_path / "lengths.csv") == list(ROWS)
 
@@ -57,7 +60,7 @@ def test_lengths_are_read_from_any_text(tmp_path, text):
         ("no numbers here\n", "no line with three numbers"),
     ],
 )
-def test_a_file_without_lengths_is_refused(tmp_path, text, words):
+def test_a_file_without_lengths_is_refused(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "lengths.csv").write_text(text)
     with pytest.raises(FormatError, match=words):
         read_lengths(tmp_path / "lengths.csv")
@@ -80,26 +83,29 @@ def test_a_file_without_lengths_is_refused(tmp_path, text, words):
         ([(1, 2, np.nan, 1.0)], "finite"),
     ],
 )
-def test_a_field_that_is_none_is_refused(field, words):
+def test_a_field_that_is_none_is_refused(field: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         Settings(length_field=field)
 
 
-def test_the_shortest_length_stands_for_the_field():
-    assert Settings(length_field=np.array(ROWS)).length == 1.5
+def test_the_shortest_length_stands_for_the_field() -> None:
+    rows: Any = np.array(ROWS)
+    assert Settings(length_field=rows).length == 1.5
     assert Settings(length_field="curvature:2:5").length == 2.0
     assert Settings(length=4.7).length_field == ""
 
 
 @pytest.mark.parametrize("field", [ROWS, "curvature:0.1:7"])
-def test_settings_with_a_field_are_kept_exactly(tmp_path, field):
+def test_settings_with_a_field_are_kept_exactly(tmp_path: Path, field: Any) -> None:
     settings = Settings(length_field=field, method="paper")
     (tmp_path / "kept.json").write_text(json.dumps(settings.to_dict()))
     assert Settings.read(tmp_path / "kept.json") == settings
     assert Settings.from_dict({"length_field": field, "method": "paper"}) == settings
 
 
-def test_a_run_with_a_file_of_lengths_is_repeated_by_its_settings(plate, tmp_path, capsys):
+def test_a_run_with_a_file_of_lengths_is_repeated_by_its_settings(
+    plate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert (
         run("grid", plate / "plate.xyz", tmp_path / "a.json", tmp_path / "a.csv", "--length", plate / "lengths.csv")
         == 0
@@ -108,7 +114,7 @@ def test_a_run_with_a_file_of_lengths_is_repeated_by_its_settings(plate, tmp_pat
     assert run("grid", plate / "plate.xyz", tmp_path / "b.json", "--settings", tmp_path / "a.settings.json") == 0
     assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
     grid = st.read_grid(tmp_path / "a.json")
-    assert grid.desired.min() < 1.0 and grid.desired.max() > 1.7
+    assert known(grid.desired).min() < 1.0 and known(grid.desired).max() > 1.7
     assert grid.quality.stretch_cv == json.loads((tmp_path / "a.json").read_text())["quality"]["stretch_cv"] < 0.1
     assert "desired_length" in (tmp_path / "a_nodes.csv").read_text().splitlines()[0]
     assert (
@@ -119,7 +125,7 @@ def test_a_run_with_a_file_of_lengths_is_repeated_by_its_settings(plate, tmp_pat
     assert "desired" not in plain and "stretch_cv" not in plain["quality"] and plain["settings"]["length_field"] == ""
 
 
-def test_info_takes_a_field(plate, capsys):
+def test_info_takes_a_field(plate: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("info", plate / "plate.xyz", "--length", "curvature:1:2") == 0
     assert "boundaries for members of 1 to 2:" in capsys.readouterr().out
 
@@ -141,7 +147,14 @@ def test_info_takes_a_field(plate, capsys):
         ),
     ],
 )
-def test_a_field_that_the_scan_cannot_carry_is_refused(plate, tmp_path, capsys, monkeypatch, length, words):
+def test_a_field_that_the_scan_cannot_carry_is_refused(
+    plate: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    length: str,
+    words: str,
+) -> None:
     monkeypatch.chdir(tmp_path)
     if " " in length:
         (tmp_path / "far.xyz").write_text(f"-5 0 0 1\n{length}\n")
@@ -151,19 +164,19 @@ def test_a_field_that_the_scan_cannot_carry_is_refused(plate, tmp_path, capsys, 
     assert words in said and said.count("\n") == 1 and not (tmp_path / "out.obj").exists()
 
 
-def test_a_grid_does_not_overwrite_its_lengths(plate, tmp_path, capsys):
+def test_a_grid_does_not_overwrite_its_lengths(plate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lengths = tmp_path / "lengths.csv"
     lengths.write_bytes((plate / "lengths.csv").read_bytes())
     assert run("grid", plate / "plate.xyz", lengths, "--length", lengths) == 2
     assert "would overwrite the file of lengths" in capsys.readouterr().err
 
 
-def test_national_coordinates_and_a_python_call():
+def test_national_coordinates_and_a_python_call() -> None:
     offset = np.array([5e5, 4e6, 100.0])
     points = cap(6.0, 1.0, 0.25)
-    field = np.column_stack([points[::400], 1.0 + 0.5 * (points[::400, 0] > 0)])
+    field: Any = np.column_stack([points[::400], 1.0 + 0.5 * (points[::400, 0] > 0)])
     here = st.grid_from_points(points, Settings(length_field=field))
     there = st.grid_from_points(points + offset, Settings(length_field=field + [*offset, 0.0]))
     assert np.array_equal(here.triangles, there.triangles)
     assert np.allclose(here.nodes + here.origin + offset, there.nodes + there.origin, atol=1e-6)
-    assert np.allclose(here.desired, there.desired, rtol=1e-6)
+    assert np.allclose(known(here.desired), known(there.desired), rtol=1e-6)

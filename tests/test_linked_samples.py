@@ -7,21 +7,26 @@ import pytest
 from hypothesis import given, settings, strategies
 from small_clouds import ball, cap, samples_of, sheet
 from steps import steps_of
+from typed import known
 
 import scantruss as st
 from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
 from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
 from scantruss.surface.linked_samples import link_samples
+<<<<<<< HEAD
 from scantruss.surface.samples import SPARSE_SPACING, sample_surface, samples_with, with_whole_boundary
+=======
+from scantruss.surface.samples import SPARSE, SurfaceSamples, sample_surface, samples_with, with_whole_boundary
+>>>>>>> wc
 
 
-def apart(samples):
+def apart(samples: SurfaceSamples) -> float:
     """How far apart the sites are: the smallest distance that they keep [member lengths]."""
     return samples.surface.radius
 
 
-def roof(angle, length, points, seed=0):
+def roof(angle: float, length: float, points: int, seed: int = 0) -> np.ndarray:
     """Two plates 12 wide that meet at an angle [degree] along a ridge, so many points on each square of a member."""
     rng = np.random.default_rng(seed)
     half, count = np.radians(angle) / 2, int(points * 12 * length)
@@ -47,7 +52,7 @@ OTHER = {
 
 
 @pytest.mark.parametrize("name", SMOOTH)
-def test_a_smooth_scan_has_larger_sites(name):
+def test_a_smooth_scan_has_larger_sites(name: str) -> None:
     samples = samples_of(SMOOTH[name]())
     assert samples.smooth and apart(samples) == pytest.approx(SMOOTH_SAMPLE_SPACING)
     finer = samples_of(SMOOTH[name](), box_size=SAMPLE_SPACING)
@@ -56,7 +61,7 @@ def test_a_smooth_scan_has_larger_sites(name):
 
 
 @pytest.mark.parametrize("name", OTHER)
-def test_any_other_scan_has_the_usual_ones(name):
+def test_any_other_scan_has_the_usual_ones(name: str) -> None:
     """They are, to the byte, those that are asked for by their size."""
     points = OTHER[name]()
     samples, asked = samples_of(points), samples_of(points, box_size=SAMPLE_SPACING)
@@ -67,13 +72,13 @@ def test_any_other_scan_has_the_usual_ones(name):
 
 @pytest.mark.parametrize("angle", [42, 50, 70, 110])
 @pytest.mark.parametrize("seed", range(3))
-def test_no_ridge_is_missed_because_a_scan_looks_smooth(angle, seed):
+def test_no_ridge_is_missed_because_a_scan_looks_smooth(angle: int, seed: int) -> None:
     """One as long as the shortest that is looked for, in a plain scan."""
     steps = steps_of(st.PointCloud.from_array(roof(angle, 3.5, 300, seed)), st.Settings(length=1.0))
     assert not steps.samples.smooth and steps.constraints.lines.sharp.sum() == 1
 
 
-def test_flatter_ridges_that_are_asked_for_are_seen():
+def test_flatter_ridges_that_are_asked_for_are_seen() -> None:
     points = roof(30, 12, 300)
     assert samples_of(points).smooth
     assert not samples_of(points, ridge_angle=25.0).smooth
@@ -83,7 +88,7 @@ def test_flatter_ridges_that_are_asked_for_are_seen():
 @pytest.mark.kernels
 @settings(max_examples=10)
 @given(strategies.integers(0, 10_000), strategies.floats(2.0, 60.0))
-def test_uneven_sites_are_those_of_a_plain_loop(seed, angle):
+def test_uneven_sites_are_those_of_a_plain_loop(seed: int, angle: float) -> None:
     """The normal of a neighbour, mirrored at the plane half-way, against that of the site; the sign of neither counts."""
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(0, 3, (150, 2)), 0.1 * rng.normal(size=150)])
@@ -102,13 +107,13 @@ def test_uneven_sites_are_those_of_a_plain_loop(seed, angle):
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal"])
-def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(effort):
+def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(effort: str) -> None:
     """Noisy domes: the same topology; nodes no farther from the true sphere, rim nodes no farther from the true circle."""
     dome, off, rim = cap(6.0, 0.9, 0.06), [], []
     for seed, size in product(range(3), (None, SAMPLE_SPACING)):
         points = dome + 0.01 * np.random.default_rng(seed).normal(size=dome.shape)
         grid = st.grid_from_points(points, st.Settings(length=1.0, effort=effort, box_size=size))
-        assert (grid.topology.boundary_loops, grid.topology.euler) == (1, 1) and grid.certificate.passed
+        assert (grid.topology.boundary_loops, grid.topology.euler) == (1, 1) and known(grid.certificate).passed
         nodes = grid.nodes + grid.origin
         off.append(abs(np.linalg.norm(nodes, axis=1) - 6.0).mean())
         ends = nodes[np.unique(grid.edges[grid.edge_uses == 1])]
@@ -118,7 +123,7 @@ def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(eff
 
 
 @pytest.mark.kernels
-def test_places_find_the_site_nearest_to_them_from_any_near_by():
+def test_places_find_the_site_nearest_to_them_from_any_near_by() -> None:
     surface = samples_of(sheet(4, 4, 0.1), box_size=0.4).surface
     rng = np.random.default_rng(0)
     places = np.column_stack([rng.uniform(-1.8, 1.8, (60, 2)), np.zeros(60)])
@@ -128,7 +133,7 @@ def test_places_find_the_site_nearest_to_them_from_any_near_by():
     assert samples.tolist() == nearest.tolist()
 
 
-def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned():
+def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned() -> None:
     """A dense plate; what is added is no smooth surface. All points near the rim are still found, and no larger sites tried."""
     cloud, settings = st.PointCloud.from_array(sheet(8, 8, 0.015)), st.Settings(length=1.0)
     samples = sample_surface(cloud, settings)

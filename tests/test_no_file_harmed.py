@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import threading
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from scantruss.runtime.ours import kind_of_ours
 LENGTH = "1.5"
 
 
-def plate(shift=0.0):
+def plate(shift: float = 0.0) -> np.ndarray:
     rng = np.random.default_rng(3)
     points = np.column_stack([rng.uniform(0, 12, 4000), rng.uniform(0, 9, 4000), np.zeros(4000)])
     points[:, 2] = 0.02 * points[:, 0] ** 2
@@ -22,7 +24,7 @@ def plate(shift=0.0):
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with three scans, a list of nodes, a picture and a grid of other programs."""
     monkeypatch.chdir(tmp_path)
     for name in ("a.xyz", "b.xyz", "c.ply", "d.csv"):
@@ -36,7 +38,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def contents(folder):
+def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
@@ -74,7 +76,9 @@ WRONG = [
 
 
 @pytest.mark.parametrize("command", WRONG)
-def test_a_wrong_order_of_arguments_harms_nothing(place, capsys, command):
+def test_a_wrong_order_of_arguments_harms_nothing(
+    place: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
     before = contents(place)
     assert main(command.replace("L", LENGTH).split()) == 2
     said = capsys.readouterr().err
@@ -82,13 +86,15 @@ def test_a_wrong_order_of_arguments_harms_nothing(place, capsys, command):
     assert contents(place) == before
 
 
-def test_several_scans_without_quotes_are_told_of_quotes(place, capsys):
+def test_several_scans_without_quotes_are_told_of_quotes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command in ("grid a.xyz b.xyz c.ply new.json --length 1.5", "clean a.xyz b.xyz c.ply", "clean a.xyz c.ply"):
         assert main(command.split()) == 2
         assert "quotes" in capsys.readouterr().err
 
 
-def test_results_of_our_own_are_replaced_and_those_of_others_by_force(place, capsys):
+def test_results_of_our_own_are_replaced_and_those_of_others_by_force(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     outs = ["one.obj", "one.json", "one.ply", "one.csv", "one.png"]
     for _ in range(2):
         assert main(["grid", "a.xyz", *outs[:2], "-o", outs[2], "-o", outs[3], "-o", outs[4], "--length", LENGTH]) == 0
@@ -105,7 +111,9 @@ def test_results_of_our_own_are_replaced_and_those_of_others_by_force(place, cap
     assert kind_of_ours(place / "theirs.obj") == "result"
 
 
-def test_a_cloud_of_our_own_is_not_replaced_by_a_grid_nor_a_grid_by_a_cloud(place, capsys):
+def test_a_cloud_of_our_own_is_not_replaced_by_a_grid_nor_a_grid_by_a_cloud(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["clean", "a.xyz", "cloud.ply", "--no-smooth"]) == 0
     assert main(["grid", "a.xyz", "net.ply", "--length", LENGTH]) == 0
     before = contents(place)
@@ -114,7 +122,7 @@ def test_a_cloud_of_our_own_is_not_replaced_by_a_grid_nor_a_grid_by_a_cloud(plac
     assert contents(place) == before
 
 
-def test_a_link_to_a_file_of_others_protects_it_and_stays_a_link(place):
+def test_a_link_to_a_file_of_others_protects_it_and_stays_a_link(place: Path) -> None:
     (place / "link.obj").symlink_to("theirs.obj")
     before = contents(place)
     assert main(["grid", "a.xyz", "link.obj", "--length", LENGTH]) == 2
@@ -125,7 +133,7 @@ def test_a_link_to_a_file_of_others_protects_it_and_stays_a_link(place):
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_a_pipe_stays_a_pipe(place):
+def test_a_pipe_stays_a_pipe(place: Path) -> None:
     os.mkfifo("pipe.obj")
     heard = []
     reader = threading.Thread(target=lambda: heard.append((place / "pipe.obj").read_bytes()))
@@ -135,12 +143,14 @@ def test_a_pipe_stays_a_pipe(place):
     assert heard[0].startswith(b"#") and not (place / "pipe.obj").is_file()
 
 
-def test_a_file_that_comes_while_we_compute_is_not_replaced(place, monkeypatch, capsys):
+def test_a_file_that_comes_while_we_compute_is_not_replaced(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     from scantruss import pipeline
 
     made = pipeline.grid_from_cloud
 
-    def meanwhile(*values, **options):
+    def meanwhile(*values: Any, **options: Any) -> Any:
         (place / "new.obj").write_text("somebody else's\n")
         return made(*values, **options)
 

@@ -155,7 +155,7 @@ def test_e57_spherical_constant_and_unknown_fields(tmp_path: Path) -> None:
     seed=st.integers(0, 99),
 )
 def test_e57_integers_of_any_number_of_bits(
-    tmp_path_factory, bits: int, count: int, low: int, scale: float, seed: int
+    tmp_path_factory: pytest.TempPathFactory, bits: int, count: int, low: int, scale: float, seed: int
 ) -> None:
     whole = np.random.default_rng(seed).integers(0, min(2**bits, 2**50), count)
     values = whole + low

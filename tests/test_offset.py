@@ -1,5 +1,7 @@
 """The edge of the surface lies a little beyond the outermost points; how far, tells how unevenly these lie."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from shapes import make
@@ -12,12 +14,13 @@ from scantruss.boundary import offset as module
 from scantruss.boundary.corners import CURVE_STEP, find_corners
 from scantruss.boundary.curves import heights_along, outward, resample, room_across, runs_around
 from scantruss.boundary.offset import NO_BIAS, SamplingBias
+from scantruss.kernels.surface.local_surface import Surface
 from scantruss.surface.samples import sample_surface
 
 RADIUS = 8.0
 
 
-def disc(density, seed=0):
+def disc(density: float, seed: int = 0) -> np.ndarray:
     """Points by chance on a flat disc, so many for an area."""
     rng = np.random.default_rng(seed)
     count = rng.poisson(density * np.pi * RADIUS**2)
@@ -25,22 +28,22 @@ def disc(density, seed=0):
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * r])
 
 
-def boundary_of(points, length=1.0, **settings):
+def boundary_of(points: np.ndarray, length: float = 1.0, **settings: Any) -> tuple[st.Boundary, np.ndarray]:
     cloud = st.PointCloud.from_array(points)
     return steps_of(cloud, st.Settings(length=length, **settings)).boundary, cloud.origin
 
 
-def short_of(places, origin, radius=RADIUS):
+def short_of(places: np.ndarray, origin: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     """How far places end before the edge of the disc."""
     return radius - np.linalg.norm((places + origin)[:, :2], axis=1)
 
 
 @pytest.fixture
-def seen(monkeypatch):
+def seen(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What `sampling_bias_of` is asked, and how far beyond it answers."""
     asked, full = [], module.sampling_bias_of
 
-    def spy(surface, points, density, radius):
+    def spy(surface: Surface, points: np.ndarray, density: float, radius: float) -> Any:
         found = full(surface, points, density, radius)
         asked.append((points, found.beyond))
         return found
@@ -51,7 +54,7 @@ def seen(monkeypatch):
 
 @pytest.mark.parametrize("density", [15, 40, 120, 500, 2000])
 @pytest.mark.parametrize("scale", [1.0, 30.0])
-def test_points_by_chance_end_before_the_edge_as_far_as_said(density, scale, seen):
+def test_points_by_chance_end_before_the_edge_as_far_as_said(density: int, scale: float, seen: list[Any]) -> None:
     _, origin = boundary_of(scale * disc(density), scale)
     ((touched, beyond),) = seen
     truth = short_of(resample(touched, CURVE_STEP * scale), origin, scale * RADIUS).mean()
@@ -60,7 +63,9 @@ def test_points_by_chance_end_before_the_edge_as_far_as_said(density, scale, see
 
 @pytest.mark.parametrize("density", [40, 120, 500])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_curve_is_nearer_to_the_edge_but_hardly_beyond(density, seed, seen, monkeypatch):
+def test_the_curve_is_nearer_to_the_edge_but_hardly_beyond(
+    density: int, seed: int, seen: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     points = disc(density, seed)
     now, origin = boundary_of(points)
     beyond = seen[0][1]
@@ -72,13 +77,13 @@ def test_the_curve_is_nearer_to_the_edge_but_hardly_beyond(density, seed, seen, 
     assert short.std() <= 0.75 * far.std()
 
 
-def lattice():
+def lattice() -> np.ndarray:
     x, y = np.meshgrid(np.arange(0, 10.05, 0.1), np.arange(0, 8.05, 0.1))
     return np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
 
 
 @pytest.mark.parametrize("name", ["lattice", "valve_vertices", "mask"])
-def test_points_on_the_edge_itself_are_its_end(name, seen, monkeypatch):
+def test_points_on_the_edge_itself_are_its_end(name: str, seen: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     points, length = lattice(), 1.0
     if name != "lattice":
         points, length = make(name).points, make(name).length
@@ -89,25 +94,25 @@ def test_points_on_the_edge_itself_are_its_end(name, seen, monkeypatch):
     assert [loop.points.tobytes() for loop in found.loops] == [loop.points.tobytes() for loop in same.loops]
 
 
-def test_the_paper_ends_at_the_boundary_points(seen):
+def test_the_paper_ends_at_the_boundary_points(seen: list[Any]) -> None:
     boundary_of(disc(100), method="paper")
     assert not seen
 
 
-def circle(count, radius=5.0, wave=0.0, waves=0):
+def circle(count: int, radius: float = 5.0, wave: float = 0.0, waves: int = 0) -> np.ndarray:
     turn = np.arange(count) * 2 * np.pi / count
     r = radius + wave * np.cos(waves * turn)
     return np.column_stack([r * np.cos(turn), r * np.sin(turn), 0 * turn])
 
 
 @pytest.fixture(scope="module")
-def plane():
+def plane() -> Surface:
     """The surface of a plate whose normals look up."""
     surface = sample_surface(st.PointCloud.from_array(sheet(14, 14, 0.1)), st.Settings(length=1.0)).surface
     return surface._replace(normals=np.tile([0.0, 0.0, 1.0], (len(surface.normals), 1)))
 
 
-def test_heights_are_those_over_the_line_through_the_neighbours(plane):
+def test_heights_are_those_over_the_line_through_the_neighbours(plane: Surface) -> None:
     """On a regular polygon the sagitta of two sides; of a point pushed out by a little so much more."""
     turns = circle(60)
     assert heights_along(plane, turns) == pytest.approx(np.full(60, 5.0 * (1 - np.cos(2 * np.pi / 60))))
@@ -116,14 +121,14 @@ def test_heights_are_those_over_the_line_through_the_neighbours(plane):
     assert heights_along(plane, turns)[7] == pytest.approx(5.05 - 5.0 * np.cos(2 * np.pi / 60))
 
 
-def test_outwards_is_away_from_the_surface(plane):
+def test_outwards_is_away_from_the_surface(plane: Surface) -> None:
     """Of an outer rim away from its middle, of the rim of a hole towards it."""
     assert outward(plane, circle(200)) == pytest.approx(circle(200, 1.0))
     assert outward(plane, circle(200)[::-1].copy()) == pytest.approx(-circle(200, 1.0)[::-1])
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_room_across_is_that_of_a_look_at_all_pairs(seed):
+def test_the_room_across_is_that_of_a_look_at_all_pairs(seed: int) -> None:
     rng = np.random.default_rng(seed)
     turn = np.linspace(0, 2 * np.pi, 300, endpoint=False)
     r = 2.0 + sum(rng.normal(0, 0.25) * np.cos(k * turn + rng.random()) for k in range(2, 9))
@@ -135,8 +140,8 @@ def test_the_room_across_is_that_of_a_look_at_all_pairs(seed):
     assert room_across(curve, reach, 0.05) == pytest.approx(np.minimum(away.min(axis=1), reach))
 
 
-def test_runs_go_on_around_the_end_of_a_curve():
-    def told(text):
+def test_runs_go_on_around_the_end_of_a_curve() -> None:
+    def told(text: str) -> list[int]:
         return runs_around(np.array([c == "x" for c in text])).tolist()
 
     assert told("xxx..x.") == [0, 0, 0, 1, 1, 2, 3]
@@ -144,14 +149,16 @@ def test_runs_go_on_around_the_end_of_a_curve():
     assert told("....") == [0, 0, 0, 0]
 
 
-def bent(curve, rng, plane, **settings):
+def bent(curve: np.ndarray, bias: SamplingBias, plane: Surface, **settings: Any) -> np.ndarray:
     """The curve of the edge without corners."""
-    return module.offset_curve(curve, rng, st.Settings(length=1.0, corner_angle=170.0, **settings), plane)[0]
+    return module.offset_curve(curve, bias, st.Settings(length=1.0, corner_angle=170.0, **settings), plane)[0]
 
 
 @pytest.mark.parametrize("density", [11.5, 115.0])
 @pytest.mark.parametrize("wave, waves", [(0.3, 16), (0.1, 25), (0.02, 32)])
-def test_more_smoothing_cuts_off_no_more_than_chance_did(wave, waves, density, plane, monkeypatch):
+def test_more_smoothing_cuts_off_no_more_than_chance_did(
+    wave: float, waves: int, density: float, plane: Surface, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Tongues hardly longer, and only bays in which few points would lie: of real ones most stays."""
     curve = resample(circle(4000, wave=wave, waves=waves), CURVE_STEP)
     rng = SamplingBias(module.BEYOND * density ** (-2 / 3) * 0.2 ** (-1 / 3), density)
@@ -166,7 +173,7 @@ def test_more_smoothing_cuts_off_no_more_than_chance_did(wave, waves, density, p
         assert np.ptp(np.linalg.norm(more, axis=1)) > 0.85 * np.ptp(np.linalg.norm(usual, axis=1))
 
 
-def test_what_chance_explains_is_smoothed_more(plane, monkeypatch):
+def test_what_chance_explains_is_smoothed_more(plane: Surface, monkeypatch: pytest.MonkeyPatch) -> None:
     curve = resample(circle(4000), CURVE_STEP)
     curve *= 1.0 + 0.002 * np.random.default_rng(0).normal(size=(len(curve), 1))
     more = bent(curve, SamplingBias(0.02, 115.0), plane)
@@ -175,7 +182,7 @@ def test_what_chance_explains_is_smoothed_more(plane, monkeypatch):
     assert np.linalg.norm(more, axis=1).std() < 0.6 * np.linalg.norm(usual, axis=1).std()
 
 
-def test_a_slit_stays_open(plane):
+def test_a_slit_stays_open(plane: Surface) -> None:
     """The sides of a narrow hole do not come to lie over each other, however far the surface may go on."""
     x = np.linspace(-3.0, 3.0, 121)
     low, high = np.column_stack([x, 0 * x - 0.1, 0 * x]), np.column_stack([x[::-1], 0 * x + 0.1, 0 * x])
@@ -185,7 +192,7 @@ def test_a_slit_stays_open(plane):
     assert abs(y[abs(x) < 2.0]).min() > 0.02
 
 
-def notched(depth, width=0.6):
+def notched(depth: float, width: float = 0.6) -> np.ndarray:
     """An outer rim with a triangular notch in a straight side."""
     half = width / 2
     turns = [(-5, -4), (-half, -4), (0, depth - 4), (half, -4), (5, -4), (5, 4), (-5, 4)]
@@ -193,7 +200,7 @@ def notched(depth, width=0.6):
 
 
 @pytest.mark.parametrize("density, kept", [(10.0, False), (400.0, True)])
-def test_a_notch_is_a_corner_where_points_would_lie_in_it(density, kept, plane):
+def test_a_notch_is_a_corner_where_points_would_lie_in_it(density: float, kept: bool, plane: Surface) -> None:
     """With 1.8 points to its area it is there by chance, with 72 not."""
     curve, settings = notched(0.6), st.Settings(length=1.0)
     at, _ = find_corners(curve, settings)
@@ -201,7 +208,7 @@ def test_a_notch_is_a_corner_where_points_would_lie_in_it(density, kept, plane):
     assert len(at) > 4 and (len(corners) == 4 if not kept else len(corners) == len(at))
 
 
-def test_a_bay_is_as_large_as_it_is(plane):
+def test_a_bay_is_as_large_as_it_is(plane: Surface) -> None:
     """The triangle of a notch; none at a corner that points outwards."""
     curve = notched(1.0, 1.6)
     out = outward(plane, curve)
@@ -211,7 +218,7 @@ def test_a_bay_is_as_large_as_it_is(plane):
     assert area[0] == pytest.approx(0.8, rel=0.05) and area[1] == np.inf
 
 
-def test_a_sparse_scan_of_a_round_shell_has_hardly_a_corner():
+def test_a_sparse_scan_of_a_round_shell_has_hardly_a_corner() -> None:
     """Ten points for a node: what turns there, turns by chance. Ten rims of fifty members had thirty."""
     corners = [len(loop.corners) for seed in range(10) for loop in boundary_of(disc(11.5, seed))[0].loops]
     assert sum(corners) <= 12

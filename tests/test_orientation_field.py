@@ -4,16 +4,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as some
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from shapes import make
 from small_clouds import ball, sheet
-from steps import front_of, rows_of, steps_of
+from steps import Steps, front_of, rows_of, steps_of
+from typed import known
 
 import scantruss as st
 from scantruss.front import orientation_field as laying
 from scantruss.front.orientation_field import FieldStart, lattice_start, make_levels, orientation_fields
+from scantruss.kernels.front.candidate_nodes import CandidateNodes
 from scantruss.kernels.surface import orientation_field as kernels
+from scantruss.kernels.surface.orientation_field import Level
 from scantruss.runtime import parallel
 
 UP = (0.0, 0.0, 1.0)
@@ -21,17 +25,17 @@ angles = some.floats(0.0, 6.3)
 places = some.tuples(some.floats(-5, 5), some.floats(-5, 5))
 
 
-def scanned(points, length):
+def scanned(points: np.ndarray, length: float) -> tuple[st.PointCloud, Steps]:
     """The cloud of some points, and the steps before the front."""
     cloud = st.PointCloud.from_array(points)
     return cloud, steps_of(cloud, st.Settings(length=length))
 
 
-def direction(angle):
+def direction(angle: float) -> tuple[float, float, float]:
     return np.cos(angle), np.sin(angle), 0.0
 
 
-def lattice(node, angle, length, reach=8):
+def lattice(node: ArrayLike, angle: float, length: float, reach: int = 8) -> np.ndarray:
     """All nodes around, by two loops."""
     u, v = (length * np.array(direction(a)) for a in (angle, angle + np.pi / 3))
     return np.array([np.add(node, i * u + j * v) for i in range(-reach, reach) for j in range(-reach, reach)])
@@ -40,19 +44,21 @@ def lattice(node, angle, length, reach=8):
 @pytest.mark.kernels
 @settings(max_examples=60, deadline=None)
 @given(places, places, angles)
-def test_the_nearest_node_is_that_of_a_search_through_all(node, place, angle):
-    node, place = (*node, 0.0), (*place, 0.0)
-    found = kernels.nearest_node(node, direction(angle), UP, place, 2.0)
-    every = lattice(node, angle, 2.0, 12)
-    least = np.linalg.norm(every - place, axis=1).min()
-    assert np.linalg.norm(np.subtract(found, place)) == pytest.approx(least, abs=1e-9)
+def test_the_nearest_node_is_that_of_a_search_through_all(
+    node: tuple[float, float], place: tuple[float, float], angle: float
+) -> None:
+    start, wanted = (*node, 0.0), (*place, 0.0)
+    found = kernels.nearest_node(start, direction(angle), UP, wanted, 2.0)
+    every = lattice(start, angle, 2.0, 12)
+    least = np.linalg.norm(every - wanted, axis=1).min()
+    assert np.linalg.norm(np.subtract(found, wanted)) == pytest.approx(least, abs=1e-9)
     assert np.linalg.norm(every - found, axis=1).min() < 1e-9
 
 
 @pytest.mark.kernels
 @settings(max_examples=60, deadline=None)
 @given(angles, angles)
-def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle, other):
+def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle: float, other: float) -> None:
     found = kernels.nearest_turn(direction(angle), direction(other), UP)
     most = max(np.dot(direction(angle + k * np.pi / 3), direction(other)) for k in range(6))
     assert np.dot(found, direction(other)) == pytest.approx(most, abs=1e-12)
@@ -61,7 +67,9 @@ def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle, other):
 @pytest.mark.kernels
 @settings(max_examples=40, deadline=None)
 @given(places, angles, angles)
-def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
+def test_the_place_between_two_posts_lies_in_both_planes(
+    place: tuple[float, float], first: float, second: float
+) -> None:
     p, q = np.array([0.0, 0.0, 0.0]), np.array([*place, 0.3])
     n = Rotation.from_rotvec([0.2 * np.cos(first), 0.2 * np.sin(first), 0]).apply(UP)
     m = Rotation.from_rotvec([0.2 * np.cos(second), 0.2 * np.sin(second), 0]).apply(UP)
@@ -73,7 +81,7 @@ def test_the_place_between_two_posts_lies_in_both_planes(place, first, second):
 
 
 @pytest.mark.parametrize("name", ["plate", "ball"])
-def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
+def test_posts_that_are_smoothed_at_once_are_not_linked(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laying, "SAMPLES_FOR_THREADS", 300)
     points = sheet(12.0, 8.0, 0.15, seed=1) if name == "plate" else ball(3.0, 8000)
     _, scan = scanned(points, 0.5)
@@ -90,7 +98,7 @@ def test_posts_that_are_smoothed_at_once_are_not_linked(name, monkeypatch):
 
 
 @pytest.mark.parametrize("processors", [1, 4])
-def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch):
+def test_rows_are_the_same_for_any_number_of_processors(processors: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laying, "SAMPLES_FOR_THREADS", 40)
     found = []
     for count in (2, processors):
@@ -102,7 +110,7 @@ def test_rows_are_the_same_for_any_number_of_processors(processors, monkeypatch)
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125), (3, 0.125), (4, 0.0)])
-def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, left_out):
+def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed: int, left_out: float) -> None:
     """All lie on it. Up to an eighth of its nodes are nearest to no post and are left out: the front makes these itself."""
     _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)
     nodes = rows_of(scan, 1.0, FieldStart())
@@ -120,7 +128,7 @@ def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed, 
 
 
 @pytest.mark.parametrize("turn", [10.0, 30.0])
-def test_rows_turn_as_they_are_told(turn):
+def test_rows_turn_as_they_are_told(turn: float) -> None:
     _, scan = scanned(sheet(12.0, 8.0, 0.2), 1.0)
     _, straight, node = lattice_start(scan.samples, scan.boundary, 1.0, 0.0)
     _, turned, same = lattice_start(scan.samples, scan.boundary, 1.0, turn)
@@ -130,16 +138,21 @@ def test_rows_turn_as_they_are_told(turn):
 
 
 @pytest.mark.parametrize("name", ["scallop", "sphere", "torus", "two_holes", "saddle"])
-def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
+def test_directions_of_neighbours_agree_but_at_a_few_singular_places(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shape = make(name, 20_000)
     _, scan = scanned(shape.points, shape.length)
-    found = {}
-    keep, laying._chosen = laying._chosen, lambda posts, owner, length: found.update(posts=posts)
-    try:
-        rows_of(scan, shape.length, FieldStart())
-    finally:
-        laying._chosen = keep
-    posts = found["posts"]
+    found: list[Level] = []
+    choose = laying._chosen
+
+    def kept(posts: Level, owner: np.ndarray, length: float) -> CandidateNodes:
+        found.append(posts)
+        return choose(posts, owner, length)
+
+    monkeypatch.setattr(laying, "_chosen", kept)
+    rows_of(scan, shape.length, FieldStart())
+    (posts,) = found
     pairs = np.argwhere(posts.neighbors >= 0)
     a, b = pairs[:, 0], posts.neighbors[pairs[:, 0], pairs[:, 1]]
     other = posts.direction[b] - posts.normals[a] * (posts.normals[a] * posts.direction[b]).sum(axis=1)[:, None]
@@ -152,7 +165,7 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(name):
     assert np.linalg.norm(posts.direction, axis=1) == pytest.approx(1.0)
 
 
-def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
+def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance() -> None:
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
     surface = scan.samples.surface
@@ -172,7 +185,7 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance():
         places = posts.mean
 
 
-def test_fields_made_together_are_those_made_alone():
+def test_fields_made_together_are_those_made_alone() -> None:
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
     starts = [FieldStart(10.0 * turn, scale) for turn in range(3) for scale in (1.0, 1.02)]
@@ -180,12 +193,12 @@ def test_fields_made_together_are_those_made_alone():
     for way, field in zip(starts, together, strict=True):
         assert field.start == way
         alone = rows_of(scanned(shape.points, shape.length)[1], shape.length, way)
-        assert field.nodes.places.tobytes() == alone.places.tobytes()
-    assert len({field.nodes.places.tobytes() for field in together}) == len(starts)
+        assert known(field.nodes).places.tobytes() == alone.places.tobytes()
+    assert len({known(field.nodes).places.tobytes() for field in together}) == len(starts)
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal", "best"])
-def test_no_rows_are_laid_by_the_paper_or_where_lengths_differ(effort):
+def test_no_rows_are_laid_by_the_paper_or_where_lengths_differ(effort: str) -> None:
     points = sheet(12.0, 8.0, 0.2)
     for asked in (
         st.Settings(length=1.0, method="paper", effort=effort),
@@ -195,7 +208,7 @@ def test_no_rows_are_laid_by_the_paper_or_where_lengths_differ(effort):
         assert all(field.nodes is None for field in orientation_fields(scan.samples, scan.boundary, asked))
 
 
-def test_nodes_of_rows_keep_apart_and_lie_near_the_scan():
+def test_nodes_of_rows_keep_apart_and_lie_near_the_scan() -> None:
     points = ball(5.0, 20_000)
     _, scan = scanned(points, 1.0)
     nodes = rows_of(scan, 1.0, FieldStart())
@@ -205,7 +218,7 @@ def test_nodes_of_rows_keep_apart_and_lie_near_the_scan():
     assert (nodes.normals * (nodes.places / 5.0)).sum(axis=1).min() > 0.9
 
 
-def test_rows_turn_and_move_with_the_scan():
+def test_rows_turn_and_move_with_the_scan() -> None:
     shape = make("clam", 20_000)
     turn = Rotation.from_rotvec([0.3, -0.8, 0.5])
     moved = turn.apply(shape.points) + [10.0, 20.0, -30.0]
@@ -215,7 +228,7 @@ def test_rows_turn_and_move_with_the_scan():
     assert np.abs(b.places + two.origin - expected).max() < 1e-7 * shape.length
 
 
-def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
+def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes() -> None:
     shape = make("scallop")
     cloud, scan = scanned(shape.points, shape.length)
     own = st.Settings(length=shape.length)
@@ -227,7 +240,7 @@ def test_the_front_comes_to_the_rows_and_leaves_fewer_irregular_nodes():
     assert with_rows.topology == without.topology
 
 
-def test_a_closed_surface_begins_with_a_triangle_of_rows():
+def test_a_closed_surface_begins_with_a_triangle_of_rows() -> None:
     cloud, scan = scanned(ball(5.0, 20_000), 1.0)
     grid = front_of(cloud, st.Settings(length=1.0), FieldStart())
     first = np.linalg.norm(np.diff(grid.nodes[grid.triangles[0]][[0, 1, 2, 0]], axis=0), axis=1)
@@ -236,7 +249,7 @@ def test_a_closed_surface_begins_with_a_triangle_of_rows():
     assert cKDTree(nodes.places).query(grid.nodes[grid.triangles[0]])[0].max() < 1e-9
 
 
-def test_appointed_positions_are_nodes_of_the_front():
+def test_appointed_positions_are_nodes_of_the_front() -> None:
     cloud = st.PointCloud.from_array(sheet(12.0, 8.0, 0.2))
     wanted = [(0.3, 0.2, 0.0), (3.1, -1.7, 0.0), (-4.4, 2.2, 0.0)]
     own = st.Settings(length=1.0, fixed=wanted)

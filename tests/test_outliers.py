@@ -1,8 +1,10 @@
 """Stray points are found, points of the surface are kept."""
 
+from typing import Any, Never
+
 import numpy as np
 import pytest
-from shapes import make
+from shapes import Shape, make
 
 import scantruss as st
 from scantruss import clean_points
@@ -15,7 +17,7 @@ from scantruss.scan.cloud import measure_gap
 from scantruss.surface.samples import sample_surface
 
 
-def marked(name, count, **options):
+def marked(name: str, count: int, **options: Any) -> tuple[Shape, np.ndarray, float]:
     """Return a cloud with a tenth of strays in its box, which of its points are true, and their spacing."""
     shape = make(name, count, outliers=0.1, **options)
     true = {point.tobytes() for point in make(name, count, **options).points}
@@ -40,7 +42,9 @@ def marked(name, count, **options):
         ("moebius", {}),
     ],
 )
-def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface_is_lost(name, options):
+def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface_is_lost(
+    name: str, options: dict[str, Any]
+) -> None:
     """Strays lie anywhere in the box enlarged by three tenths to all sides, those on the surface included."""
     shape, is_true, spacing = marked(name, 30_000, **options)
     outlier = outliers.find_outliers(shape.points, 3.0)
@@ -51,7 +55,7 @@ def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface
 
 
 @pytest.mark.parametrize("name", ["fold_over", "terrain", "flat_plate"])
-def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name):
+def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name: str) -> None:
     """Here a good part of the strays lies on the surface itself, where nothing tells them; in the plate's case half of them.
 
     The others of the plate lie in its own plane, a sparse surface: with other seeds between .91 and .97 of them are found.
@@ -63,7 +67,7 @@ def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name):
     assert outlier[is_true].mean() <= 0.005
 
 
-def test_strays_among_noise_are_found():
+def test_strays_among_noise_are_found() -> None:
     spacing = np.sqrt(make("cloth", 30_000).area / 30_000)
     shape, is_true, _ = marked("cloth", 30_000, noise=0.3 * spacing)
     outlier = outliers.find_outliers(shape.points, 3.0)
@@ -71,8 +75,8 @@ def test_strays_among_noise_are_found():
     assert outlier[is_true].mean() <= 0.005
 
 
-def test_a_scan_without_strays_is_not_searched(monkeypatch):
-    def never(*_):
+def test_a_scan_without_strays_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: Any) -> Never:
         raise AssertionError("looked for strays")
 
     monkeypatch.setattr("scantruss.surface.samples.judge_points", never)
@@ -80,7 +84,7 @@ def test_a_scan_without_strays_is_not_searched(monkeypatch):
     assert sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).outliers == 0
 
 
-def test_strays_are_counted_left_out_and_kept_if_asked():
+def test_strays_are_counted_left_out_and_kept_if_asked() -> None:
     shape = make("scallop", 20_000, outliers=0.05)
     cloud, own = st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)
     cleaned = sample_surface(cloud, own)
@@ -90,19 +94,19 @@ def test_strays_are_counted_left_out_and_kept_if_asked():
     assert kept.outliers == 0 and len(kept.surface.points) == len(shape.points)
 
 
-def test_a_tenth_of_strays_does_not_change_the_topology():
+def test_a_tenth_of_strays_does_not_change_the_topology() -> None:
     shape = make("scallop", outliers=0.1)
     grid = st.grid_from_points(shape.points, st.Settings(length=shape.length))
     assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (1, 1, 1)
     assert len(grid.boundary_loops) == len(shape.loops)
 
 
-def test_few_or_coinciding_points_are_no_strays():
+def test_few_or_coinciding_points_are_no_strays() -> None:
     assert not outliers.find_outliers(np.zeros((5, 3)), 3.0).any()
     assert not outliers.find_outliers(np.repeat(np.eye(3), 30, axis=0), 3.0)[:0].any()
 
 
-def test_parts_of_the_sites_find_the_same_neighbours():
+def test_parts_of_the_sites_find_the_same_neighbours() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (500, 3))
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 0.2, 500, 500)
     kernels.put_all(boxes, points, np.arange(500))
@@ -114,7 +118,7 @@ def test_parts_of_the_sites_find_the_same_neighbours():
 
 
 @pytest.mark.parametrize("seed", [0, 3])
-def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed):
+def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed: int) -> None:
     """What stands off the ground by more than a gap is left out, or nearly all of it; the ground stays."""
     shape = make("terrain", 20_000, outliers=0.1, seed=seed)
     away = shape.distance(shape.points)
@@ -125,7 +129,7 @@ def test_strays_in_the_flat_box_of_a_terrain_are_told_apart(seed):
     assert outlier[true].mean() < 0.002
 
 
-def pleated(width, depth, count=20_000):
+def pleated(width: float, depth: float, count: int = 20_000) -> np.ndarray:
     """Points of a sheet with sharp pleats in its middle, so many spacings wide and deep."""
     rng, spacing = np.random.default_rng(3), count**-0.5
     across = np.linspace(0, 1, 200_001)
@@ -138,12 +142,12 @@ def pleated(width, depth, count=20_000):
 
 
 @pytest.mark.parametrize("width, depth", [(2, 3), (4, 8), (6, 8)])
-def test_sharp_pleats_are_no_cloud_of_strays(width, depth):
+def test_sharp_pleats_are_no_cloud_of_strays(width: int, depth: int) -> None:
     """There the nearest points lie as thick as in a cloud, and yet they are the surface."""
     assert outliers.find_outliers(pleated(width, depth), 3.0).mean() <= 0.005
 
 
-def test_a_far_dense_ball_goes_though_it_has_a_tenth_of_the_points():
+def test_a_far_dense_ball_goes_though_it_has_a_tenth_of_the_points() -> None:
     shape = make("scallop", 20_000)
     rng = np.random.default_rng(0)
     way = rng.normal(size=(2000, 3))
@@ -152,7 +156,7 @@ def test_a_far_dense_ball_goes_though_it_has_a_tenth_of_the_points():
     assert (clean.kept >= 20_000).sum() == 0 and (clean.kept < 20_000).sum() >= 0.995 * 20_000
 
 
-def principal(points):
+def principal(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean of points (N, 3), their plane's normal, and their sums of squares about the mean along the principal axes, smallest first."""
     squares, axes = np.linalg.eigh(np.cov(points.T, bias=True) * len(points))
     return points.mean(axis=0), axes[:, 0], squares.clip(0.0)
@@ -161,7 +165,7 @@ def principal(points):
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("flat", [1.0, 0.2, 0.0])
-def test_planes_are_measured_as_principal_axes_tell(seed, flat):
+def test_planes_are_measured_as_principal_axes_tell(seed: int, flat: float) -> None:
     points = np.random.default_rng(seed).normal(size=(60, 3)) * [1.0, 0.8, flat]
     near = Nearby.of(points)
     which = np.arange(0, 60, 3)
@@ -178,7 +182,7 @@ def test_planes_are_measured_as_principal_axes_tell(seed, flat):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(4))
-def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(seed):
+def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(150, 3)) * [1.0, 0.9, 0.3]
     near = Nearby.of(points)
@@ -195,7 +199,9 @@ def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(s
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("extent, expected", [((1, 1, 1), 1 / 3), ((1, 1, 0), 0.0), ((1, 0, 0), 0.0)])
-def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(extent, expected):
+def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(
+    extent: tuple[int, int, int], expected: float
+) -> None:
     points = np.random.default_rng(0).normal(size=(8000, 3)) * extent
     near = Nearby.of(points)
     middle = np.flatnonzero(np.linalg.norm(near.tree.points, axis=1) < 0.5)[:200]
@@ -204,21 +210,23 @@ def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(extent, expect
     assert bulk.mean() == pytest.approx(expected, abs=0.1)
 
 
-def with_sparse_part(points, is_sparse, share, seed=0):
+def with_sparse_part(
+    points: np.ndarray, is_sparse: np.ndarray, share: float, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """Return points of which only a share is left in a part; and which of them lie there."""
     kept = ~is_sparse | (np.random.default_rng(seed).random(len(points)) < share)
     return points[kept], is_sparse[kept]
 
 
 @pytest.mark.parametrize("share", [0.1, 0.04, 0.02])
-def test_a_sparse_part_inside_a_sheet_is_no_stray(share):
+def test_a_sparse_part_inside_a_sheet_is_no_stray(share: float) -> None:
     """A face, or a wall in the shadow, that was scanned with a fraction of the points of the rest."""
     shape = make("sphere", 60_000)
     points, sparse = with_sparse_part(shape.points, shape.points[:, 2] > 35.0, share)
     assert outliers.find_outliers(points, 3.0)[sparse].mean() <= 0.03
 
 
-def test_a_sparse_wall_beside_a_dense_one_is_no_stray():
+def test_a_sparse_wall_beside_a_dense_one_is_no_stray() -> None:
     """A vessel whose inner wall has a tenth of the points of the outer one, a little more than its own spacing away."""
     rng = np.random.default_rng(1)
     turn, height = rng.uniform(0.0, 2 * np.pi, 44_000), rng.uniform(0.0, 60.0, 44_000)
@@ -229,7 +237,7 @@ def test_a_sparse_wall_beside_a_dense_one_is_no_stray():
     assert outlier[inner].mean() <= 0.02 and outlier[~inner].mean() <= 0.002
 
 
-def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length():
+def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length() -> None:
     shape = make("cloth", 20_000, outliers=0.05)
     cloud = st.PointCloud.from_array(shape.points)
     found = {sample_surface(cloud, st.Settings(length=share * shape.length)).outliers for share in (0.5, 1.0)}
@@ -237,7 +245,7 @@ def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length():
 
 
 @pytest.mark.kernels
-def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go():
+def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go() -> None:
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(24) * 1.0, np.arange(24) * 1.0))
     middle = (np.abs(x - 11.5) < 9) & (np.abs(y - 11.5) < 9)
     kept = ~middle | ((x % 5 == 1) & (y % 5 == 1))

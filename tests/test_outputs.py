@@ -19,7 +19,7 @@ LENGTHS = "x,y,z,length\n0,0,0,5\n9,9,9,6\n"
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with two scans and all other things that commands read; results may go to the folder out."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
@@ -34,7 +34,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def refused(capsys, words):
+def refused(capsys: pytest.CaptureFixture[str], words: list[str]) -> str:
     """Run a command that must be refused without a byte written or read of a scan; return what it says."""
     held = {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")}
     assert main(words) == 2
@@ -45,7 +45,7 @@ def refused(capsys, words):
 
 
 @pytest.fixture
-def unread(place, monkeypatch):
+def unread(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same, where no scan may be read."""
     for module, name in ((reading, "read_points"), (opened, "open_scan"), (fit, "spacing_to_fit")):
         monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("a scan was read"))
@@ -74,7 +74,9 @@ def unread(place, monkeypatch):
         ),
     ],
 )
-def test_nothing_that_is_read_is_written_over(unread, capsys, words, line):
+def test_nothing_that_is_read_is_written_over(
+    unread: Path, capsys: pytest.CaptureFixture[str], words: str, line: str
+) -> None:
     assert line in refused(capsys, words.split())
 
 
@@ -90,11 +92,15 @@ def test_nothing_that_is_read_is_written_over(unread, capsys, words, line):
         "demo out",
     ],
 )
-def test_a_folder_that_cannot_be_written_to_is_refused_at_the_start(unread, capsys, monkeypatch, words):
+def test_a_folder_that_cannot_be_written_to_is_refused_at_the_start(
+    unread: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     assert "no permission to write in the folder" in refused(capsys, words.split())
 
 
 @pytest.mark.parametrize("words", ["sweep a.xyz --length 1 -o b.xyz/deep", "demo b.xyz/deep", "demo b.xyz"])
-def test_a_folder_in_a_file_is_refused_at_the_start(unread, capsys, words):
+def test_a_folder_in_a_file_is_refused_at_the_start(
+    unread: Path, capsys: pytest.CaptureFixture[str], words: str
+) -> None:
     assert "b.xyz is a file; name a folder" in refused(capsys, words.split())

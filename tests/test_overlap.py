@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as some
 from range_scans import body, random_pose, scans_of
 from scipy.spatial import cKDTree
+from typed import xyz
 
+from scantruss.kernels.geometry.boxes import nearest
 from scantruss.kernels.scan import blend as blending
 from scantruss.kernels.scan import features as feature_kernels
 from scantruss.kernels.scan import overlap as kernels
@@ -16,14 +18,14 @@ from scantruss.scan.register.features import BINS, find_features, flip
 from scantruss.scan.register.fine import align, judge, solve
 from scantruss.scan.register.matching import fit_pose
 from scantruss.scan.register.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
-from scantruss.scan.register.views import boxes_of, make_view
+from scantruss.scan.register.views import View, boxes_of, make_view
 
 pytestmark = pytest.mark.kernels
 SPACING = 0.12
 
 
 @pytest.fixture(scope="module")
-def views():
+def views() -> tuple[View, View, np.ndarray]:
     """Two overlapping views of a body, and the true pose from the first to the second."""
     rng = np.random.default_rng(3)
     scans, poses = scans_of(body(2), [(1.0, 0.0, 0.0), (0.8, 0.6, 0.1)], rng, count=4000)
@@ -31,16 +33,16 @@ def views():
 
 
 @given(some.integers(0, 2**32 - 1))
-def test_the_nearest_place_is_the_nearest(seed):
+def test_the_nearest_place_is_the_nearest(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = rng.random((40, 3))
     boxes, reach = boxes_of(places, 0.2), rng.uniform(0.05, 0.5)
     for x in rng.uniform(-0.3, 1.3, (20, 3)):
         away, at = cKDTree(places).query(x)
-        assert kernels.nearest(boxes, places, *x, reach) == (at if away <= reach else -1)
+        assert nearest(boxes, places, *xyz(x), reach) == (at if away <= reach else -1)
 
 
-def test_the_first_place_within_reach_is_the_first():
+def test_the_first_place_within_reach_is_the_first() -> None:
     rng = np.random.default_rng(1)
     points, places = rng.random((200, 3)), rng.random((40, 3))
     owner = np.empty(200, np.int64)
@@ -49,7 +51,7 @@ def test_the_first_place_within_reach_is_the_first():
     assert np.array_equal(owner, np.where(near.any(axis=1), near.argmax(axis=1), -1))
 
 
-def test_places_keep_their_spacing_and_normals_face_outside(views):
+def test_places_keep_their_spacing_and_normals_face_outside(views: tuple[View, View, np.ndarray]) -> None:
     for view in views[:2]:
         assert len(view.points) > 80 and np.allclose(np.linalg.norm(view.normals, axis=1), 1.0)
         assert view.bulge > 0.5
@@ -58,13 +60,13 @@ def test_places_keep_their_spacing_and_normals_face_outside(views):
         assert 0.05 < view.on_boundary.mean() < 0.6
 
 
-def slow_values(p, n, q, m):
+def slow_values(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray) -> tuple[float, float, float]:
     d = (q - p) / np.linalg.norm(q - p)
     v = np.cross(d, n) / np.linalg.norm(np.cross(d, n))
     return v @ m, n @ d, np.arctan2(np.cross(n, v) @ m, n @ m)
 
 
-def test_histograms_count_the_angles_of_all_pairs_in_reach(views):
+def test_histograms_count_the_angles_of_all_pairs_in_reach(views: tuple[View, View, np.ndarray]) -> None:
     view, reach = views[0], 4 * SPACING
     edges = np.sort(np.random.default_rng(0).uniform(-1, 1, (3, 4)), axis=1)
     found = np.zeros((len(view.points), 2 * 3 * 5))
@@ -81,7 +83,7 @@ def test_histograms_count_the_angles_of_all_pairs_in_reach(views):
         assert np.allclose(found[p], slow.ravel())
 
 
-def test_features_do_not_change_when_a_scan_is_moved(views):
+def test_features_do_not_change_when_a_scan_is_moved(views: tuple[View, View, np.ndarray]) -> None:
     view = views[0]
     pose = random_pose(np.random.default_rng(8))
     points, normals = move(pose, view.points), turn_by(pose, view.normals)
@@ -93,7 +95,9 @@ def test_features_do_not_change_when_a_scan_is_moved(views):
     assert plain.shape == (len(view.points), 6 * BINS) and np.array_equal(plain, np.round(plain))
 
 
-def slow_sums(a, b, pose, reach, soft, sharp, centre):
+def slow_sums(
+    a: View, b: View, pose: np.ndarray, reach: float, soft: float, sharp: float, centre: np.ndarray
+) -> tuple[np.ndarray, int]:
     """One way of a plane-to-plane step: the pairs by a tree, the weights by inverting the sum of the covariances."""
     sums = np.zeros((6, 7))
     count = 0
@@ -115,7 +119,7 @@ def slow_sums(a, b, pose, reach, soft, sharp, centre):
     return sums, count
 
 
-def test_a_step_sums_what_generalized_icp_says(views):
+def test_a_step_sums_what_generalized_icp_says(views: tuple[View, View, np.ndarray]) -> None:
     a, b, pose = views
     pose = (
         small_motion(np.array([0.02, -0.01, 0.03]), np.array([0.01, 0.02, 0.0]), move(pose, a.points).mean(axis=0))
@@ -132,7 +136,7 @@ def test_a_step_sums_what_generalized_icp_says(views):
     assert np.allclose(sums[:6], slow, rtol=1e-6, atol=1e-6 * np.abs(slow).max())
 
 
-def test_judging_counts_what_agrees_and_what_does_not(views):
+def test_judging_counts_what_agrees_and_what_does_not(views: tuple[View, View, np.ndarray]) -> None:
     a, b, pose = views
     near, reach = 0.02, 0.36
     tree = cKDTree(b.points)
@@ -160,7 +164,7 @@ def test_judging_counts_what_agrees_and_what_does_not(views):
     assert right.agreement > 0.9 > wrong.agreement and right.score > wrong.score
 
 
-def test_alignment_finds_back(views):
+def test_alignment_finds_back(views: tuple[View, View, np.ndarray]) -> None:
     a, b, pose = views
     centre = move(pose, a.points).mean(axis=0)
     start = small_motion(np.array([0.05, -0.06, 0.04]), np.array([0.04, -0.05, 0.03]), centre) @ pose
@@ -170,7 +174,7 @@ def test_alignment_finds_back(views):
 
 
 @given(some.integers(0, 2**32 - 1))
-def test_poses(seed):
+def test_poses(seed: int) -> None:
     rng = np.random.default_rng(seed)
     pose, other = random_pose(rng), random_pose(rng)
     points = rng.normal(size=(7, 3))
@@ -188,13 +192,13 @@ def test_poses(seed):
 
 
 @given(some.integers(0, 2**32 - 1))
-def test_a_step_is_the_solution(seed):
+def test_a_step_is_the_solution(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, load = rng.normal(size=(12, 20)), rng.normal(size=12)
     assert np.allclose(solve(a @ a.T, load, 1.0), -np.linalg.solve(a @ a.T, load), atol=1e-2)
 
 
-def test_depth_is_the_distance_from_the_rim(views):
+def test_depth_is_the_distance_from_the_rim(views: tuple[View, View, np.ndarray]) -> None:
     view = views[0]
     boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.empty(len(view.points))
@@ -202,7 +206,7 @@ def test_depth_is_the_distance_from_the_rim(views):
     assert np.allclose(depth, np.minimum(cKDTree(boundary_points).query(view.points)[0], 0.5))
 
 
-def test_a_second_layer_moves_points_to_the_mean_and_takes_what_it_sees_better():
+def test_a_second_layer_moves_points_to_the_mean_and_takes_what_it_sees_better() -> None:
     """Two level plates 0.1 apart: with equal weights points move half-way; the deeper one keeps its points."""
     x, y = np.meshgrid(np.arange(12.0), np.arange(12.0))
     low = np.column_stack([x.ravel(), y.ravel(), np.zeros(144)])

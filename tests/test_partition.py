@@ -1,26 +1,30 @@
 """Two halves of a grid: apart, complete, and the same whoever works on them."""
 
+from collections.abc import Callable, Iterable
+from typing import Any
+
 import numpy as np
 import pytest
-from rough import rough_disc, rough_sphere, same_topology
+from rough import Rough, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve import equalize, perturbation
 from scantruss.improve.partition import Partition
+from scantruss.kernels.mesh.grid import Net
 from scantruss.kernels.mesh.partition import BETWEEN
 from scantruss.runtime import parallel
 
-MAKERS = {
+MAKERS: dict[str, Callable[[int], Rough]] = {
     "disc": lambda seed: rough_disc(length=0.14, seed=seed, points=9000),
     "sphere": lambda seed: rough_sphere(count=500, seed=seed, points=6000),
 }
 
 
 @pytest.fixture(params=sorted(MAKERS))
-def make(request):
+def make(request: pytest.FixtureRequest) -> Callable[..., Rough]:
     return MAKERS[request.param]
 
 
-def ways(net, start):
+def ways(net: Net, start: Iterable[int]) -> dict[int, int]:
     """Members from a set of nodes to each node, by plain rings."""
     away, ring, steps = dict.fromkeys(start, 0), list(start), 0
     while ring:
@@ -32,7 +36,7 @@ def ways(net, start):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(3))
-def test_two_rings_of_nodes_lie_between_the_halves(make, seed):
+def test_two_rings_of_nodes_lie_between_the_halves(make: Callable[..., Rough], seed: int) -> None:
     net = make(seed).mesh().net
     live = net.degree > 0
     partition = Partition(net, live)
@@ -44,7 +48,7 @@ def test_two_rings_of_nodes_lie_between_the_halves(make, seed):
 
 
 @pytest.mark.kernels
-def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make):
+def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make: Callable[..., Rough]) -> None:
     net = make(0).mesh().net
     free, used = net.free[: net.spare[0]].copy(), net.used
     partition = Partition(net, net.degree > 0)
@@ -56,13 +60,13 @@ def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make):
 
 
 @pytest.mark.kernels
-def test_a_grid_without_work_has_no_halves(make):
+def test_a_grid_without_work_has_no_halves(make: Callable[..., Rough]) -> None:
     net = make(0).mesh().net
     partition = Partition(net, np.zeros(len(net.arc), bool))
     assert (partition.label[net.degree > 0] == BETWEEN).all()
 
 
-def in_independent_sets(make, monkeypatch, seed=1):
+def in_independent_sets(make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch, seed: int = 1) -> Rough:
     """A relief small enough for a test that is settled and searched in halves all the same."""
     monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", 50)
     monkeypatch.setattr(equalize, "NODES_SEARCHED_IN_HALVES", 10)
@@ -71,7 +75,9 @@ def in_independent_sets(make, monkeypatch, seed=1):
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(3))
-def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_once(make, seed, monkeypatch):
+def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_once(
+    make: Callable[..., Rough], seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     net = in_independent_sets(make, monkeypatch, seed).mesh().net
     first, second, between = equalize.independent_sets_of(net)
     assert sorted([*first, *second, *between]) == np.flatnonzero(net.degree > 0).tolist()
@@ -83,7 +89,9 @@ def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_o
 
 
 @pytest.mark.parametrize("processors", [1, 4])
-def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, processors, monkeypatch):
+def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(
+    make: Callable[..., Rough], processors: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(parallel, "processors", lambda count=count: count)
@@ -98,7 +106,9 @@ def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(make, proces
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
+def test_halves_settle_as_well_as_the_whole(
+    make: Callable[..., Rough], seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     energies, sweeps = [], []
     for many in (50, 10_000):
         mesh = make(seed).mesh()
@@ -109,16 +119,18 @@ def test_halves_settle_as_well_as_the_whole(make, seed, monkeypatch):
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
 
 
-def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
+def test_what_lies_between_is_searched_after_the_halves(
+    make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
+) -> None:
     mesh = in_independent_sets(make, monkeypatch, 2).mesh()
     equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net, scratch = mesh.net, equalize.new_scratch(mesh)
     seen, run = [], Partition.run
 
-    def of_net():
+    def of_net() -> tuple[np.ndarray, ...]:
         return net.nodes, net.ring, net.degree, net.kind, net.curve, net.ideal, net.line
 
-    def look(partition, work):
+    def look(partition: Partition, work: Any) -> None:
         between = (partition.label == BETWEEN) & (net.degree > 0)
         old = [array[between].copy() for array in of_net()]
         run(partition, work)
@@ -135,7 +147,9 @@ def test_what_lies_between_is_searched_after_the_halves(make, monkeypatch):
 
 
 @pytest.mark.parametrize("processors", [1, 4])
-def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, monkeypatch):
+def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(
+    make: Callable[..., Rough], processors: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     nets = []
     for count in (2, processors):
         monkeypatch.setattr(parallel, "processors", lambda count=count: count)
@@ -152,13 +166,15 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(make, processors, 
         assert one.tobytes() == other.tobytes()
 
 
-def test_what_lies_between_stays_while_the_halves_are_kicked(make, monkeypatch):
+def test_what_lies_between_stays_while_the_halves_are_kicked(
+    make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
+) -> None:
     mesh = make(2).mesh()
     equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
     net = mesh.net
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 
-    def look(partition, work):
+    def look(partition: Partition, work: Any) -> None:
         parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN, 0, 1)]
         old = {name: getattr(net, name).copy() for name in names}
         run(partition, work)

@@ -1,14 +1,19 @@
 """Kicks: they lower the energy or leave no trace, and never touch the topology."""
 
+from typing import Any
+
 import naive_grid
 import numpy as np
 import pytest
-from rough import rough_disc, rough_sphere, same_topology
+from rough import Rough, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve.equalize import LENGTH_WEIGHT, PRICE, energy_of_node, new_scratch, settle
 from scantruss.improve.perturbation import new_area, search_widely
+from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.kernels.mesh import perturbation as kernels
-from scantruss.kernels.mesh.trial import total_energy
+from scantruss.kernels.mesh.grid import LOCKED, Net
+from scantruss.kernels.mesh.perturbation import Area
+from scantruss.kernels.mesh.trial import Scratch, total_energy
 
 MAKERS = {
     "disc": lambda seed=0: rough_disc(length=0.4, seed=seed, points=1500),
@@ -17,7 +22,7 @@ MAKERS = {
 
 
 @pytest.fixture(params=sorted(MAKERS))
-def settled(request):
+def settled(request: pytest.FixtureRequest) -> tuple[Rough, WorkingMesh, Scratch, Area]:
     """A rough grid, settled, with room for kicks."""
     rough = MAKERS[request.param]()
     mesh = rough.mesh()
@@ -25,18 +30,23 @@ def settled(request):
     return rough, mesh, new_scratch(mesh), new_area(mesh)
 
 
-def trace(net):
+def trace(net: Net) -> Any:
     """All that a net says of the nodes in use."""
     used = np.flatnonzero(net.degree > 0)
     rings = [net.ring[v, : net.degree[v]].tolist() for v in used]
     return used.tolist(), rings, net.nodes[used].tobytes(), net.arc[used].tobytes(), net.degree[used].tobytes()
 
 
+<<<<<<< HEAD
 def energy_of(mesh, scratch):
     return total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
+=======
+def energy_of(mesh: WorkingMesh, scratch: Scratch) -> float:
+    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
+>>>>>>> wc
 
 
-def perturb(mesh, scratch, area, v, worth, temperature=0.0):
+def perturb(mesh: WorkingMesh, scratch: Scratch, area: Area, v: int, worth: float, temperature: float = 0.0) -> bool:
     listed = kernels.list_area(mesh.net, mesh.patches, area, v) == kernels.LISTED
     return listed and kernels.perturb(
         mesh.net,
@@ -54,7 +64,7 @@ def perturb(mesh, scratch, area, v, worth, temperature=0.0):
 
 
 @pytest.mark.kernels
-def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
+def test_a_kick_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, mesh, scratch, area = settled
     net = mesh.net
@@ -72,7 +82,9 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled):
 
 
 @pytest.mark.kernels
-def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
+def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(
+    settled: tuple[Rough, WorkingMesh, Scratch, Area],
+) -> None:
     _, mesh, scratch, area = settled
     net = mesh.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
@@ -91,7 +103,9 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(settled):
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 
-def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(settled):
+def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
+    settled: tuple[Rough, WorkingMesh, Scratch, Area],
+) -> None:
     rough, mesh, scratch, area = settled
     net, paid = mesh.net, 0
     for v in np.flatnonzero(net.degree > 0).tolist() * 2:
@@ -105,7 +119,7 @@ def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(set
     assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
-def test_heat_lets_a_kick_cost_something(settled):
+def test_heat_lets_a_kick_cost_something(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     _, mesh, scratch, area = settled
     rises = 0
     for v in np.flatnonzero(mesh.net.degree > 0).tolist():
@@ -116,7 +130,9 @@ def test_heat_lets_a_kick_cost_something(settled):
 
 
 @pytest.mark.parametrize("effort", ["normal", "best"])
-def test_the_wide_search_lowers_the_energy_the_same_way_every_time(settled, effort):
+def test_the_wide_search_lowers_the_energy_the_same_way_every_time(
+    settled: tuple[Rough, WorkingMesh, Scratch, Area], effort: str
+) -> None:
     rough, mesh, _, _ = settled
     before = energy_of_node(mesh)
     search_widely(mesh, effort)
@@ -128,7 +144,7 @@ def test_the_wide_search_lowers_the_energy_the_same_way_every_time(settled, effo
     assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
-def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
+def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     rough, mesh, _, _ = settled
     grid = mesh.to_grid(rough.grid)
     mean = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean()
@@ -139,15 +155,15 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled):
 
 
 @pytest.mark.kernels
-def test_a_defect_is_left_alone(settled):
+def test_a_defect_is_left_alone(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     _, mesh, _, area = settled
-    mesh.net.kind[:] = kernels.LOCKED
+    mesh.net.kind[:] = LOCKED
     first = int(np.flatnonzero(mesh.net.degree > 0)[0])
     assert kernels.list_area(mesh.net, mesh.patches, area, first) == kernels.UNFIT
 
 
 @pytest.mark.kernels
-def test_an_area_that_reaches_out_of_bounds_is_told(settled):
+def test_an_area_that_reaches_out_of_bounds_is_told(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     _, mesh, _, area = settled
     net = mesh.net
     first = int(np.flatnonzero(net.degree > 0)[0])
@@ -161,7 +177,9 @@ def test_an_area_that_reaches_out_of_bounds_is_told(settled):
 
 
 @pytest.mark.kernels
-def test_a_net_is_as_before_until_a_member_of_the_area_changes(settled):
+def test_a_net_is_as_before_until_a_member_of_the_area_changes(
+    settled: tuple[Rough, WorkingMesh, Scratch, Area],
+) -> None:
     _, mesh, scratch, area = settled
     net, changed = mesh.net, 0
     for v in np.flatnonzero(net.degree > 0)[::4].tolist():

@@ -29,16 +29,15 @@ reveal_type(grid.certificate)
 """
 
 
-def typed_names():
+def typed_names() -> set[str]:
     """Names that type checkers find in the package."""
     tree = ast.parse((ROOT / "src" / "scantruss" / "__init__.py").read_text(encoding="utf-8"))
     guarded = [node for node in tree.body if isinstance(node, ast.If)]
-    return {
-        alias.asname for node in ast.walk(guarded[0]) if isinstance(node, ast.ImportFrom) for alias in node.names
-    } - {None}
+    imports = [node for node in ast.walk(guarded[0]) if isinstance(node, ast.ImportFrom)]
+    return {alias.asname for node in imports for alias in node.names if alias.asname}
 
 
-def test_each_public_name_is_there_and_has_a_type():
+def test_each_public_name_is_there_and_has_a_type() -> None:
     assert typed_names() == set(st.__all__) - {"__version__"}
     for name in st.__all__:
         value = getattr(st, name)
@@ -46,13 +45,13 @@ def test_each_public_name_is_there_and_has_a_type():
     assert dir(st) == st.__all__
 
 
-def test_other_names_are_refused():
+def test_other_names_are_refused() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'no_such_name'"):
         st.no_such_name  # noqa: B018
 
 
 @pytest.mark.parametrize("part", ["steps", "examples"])
-def test_what_a_user_writes_is_checked_strictly(part, tmp_path):
+def test_what_a_user_writes_is_checked_strictly(part: str, tmp_path: Path) -> None:
     """The steps of the README, and the examples: no Any comes out of the package."""
     pytest.importorskip("mypy")
     path = tmp_path / "user.py"

@@ -1,6 +1,8 @@
 """Figures and topology of a grid: against plain loops, hand-made grids, and the check beside the repository."""
 
+import importlib
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import naive_grid as naive
@@ -11,12 +13,13 @@ from hypothesis import strategies as some
 from rough import rough_disc, rough_sphere, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
+from scantruss import Grid
 from scantruss.report.figures import count_holes
 
 CHECK = Path(__file__).resolve().parents[2] / "shared" / "check"
 
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0.2), (2, 1, 0)]
-GRIDS = {
+GRIDS: dict[str, Callable[[], Grid]] = {
     "fan": fan,
     "icosahedron": icosahedron,
     "two pieces": two_pieces,
@@ -32,7 +35,7 @@ GRIDS = {
 
 
 @pytest.mark.parametrize("name", ["fan", "icosahedron", "dome", "rough disc", "moebius"])
-def test_figures_agree_with_plain_loops(name):
+def test_figures_agree_with_plain_loops(name: str) -> None:
     grid = GRIDS[name]()
     quality = grid.quality
     shape = [naive.shape(*grid.nodes[t]) for t in grid.triangles]
@@ -52,13 +55,13 @@ def test_figures_agree_with_plain_loops(name):
     assert quality.node_deviation_mean is None
 
 
-def test_deviation_is_that_of_the_nodes():
+def test_deviation_is_that_of_the_nodes() -> None:
     grid = fan(deviation=np.array([0.0, 0.2, 0.1, 0, 0, 0, 0]))
     assert grid.quality.node_deviation_mean == pytest.approx(0.3 / 7)
     assert grid.quality.node_deviation_max == pytest.approx(0.2)
 
 
-def test_an_empty_grid_has_zeros():
+def test_an_empty_grid_has_zeros() -> None:
     grid = make_grid([], [])
     assert all(value == 0 for value in grid.quality.to_dict().values() if value is not None)
     assert grid.topology.to_dict() == {
@@ -79,14 +82,16 @@ def test_an_empty_grid_has_zeros():
         ("twice", 1, 1, 2, False, True),
     ],
 )
-def test_topology_of_known_grids(name, components, loops, euler, manifold, orientable):
+def test_topology_of_known_grids(
+    name: str, components: int, loops: int, euler: int, manifold: bool, orientable: bool
+) -> None:
     topology = GRIDS[name]().topology
     assert (topology.components, topology.euler, topology.manifold) == (components, euler, manifold)
     if manifold:
         assert (topology.boundary_loops, topology.orientable) == (loops, orientable)
 
 
-def test_every_loop_is_a_hole_but_the_outer_rim_of_its_piece():
+def test_every_loop_is_a_hole_but_the_outer_rim_of_its_piece() -> None:
     ring = strip_of(12)
     beside = np.vstack([ring.nodes, ring.nodes + (100, 0, 0)])
     two_rings = make_grid(beside, np.vstack([ring.triangles, ring.triangles + len(ring.nodes)]))
@@ -102,7 +107,9 @@ def test_every_loop_is_a_hole_but_the_outer_rim_of_its_piece():
 
 
 @given(some.sets(some.integers(0, 19)), some.integers(0, 1))
-def test_whether_a_grid_is_orientable_does_not_depend_on_how_its_triangles_lie(turned, half_turns):
+def test_whether_a_grid_is_orientable_does_not_depend_on_how_its_triangles_lie(
+    turned: set[int], half_turns: int
+) -> None:
     for grid in (icosahedron(), strip_of(10, half_turns)):
         triangles = grid.triangles.copy()
         for t in turned:
@@ -113,9 +120,9 @@ def test_whether_a_grid_is_orientable_does_not_depend_on_how_its_triangles_lie(t
 
 @pytest.mark.skipif(not CHECK.exists(), reason="../shared/check is not here")
 @pytest.mark.parametrize("name", sorted(GRIDS))
-def test_figures_agree_with_the_check_beside_the_repository(name, monkeypatch):
+def test_figures_agree_with_the_check_beside_the_repository(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", [str(CHECK), *sys.path])
-    from quality import measure_grid
+    measure_grid = importlib.import_module("quality").measure_grid
 
     grid = GRIDS[name]()
     theirs, quality, topology = measure_grid(grid.nodes, grid.triangles), grid.quality, grid.topology

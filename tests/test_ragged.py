@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,10 +40,10 @@ def in_tiles(path: Path) -> tuple[np.ndarray, tuple[str, ...]]:
     )
 
 
-def every_way(path: Path, rows: list[str]) -> list:
+def every_way(path: Path, rows: list[str]) -> list[Any]:
     """Return points and what was left out, or the refusal, by each way of reading."""
     path.write_text("\n".join(rows) + "\n")
-    told = []
+    told: list[Any] = []
     for large in (1 << 23, 0):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(text, "LARGE", large)

@@ -6,6 +6,7 @@ import re
 import struct
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
@@ -248,8 +249,8 @@ def test_what_no_scan_has_is_told_with_the_other_notes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["points", "xyz", "Positions", "vertices", "coords", "pts", "arr_0", "anything"])
 def test_the_points_of_an_archive_are_found_by_name_wherever_they_stand(tmp_path: Path, name: str) -> None:
-    first = {"normals": np.ones((60, 3)), "K": np.eye(3), "pose": np.eye(4)}
-    np.savez(tmp_path / "a.npz", **first, **{name: roof()}, rgb=np.ones((60, 3)))
+    others: dict[str, Any] = {"normals": np.ones((60, 3)), "K": np.eye(3), "pose": np.eye(4)}
+    np.savez(tmp_path / "a.npz", **(others | {name: roof(), "rgb": np.ones((60, 3))}))
     assert np.array_equal(coordinates(tmp_path / "a.npz"), roof())
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,25 +19,26 @@ from scantruss.scan.cloud import PointCloud, measure_spacing
 from scantruss.scan.register import pairs as pair_module
 from scantruss.scan.register import splice_scans
 from scantruss.scan.register.pose_file import pose_values, read_poses
+from scantruss.scan.register.run import Splice
 from scantruss.scan.register.saving import splice_values
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 NAMES = ["a", "b", "c", "d"]
 
 
-def clouds_of(scans):
+def clouds_of(scans: Iterable[np.ndarray]) -> list[PointCloud]:
     return [PointCloud.from_array(scan) for scan in scans]
 
 
 @pytest.fixture(scope="module")
-def scanned():
+def scanned() -> tuple[list[np.ndarray], list[np.ndarray], Splice]:
     """Four scans around a body, their poses, and what became of them."""
     rng = np.random.default_rng(4)
     scans, poses = scans_of(body(1), around(4, rng), rng, noise=0.1)
     return scans, poses, splice_scans(clouds_of(scans), NAMES)
 
 
-def test_scans_come_together_without_help(scanned):
+def test_scans_come_together_without_help(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, poses, result = scanned
     turned, moved = errors_of(result.poses, poses, scans, NAMES)
     assert set(result.poses) == set(NAMES) and not result.left_out
@@ -45,7 +47,7 @@ def test_scans_come_together_without_help(scanned):
     assert result.spacing == pytest.approx(np.median([measure_spacing(scan) for scan in scans]))
 
 
-def test_every_residual_is_that_of_the_layers(scanned):
+def test_every_residual_is_that_of_the_layers(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     """A pair's residual, by slow means: the distance of each point from the plane of the nearest points of the other scan."""
     scans, _, result = scanned
     placed = {
@@ -66,7 +68,7 @@ def test_every_residual_is_that_of_the_layers(scanned):
         assert 0.0 < pair.overlap <= 1.0 and 0.9 < pair.agreement <= 1.0
 
 
-def test_the_order_of_the_scans_does_not_matter(scanned):
+def test_the_order_of_the_scans_does_not_matter(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, _, result = scanned
     again = splice_scans(clouds_of(scans[::-1]), NAMES[::-1])
     assert again.frame == "d"
@@ -78,7 +80,9 @@ def test_the_order_of_the_scans_does_not_matter(scanned):
     )
 
 
-def test_the_same_to_the_byte_with_one_thread(scanned, monkeypatch):
+def test_the_same_to_the_byte_with_one_thread(
+    scanned: tuple[list[np.ndarray], list[np.ndarray], Splice], monkeypatch: pytest.MonkeyPatch
+) -> None:
     scans, _, _result = scanned
     monkeypatch.setattr(pair_module, "processors", lambda: 1)
     again = splice_scans(clouds_of(scans[:2]), NAMES[:2])
@@ -88,7 +92,7 @@ def test_the_same_to_the_byte_with_one_thread(scanned, monkeypatch):
     assert all(again.poses[name].tobytes() == once_more.poses[name].tobytes() for name in again.poses)
 
 
-def test_a_stranger_is_left_out_by_name(scanned):
+def test_a_stranger_is_left_out_by_name(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, poses, _ = scanned
     rng = np.random.default_rng(9)
     stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], rng)
@@ -99,14 +103,14 @@ def test_a_stranger_is_left_out_by_name(scanned):
     assert turned < 0.5 and moved < 0.5 * result.spacing
 
 
-def test_scans_without_overlap_are_refused_by_name():
+def test_scans_without_overlap_are_refused_by_name() -> None:
     rng = np.random.default_rng(2)
     scans, _ = scans_of(body(1), [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], rng)
     with pytest.raises(InputError, match="front, back do not fit together"):
         splice_scans(clouds_of(scans), ["front", "back"])
 
 
-def test_a_sphere_fits_in_many_ways_and_is_refused():
+def test_a_sphere_fits_in_many_ways_and_is_refused() -> None:
     rng = np.random.default_rng(2)
     scans, _ = scans_of(lambda u: np.ones(len(u)), around(3, rng), rng, count=6000)
     with pytest.raises(InputError, match="do not fit together"):
@@ -114,7 +118,7 @@ def test_a_sphere_fits_in_many_ways_and_is_refused():
 
 
 @pytest.fixture(scope="module")
-def saddles():
+def saddles() -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Two scans of a saddle, which looks the same when turned by half a turn, and their poses."""
     rng = np.random.default_rng(7)
     scans, poses = [], []
@@ -128,7 +132,9 @@ def saddles():
     return scans, poses
 
 
-def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_given(saddles):
+def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_given(
+    saddles: tuple[list[np.ndarray], list[np.ndarray]],
+) -> None:
     scans, poses = saddles
     with pytest.raises(InputError, match=r"in more ways than one.*--poses"):
         splice_scans(clouds_of(scans), NAMES[:2])
@@ -137,14 +143,16 @@ def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_give
     assert turned < 0.5 and moved < given.spacing and not given.left_out
 
 
-def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(saddles):
+def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(
+    saddles: tuple[list[np.ndarray], list[np.ndarray]],
+) -> None:
     scans, _ = saddles
     rng = np.random.default_rng(100)
     with pytest.raises(InputError, match="in more ways than one"):
         splice_scans(clouds_of(scans), NAMES[:2], poses={name: random_pose(rng) for name in NAMES[:2]})
 
 
-def test_units_do_not_matter(scanned):
+def test_units_do_not_matter(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     """The same scans a thousand times as large, far from the origin."""
     scans, _, _result = scanned
     far = np.array([4e5, 5e6, 100.0])
@@ -162,7 +170,9 @@ def test_units_do_not_matter(scanned):
         assert np.abs(apart).max() < 0.2 * large.spacing
 
 
-def test_the_whole_has_one_layer_as_dense_as_one_scan(scanned):
+def test_the_whole_has_one_layer_as_dense_as_one_scan(
+    scanned: tuple[list[np.ndarray], list[np.ndarray], Splice],
+) -> None:
     scans, poses, result = scanned
     spacing = result.spacing
     true = [scan @ pose[:3, :3].T + pose[:3, 3] for scan, pose in zip(scans, poses, strict=False)]
@@ -177,14 +187,14 @@ def test_the_whole_has_one_layer_as_dense_as_one_scan(scanned):
     assert np.median(counts.sum(axis=0) / counts.max(axis=0)) > 1.4  # not so by itself
     radius = body(1)
 
-    def off(points):
+    def off(points: np.ndarray) -> float:
         far = np.linalg.norm(points, axis=1)
         return np.abs(far - radius(points / far[:, None])).mean()
 
     assert off(whole) < 1.02 * off(np.concatenate(true))
 
 
-def test_poses_to_start_from_and_poses_as_they_are(scanned):
+def test_poses_to_start_from_and_poses_as_they_are(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, poses, result = scanned
     rough = {}
     for name, pose in zip(NAMES, poses, strict=False):
@@ -203,7 +213,7 @@ def test_poses_to_start_from_and_poses_as_they_are(scanned):
         splice_scans(clouds_of(scans), NAMES, poses=dict(zip(NAMES[:3], poses, strict=False)), use_poses=True)
 
 
-def test_wrong_poses_taken_as_they_are_are_told(scanned):
+def test_wrong_poses_taken_as_they_are_are_told(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, _, result = scanned
     assert result.contradicting == () and result.alone == ()
     for shift in (1.5, 50.0):  # spacings: over the others but off them, and nowhere near
@@ -215,7 +225,7 @@ def test_wrong_poses_taken_as_they_are_are_told(scanned):
         assert bool(wrong.contradicting) == (shift < 10.0)
 
 
-def test_a_pair_of_which_nothing_agrees_is_listed_without_a_residual():
+def test_a_pair_of_which_nothing_agrees_is_listed_without_a_residual() -> None:
     plate = np.stack([*np.meshgrid(np.arange(60.0), np.arange(40.0)), np.zeros((40, 60))], axis=2).reshape(-1, 3)
     pose = np.eye(4)
     pose[2, 3] = 3.0
@@ -226,7 +236,9 @@ def test_a_pair_of_which_nothing_agrees_is_listed_without_a_residual():
     assert '"residual": null' in json.dumps(splice_values(result))
 
 
-def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(scanned):
+def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(
+    scanned: tuple[list[np.ndarray], list[np.ndarray], Splice],
+) -> None:
     scans, _, result = scanned
     again = splice_scans(clouds_of(scans), NAMES, poses=result.poses, use_poses=True)
     assert {(p.first, p.second) for p in again.pairs} == {(p.first, p.second) for p in result.pairs}
@@ -242,7 +254,7 @@ def test_poses_taken_as_they_are_are_measured_like_those_that_were_found(scanned
         (["mm", "m"], "must be in one unit"),
     ],
 )
-def test_what_cannot_be_spliced_is_refused(clouds, words):
+def test_what_cannot_be_spliced_is_refused(clouds: list[str], words: str) -> None:
     points = np.random.default_rng(0).random((100, 3))
     with pytest.raises(InputError, match=words):
         splice_scans([PointCloud.from_array(points, unit=unit) for unit in clouds])
@@ -251,7 +263,7 @@ def test_what_cannot_be_spliced_is_refused(clouds, words):
 # the files and the command
 
 
-def test_poses_are_read_back_as_they_were_written(tmp_path):
+def test_poses_are_read_back_as_they_were_written(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     poses = {f"{k}.ply": random_pose(rng) for k in range(40)}
     path = tmp_path / "poses.json"
@@ -286,7 +298,7 @@ def test_poses_are_read_back_as_they_were_written(tmp_path):
         ('{"a": [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]}', "no rigid motion"),
     ],
 )
-def test_a_broken_file_of_poses_is_refused(tmp_path, text, words):
+def test_a_broken_file_of_poses_is_refused(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "poses.json"
     path.write_text(text)
     with pytest.raises(FormatError, match=words):
@@ -294,7 +306,9 @@ def test_a_broken_file_of_poses_is_refused(tmp_path, text, words):
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch, scanned):
+def place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]
+) -> Path:
     """A folder with two scans in it, which is where the command runs."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
@@ -303,7 +317,7 @@ def place(tmp_path, monkeypatch, scanned):
     return tmp_path
 
 
-def test_the_command_writes_the_whole_and_the_poses(place, capsys):
+def test_the_command_writes_the_whole_and_the_poses(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["splice", "*.xyz", "-o", "whole.ply", "--unit", "m"]) == 0
     said = capsys.readouterr().out
     assert "2 of 2 scans in the frame of a.xyz" in said and "a.xyz - b.xyz" in said
@@ -339,7 +353,9 @@ def test_the_command_writes_the_whole_and_the_poses(place, capsys):
         (["a.xyz", "b.xyz", "-o", "out.ply", "--poses", "none.json"], "none.json"),
     ],
 )
-def test_a_refusal_is_one_line_and_writes_nothing(place, capsys, words, said):
+def test_a_refusal_is_one_line_and_writes_nothing(
+    place: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
     before = sorted(place.iterdir())
     assert main(["splice", *words]) == 2
     told = capsys.readouterr().err
@@ -347,7 +363,12 @@ def test_a_refusal_is_one_line_and_writes_nothing(place, capsys, words, said):
     assert sorted(place.iterdir()) == before
 
 
-def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(place, capsys, scanned, monkeypatch):
+def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(
+    place: Path,
+    capsys: pytest.CaptureFixture[str],
+    scanned: tuple[list[np.ndarray], list[np.ndarray], Splice],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     _, _, result = scanned
     result = replace(result, left_out=("x.xyz", "y.xyz"), doubtful=("y.xyz",))
     monkeypatch.setattr("scantruss.scan.register.splice_scans", lambda *_, **__: result)
@@ -360,7 +381,13 @@ def test_one_that_fits_nowhere_is_named_and_all_of_them_can_be_demanded(place, c
 
 
 @pytest.mark.parametrize("suffix", [".las", ".laz", ".ply"])
-def test_what_is_said_of_the_file_names_only_options_that_splice_has(place, capsys, scanned, monkeypatch, suffix):
+def test_what_is_said_of_the_file_names_only_options_that_splice_has(
+    place: Path,
+    capsys: pytest.CaptureFixture[str],
+    scanned: tuple[list[np.ndarray], list[np.ndarray], Splice],
+    monkeypatch: pytest.MonkeyPatch,
+    suffix: str,
+) -> None:
     monkeypatch.setattr("scantruss.scan.register.splice_scans", lambda *_, **__: scanned[2])
     assert main(["splice", "*.xyz", "-o", f"out{suffix}"]) == 0
     said = capsys.readouterr().out.partition("wrote ")[2]
@@ -369,8 +396,8 @@ def test_what_is_said_of_the_file_names_only_options_that_splice_has(place, caps
     assert options <= set(splice_parser()._option_string_actions)
 
 
-def test_it_can_be_stopped(scanned):
-    def stop(stage, share):
+def test_it_can_be_stopped(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
+    def stop(stage: str, share: float) -> None:
         if stage == "match":
             raise KeyboardInterrupt
 
@@ -378,7 +405,7 @@ def test_it_can_be_stopped(scanned):
         splice_scans(clouds_of(scanned[0]), NAMES, progress=stop)
 
 
-def shared(folder, poses):
+def shared(folder: str, poses: str) -> tuple[list[str], list[PointCloud], list[np.ndarray]]:
     """Names, clouds and true poses of the scans in a folder of the shared data."""
     true = read_poses(DATA / folder / poses)
     names = sorted(true)
@@ -389,7 +416,7 @@ def shared(folder, poses):
 @pytest.mark.parametrize(
     "folder, poses", [("twins/twin_scans", "ex3_limpet_poses.json"), ("real/bunny_scans", "poses.json")]
 )
-def test_shared_scans_come_together_where_the_truth_says(folder, poses):
+def test_shared_scans_come_together_where_the_truth_says(folder: str, poses: str) -> None:
     names, clouds, true = shared(folder, poses)
     result = splice_scans(clouds, names)
     assert not result.left_out

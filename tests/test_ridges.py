@@ -1,14 +1,19 @@
 """Sharp ridges of the scan: found where there are some, straight and in place, and nowhere else."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from marks import compiled_only
+from numpy.typing import ArrayLike
 from shapes import make
 from steps import steps_of
+from typed import known
 
-from scantruss import PointCloud, Settings, candidates, grid_from_points
+from scantruss import Grid, PointCloud, Settings, candidates, grid_from_points
+from scantruss.check.certify import certified
 from scantruss.constraints.ridges import Tracer, find_ridges, is_ridge, join_ends
 from scantruss.errors import FrontError
 from scantruss.kernels.geometry.quadric import COLUMNS, WEIGHT
@@ -18,7 +23,7 @@ from scantruss.surface.samples import sample_surface
 SIZE = 5.0  # member length of all shapes here
 
 
-def groin(count=40_000, radius=40.0, half=28.0, noise=0.02):
+def groin(count: int = 40_000, radius: float = 40.0, half: float = 28.0, noise: float = 0.02) -> np.ndarray:
     """Two barrel vaults that cross: ridges along both diagonals, which fade towards the middle."""
     rng = np.random.default_rng(3)
     xy = rng.uniform(-half, half, (count, 2))
@@ -26,7 +31,7 @@ def groin(count=40_000, radius=40.0, half=28.0, noise=0.02):
     return np.column_stack([xy, z]) + noise * rng.normal(size=(count, 3))
 
 
-def box(count=40_000, half=15.0, noise=0.02):
+def box(count: int = 40_000, half: float = 15.0, noise: float = 0.02) -> np.ndarray:
     """A cube: twelve ridges that meet by three."""
     rng = np.random.default_rng(4)
     places = rng.uniform(-half, half, (count, 3))
@@ -34,22 +39,22 @@ def box(count=40_000, half=15.0, noise=0.02):
     return places + noise * rng.normal(size=places.shape)
 
 
-def ridges_of(points, length=SIZE, **others):
+def ridges_of(points: np.ndarray, length: float = SIZE, **others: Any) -> list[tuple[np.ndarray, bool]]:
     settings = Settings(length=length, **others)
     return find_ridges(sample_surface(PointCloud.from_array(points), settings), settings)
 
 
-def line_nodes(grid):
+def line_nodes(grid: Grid) -> np.ndarray:
     return grid.nodes[np.unique(grid.lines)] + grid.origin
 
 
-def valences(grid):
+def valences(grid: Grid) -> list[int]:
     """How many nodes of lines have 1, 2, 3... members of lines."""
     return np.bincount(np.bincount(grid.lines.ravel()))[1:].tolist()
 
 
 @compiled_only
-def test_the_ridge_of_a_gable_is_a_straight_chain_from_rim_to_rim():
+def test_the_ridge_of_a_gable_is_a_straight_chain_from_rim_to_rim() -> None:
     shape = make("gable", 50_000)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
     nodes = line_nodes(grid)
@@ -62,7 +67,7 @@ def test_the_ridge_of_a_gable_is_a_straight_chain_from_rim_to_rim():
 
 
 @compiled_only
-def test_the_ridges_of_a_groin_vault_cross_in_its_middle():
+def test_the_ridges_of_a_groin_vault_cross_in_its_middle() -> None:
     grid = grid_from_points(groin(), Settings(length=SIZE))
     nodes = line_nodes(grid)
     assert (np.abs(np.abs(nodes[:, 0]) - np.abs(nodes[:, 1])) / np.sqrt(2)).max() < 0.05 * SIZE
@@ -73,7 +78,7 @@ def test_the_ridges_of_a_groin_vault_cross_in_its_middle():
 
 
 @compiled_only
-def test_the_ridges_of_a_cube_meet_in_its_corners():
+def test_the_ridges_of_a_cube_meet_in_its_corners() -> None:
     grid = grid_from_points(box(), Settings(length=SIZE))
     off = np.sort(np.abs(np.abs(line_nodes(grid)) - 15.0), axis=1)
     assert off[:, 1].max() < 0.05 * SIZE
@@ -83,18 +88,18 @@ def test_the_ridges_of_a_cube_meet_in_its_corners():
 
 
 @pytest.mark.parametrize("name", ["limpet", "torus", "pantheon", "l_plate", "flat_plate"])
-def test_smooth_shapes_have_no_ridge(name):
+def test_smooth_shapes_have_no_ridge(name: str) -> None:
     shape = make(name, 20_000)
     assert ridges_of(shape.points, 1.3 * shape.length) == []
 
 
 @pytest.mark.parametrize("name", ["scallop", "saddle", "fold_over"])
-def test_ribs_bumps_and_bends_are_no_ridges(name):
+def test_ribs_bumps_and_bends_are_no_ridges(name: str) -> None:
     shape = make(name, 30_000)
     assert ridges_of(shape.points, shape.length) == []
 
 
-def test_without_a_ridge_nothing_changes_and_zero_turns_the_search_off():
+def test_without_a_ridge_nothing_changes_and_zero_turns_the_search_off() -> None:
     shape = make("saddle", 10_000)
     settings = Settings(length=2 * shape.length)
     first = grid_from_points(shape.points, settings)
@@ -105,7 +110,7 @@ def test_without_a_ridge_nothing_changes_and_zero_turns_the_search_off():
         assert len(steps_of(gable, Settings(length=5.0, **others)).constraints.lines.curves) == 0
 
 
-def test_a_ridge_is_found_through_noise_and_in_any_pose():
+def test_a_ridge_is_found_through_noise_and_in_any_pose() -> None:
     for noise in (0.1, 0.2):
         shape = make("gable", 50_000, noise=noise, pose=True, seed=2)
         (found,) = ridges_of(shape.points)
@@ -116,26 +121,25 @@ def test_a_ridge_is_found_through_noise_and_in_any_pose():
         assert off.mean() < 0.05 * SIZE and np.ptp(places @ ahead) > 0.9 * 60
 
 
-def _origin(points):
+def _origin(points: np.ndarray) -> np.ndarray:
     return -PointCloud.from_array(points).origin
 
 
 @compiled_only
-def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch):
+def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch: pytest.MonkeyPatch) -> None:
     shape = make("gable", 20_000)
-    real = candidates.certified
 
-    def refuse_lines(grid, *others):
+    def refuse_lines(grid: Grid, *others: Any) -> Grid:
         if len(grid.lines):
             raise FrontError("no", grid)
-        return real(grid, *others)
+        return certified(grid, *others)
 
     monkeypatch.setattr(candidates, "certified", refuse_lines)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
-    assert len(grid.lines) == 0 and grid.settings.ridge_angle == 0.0
+    assert len(grid.lines) == 0 and known(grid.settings).ridge_angle == 0.0
 
 
-def folds(count=30, angle=60.0, wiggle=0.0, jitter=0.0, gain=1000.0):
+def folds(count: int = 30, angle: float = 60.0, wiggle: float = 0.0, jitter: float = 0.0, gain: float = 1000.0) -> Any:
     """A row of folds a quarter member apart, as `Tracer` finds them."""
     rng = np.random.default_rng(5)
     found = np.zeros((count, FOUND))
@@ -146,7 +150,7 @@ def folds(count=30, angle=60.0, wiggle=0.0, jitter=0.0, gain=1000.0):
     return found
 
 
-def test_what_is_short_blunt_or_uneven_is_no_ridge():
+def test_what_is_short_blunt_or_uneven_is_no_ridge() -> None:
     asked = np.radians(40.0)
     assert is_ridge(folds(), asked)
     assert not is_ridge(folds(count=11), asked)
@@ -157,8 +161,8 @@ def test_what_is_short_blunt_or_uneven_is_no_ridge():
     assert is_ridge(folds(jitter=3.0, gain=40.0), asked)  # what the noise explains
 
 
-def test_ends_that_face_each_other_or_one_corner_are_joined():
-    def row(a, b):
+def test_ends_that_face_each_other_or_one_corner_are_joined() -> None:
+    def row(a: ArrayLike, b: ArrayLike) -> np.ndarray:
         return np.array(a) + np.linspace(0, 1, 20)[:, None] * (np.array(b, float) - a)
 
     (whole,) = join_ends([row((0, 0, 0), (5, 0, 0)), row((12, 0.1, 0), (7, 0, 0))], 1.0)
@@ -170,7 +174,7 @@ def test_ends_that_face_each_other_or_one_corner_are_joined():
 
 @pytest.mark.kernels
 @given(st.integers(0, 10_000), st.booleans())
-def test_the_error_of_a_fold_is_that_of_least_squares(seed, folded):
+def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -> None:
     rng = np.random.default_rng(seed)
     buffer = np.zeros((60, COLUMNS))
     buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
@@ -190,7 +194,7 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed, folded):
 
 
 @pytest.mark.kernels
-def test_a_fold_is_measured_where_it_is():
+def test_a_fold_is_measured_where_it_is() -> None:
     """Planes that meet at a known angle: place, direction and angle, from sites to both sides of it."""
     rng = np.random.default_rng(1)
     for degrees in (30.0, 60.0, 90.0):

@@ -1,5 +1,7 @@
 """The disc that is rolled along the edge of a scan."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -9,11 +11,14 @@ from small_clouds import samples_of, sheet
 
 from scantruss.kernels.boundary.loops import DIRECTIONS, free_directions, has_gap
 from scantruss.kernels.geometry.vectors import across
+from scantruss.kernels.surface.local_surface import Surface
 
 
 @pytest.mark.kernels
 @given(st.lists(st.tuples(st.floats(-180, 180), st.floats(0.2, 1.0)), max_size=9), st.floats(20, 85))
-def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(others, widest):
+def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(
+    others: list[tuple[float, float]], widest: float
+) -> None:
     angles = np.radians([angle for angle, _ in others])
     turns = np.sort(angles % (2 * np.pi))
     gaps = np.diff(turns, append=turns[:1] + 2 * np.pi)
@@ -28,7 +33,7 @@ def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(others,
     assert found == bool((gaps > np.radians(widest)).any())
 
 
-def widest_free(surface, sample, radius):
+def widest_free(surface: Surface, sample: int, radius: float) -> tuple[Any, float, int]:
     """Middle of the widest run of directions in which a disc that touches a site holds no other one, 9 where there is none."""
     mean, u = surface.mean, np.array(across(tuple(surface.normals[sample])))
     turns = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
@@ -48,7 +53,7 @@ def widest_free(surface, sample, radius):
 @pytest.mark.kernels
 @settings(max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0.15, 0.4))
-def test_a_site_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed, radius):
+def test_a_site_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed: int, radius: float) -> None:
     """Points by chance leave gaps between their neighbours at many sites, into most of which no disc fits."""
     rng = np.random.default_rng(seed)
     surface = samples_of(np.pad(rng.uniform(0, 2, (250, 2)), ((0, 0), (0, 1))), length=0.3).surface

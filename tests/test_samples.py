@@ -14,6 +14,7 @@ from steps import boundary_of
 
 from scantruss import InputError, PointCloud, Settings, grid_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
+from scantruss.kernels.surface.local_surface import Surface
 from scantruss.kernels.surface.normals import (
     cut_steep_links,
     link_weights,
@@ -28,7 +29,7 @@ from scantruss.surface.samples import sample_surface
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal"])
-def test_a_run_leaves_no_memory_to_be_collected(effort):
+def test_a_run_leaves_no_memory_to_be_collected(effort: str) -> None:
     points, chosen = make("cloth", 4000).points, Settings(length=25.0, effort=effort)
     grid_from_points(points, chosen)  # loading kernels leaves some
     gc.collect()
@@ -44,7 +45,7 @@ def test_a_run_leaves_no_memory_to_be_collected(effort):
         gc.enable()
 
 
-def thinned(points, radius, capacity=None):
+def thinned(points: np.ndarray, radius: float, capacity: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """A site within the radius of each point, and the point of each site; a small capacity lets the table fill up on the way."""
     capacity = capacity or len(points)
     lower, upper = points.min(axis=0), points.max(axis=0)
@@ -63,7 +64,7 @@ def thinned(points, radius, capacity=None):
         put_all(boxes, points, chosen[:count])
 
 
-def linked(points, length=1.0):
+def linked(points: np.ndarray, length: float = 1.0) -> tuple[Surface, np.ndarray]:
     """Sites of a cloud and their (S, K) neighbours by brute force over the means."""
     surface = samples_of(points, length).surface
     pairs = [(s, int(n)) for s, row in enumerate(surface.neighbors) for n in row if n >= 0]
@@ -71,13 +72,13 @@ def linked(points, length=1.0):
 
 
 @cache
-def small_ball():
+def small_ball() -> Surface:
     """Sites of a ball, prepared once."""
     return samples_of(ball(2.0, 400)).surface
 
 
 @st.composite
-def clouds(draw):
+def clouds(draw: st.DrawFn) -> np.ndarray:
     """Random points, flat ones and repeated ones among them, anywhere."""
     rng = np.random.default_rng(draw(st.integers(0, 10_000)))
     extent = np.array([1.0, draw(st.sampled_from([0.0, 0.2, 1.0])), draw(st.sampled_from([0.0, 0.1, 1.0]))])
@@ -87,7 +88,7 @@ def clouds(draw):
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
-def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points, radius):
+def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points: np.ndarray, radius: float) -> None:
     owner, chosen = thinned(points, radius)
     assert chosen.tolist() == naive.thin(points, radius)
     assert (np.linalg.norm(points - points[chosen[owner]], axis=1) < radius).all()
@@ -98,7 +99,7 @@ def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points, radi
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
-def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points, radius):
+def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points: np.ndarray, radius: float) -> None:
     """With links to all the others that is the nearest of all, the first of several that are as near but for rounding."""
     owner, chosen = thinned(points, radius)
     places, all_others = points[chosen], np.arange(len(chosen))
@@ -110,7 +111,7 @@ def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points, radius
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8), st.integers(0, 50))
-def test_sites_move_with_the_cloud(points, radius, seed):
+def test_sites_move_with_the_cloud(points: np.ndarray, radius: float, seed: int) -> None:
     """A turn and a shift of the cloud change nothing, unless rounding decides which of two distances is the larger."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     for row in distance:
@@ -127,13 +128,13 @@ def test_sites_move_with_the_cloud(points, radius, seed):
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.3))
-def test_room_that_runs_out_on_the_way_makes_no_difference(points, radius):
+def test_room_that_runs_out_on_the_way_makes_no_difference(points: np.ndarray, radius: float) -> None:
     assert thinned(points, radius, 2)[1].tolist() == thinned(points, radius)[1].tolist()
 
 
 @pytest.mark.kernels
 @given(clouds(), st.integers(0, 99))
-def test_points_are_grouped_by_site_with_their_means(points, seed):
+def test_points_are_grouped_by_site_with_their_means(points: np.ndarray, seed: int) -> None:
     owner = np.random.default_rng(seed).permutation(np.arange(len(points)) % 7)
     samples = int(owner.max()) + 1
     start, mean = np.zeros(samples + 1, np.int64), np.zeros((samples, 3))
@@ -147,7 +148,7 @@ def test_points_are_grouped_by_site_with_their_means(points, seed):
 
 @pytest.mark.kernels
 @given(st.integers(0, 1000), st.integers(8, 60), st.floats(0.3, 3.0))
-def test_nearest_sites_are_the_nearest(seed, count, far):
+def test_nearest_sites_are_the_nearest(seed: int, count: int, far: float) -> None:
     places = np.random.default_rng(seed).random((count, 3)) * [2.0, 2.0, 0.2]
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
     put_all(boxes, places, np.arange(count))
@@ -161,7 +162,7 @@ def test_nearest_sites_are_the_nearest(seed, count, far):
 
 @pytest.mark.kernels
 @given(st.integers(0, 1000))
-def test_normals_agree_with_those_of_numpy(seed):
+def test_normals_agree_with_those_of_numpy(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mean = rng.normal(size=(13, 3)) * [1.0, 0.8, 0.2] @ turn_of(seed).T + [100.0, -40.0, 7.0]
     neighbors = np.full((13, 12), -1, np.int64)
@@ -176,7 +177,7 @@ def test_normals_agree_with_those_of_numpy(seed):
 
 
 @pytest.mark.kernels
-def test_the_normals_of_a_plate_are_those_of_the_plate():
+def test_the_normals_of_a_plate_are_those_of_the_plate() -> None:
     turn = turn_of(4)
     surface = samples_of(sheet(5, 4, 0.25) @ turn.T).surface
     assert abs(surface.normals @ turn[:, 2]) == pytest.approx(1, abs=1e-9)
@@ -185,7 +186,7 @@ def test_the_normals_of_a_plate_are_those_of_the_plate():
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(4))
-def test_the_normals_of_a_ball_point_outwards_from_its_centre(seed):
+def test_the_normals_of_a_ball_point_outwards_from_its_centre(seed: int) -> None:
     points = ball(2.0, 500, seed=seed) @ turn_of(seed) + [50.0, -20.0, 3.0]
     surface = samples_of(points).surface
     outwards = surface.mean + samples_origin(points) - [50.0, -20.0, 3.0]
@@ -193,11 +194,11 @@ def test_the_normals_of_a_ball_point_outwards_from_its_centre(seed):
     assert ((surface.normals * outwards).sum(axis=1) > np.cos(np.radians(6))).all()
 
 
-def samples_origin(points):
+def samples_origin(points: np.ndarray) -> np.ndarray:
     return PointCloud.from_array(points).origin
 
 
-def test_the_normals_of_a_torus_point_outwards_even_in_its_hole():
+def test_the_normals_of_a_torus_point_outwards_even_in_its_hole() -> None:
     surface = samples_of(tire(4.0, 1.5, 0.2), 0.8).surface
     around = surface.mean * [1, 1, 0]
     centre = 4.0 * around / np.linalg.norm(around, axis=1)[:, None]
@@ -206,7 +207,7 @@ def test_the_normals_of_a_torus_point_outwards_even_in_its_hole():
 
 
 @pytest.mark.parametrize("name", ["saddle", "gable", "pantheon", "thin_strip", "terrain"])
-def test_all_normals_of_a_two_sided_surface_are_on_one_side(name):
+def test_all_normals_of_a_two_sided_surface_are_on_one_side(name: str) -> None:
     """Linked neighbours face the same way everywhere; the helical strip turns round twice and is still two-sided."""
     shape = make(name, 20_000)
     surface, pairs = linked(shape.points, shape.length)
@@ -215,14 +216,14 @@ def test_all_normals_of_a_two_sided_surface_are_on_one_side(name):
     boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))  # is not refused
 
 
-def test_one_sided_surfaces_are_refused():
+def test_one_sided_surfaces_are_refused() -> None:
     shape = make("moebius", 20_000)
     with pytest.raises(InputError, match="one-sided"):
         boundary_of(PointCloud.from_array(shape.points), Settings(length=shape.length))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed):
+def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed: int) -> None:
     shape = make("moebius", 12_000, seed=seed, pose=True, scale=0.01)
     with pytest.raises(InputError, match="one-sided"):
         boundary_of(PointCloud.from_array(shape.points), Settings(length=1.2 * shape.length))
@@ -231,7 +232,7 @@ def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed):
 @pytest.mark.kernels
 @given(st.integers(0, 1000))
 @settings(max_examples=6)
-def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed):
+def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed: int) -> None:
     """Whatever the signs of the normals, all of a piece end on one side: that of its first site or the other."""
     surface = small_ball()
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(surface.mean))
@@ -248,7 +249,7 @@ def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed):
 
 
 @pytest.mark.kernels
-def test_link_weights_are_0_between_mirrored_normals_and_most_without_a_link():
+def test_link_weights_are_0_between_mirrored_normals_and_most_without_a_link() -> None:
     """Two places of a circle: each normal is the other one mirrored at the plane half-way, however far apart they are."""
     angle = np.radians([0.0, 70.0])
     mean = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
@@ -261,7 +262,7 @@ def test_link_weights_are_0_between_mirrored_normals_and_most_without_a_link():
 
 
 @pytest.mark.kernels
-def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay():
+def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay() -> None:
     up, side = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     mean = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0.1, 0, -1)], float)
     normals = np.array([up, up, up, side])
@@ -271,7 +272,7 @@ def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay():
 
 
 @pytest.mark.kernels
-def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere():
+def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere() -> None:
     normals = np.array([(0, 0, 1), (0, 0.6, 0.8), (0, 0, -1), (1, 0, 0)], float)
     neighbors = np.array([[1, 2, 3], [-1, -1, -1], [-1, -1, -1], [-1, -1, -1]])
     smoothed = np.empty((4, 3))
@@ -282,7 +283,7 @@ def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere():
 
 
 @pytest.mark.parametrize("gap", [0.6, 0.7])
-def test_links_do_not_lead_to_a_second_sheet(gap):
+def test_links_do_not_lead_to_a_second_sheet(gap: float) -> None:
     """Two plates less than a member apart: no site that is a member away from the rim is linked to the other plate."""
     plate = sheet(4, 4, 0.1)
     surface = samples_of(np.concatenate([plate, plate[:, [1, 0, 2]] + [0, 0, gap]])).surface
@@ -294,7 +295,7 @@ def test_links_do_not_lead_to_a_second_sheet(gap):
 
 
 @pytest.mark.kernels
-def test_pieces_are_numbered_by_size_and_debris_is_no_piece():
+def test_pieces_are_numbered_by_size_and_debris_is_no_piece() -> None:
     large, small = sheet(6, 5, 0.25), sheet(4, 3, 0.25) + np.array([9, 0, 0])
     debris = sheet(0.5, 0.5, 0.25) + np.array([0, 9, 0])
     samples = samples_of(np.concatenate([small, debris, large]))
@@ -308,7 +309,7 @@ def test_pieces_are_numbered_by_size_and_debris_is_no_piece():
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.12])
-def test_a_rough_cloud_is_seen_as_a_sheet(noise):
+def test_a_rough_cloud_is_seen_as_a_sheet(noise: float) -> None:
     """Where the points scatter by a tenth of a member, sites lie nearer to the plane than points, and their normals stand on it."""
     points = sheet(12, 10, 0.1, noise=noise)
     surface = samples_of(points).surface
@@ -317,7 +318,7 @@ def test_a_rough_cloud_is_seen_as_a_sheet(noise):
     assert np.degrees(np.arccos(abs(surface.normals[inside, 2]))).mean() < 4
 
 
-def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough():
+def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough() -> None:
     """They stay where they are: moved to the plane around them they would leave the ridges, and others would be chosen."""
     shape = make("great_court", 100_000)
     length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
@@ -329,13 +330,13 @@ def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough():
     )
 
 
-def test_the_area_is_about_right():
+def test_the_area_is_about_right() -> None:
     assert samples_of(sheet(10, 8, 0.15)).area == pytest.approx(80, rel=0.2)
     assert samples_of(ball(3.0, 6000)).area == pytest.approx(36 * np.pi, rel=0.2)
 
 
 @pytest.mark.kernels
-def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay():
+def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay() -> None:
     cloud = PointCloud.from_array(sheet(4, 3, 0.25))
     first = sample_surface(cloud, Settings(length=1.0))
     assert sample_surface(cloud, Settings(length=1.0, method="paper")) is first
@@ -344,13 +345,13 @@ def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay():
 
 
 @pytest.mark.kernels
-def test_same_cloud_same_bytes():
+def test_same_cloud_same_bytes() -> None:
     a, b = (samples_of(cap(3.0, 1.0, 0.3)) for _ in range(2))
     for x, y in zip(a.surface, b.surface, strict=True):
         assert np.asarray(x).tobytes() == np.asarray(y).tobytes()
 
 
-def test_repeated_points_change_no_site():
+def test_repeated_points_change_no_site() -> None:
     points = sheet(8, 6, 0.2)
     a = samples_of(points).surface
     b = samples_of(np.concatenate([points, points[::3]])).surface
@@ -358,13 +359,13 @@ def test_repeated_points_change_no_site():
     assert a.neighbors.tolist() == b.neighbors.tolist() or abs(a.mean - b.mean).max() < 0.1
 
 
-def test_points_are_sorted_where_their_sites_are_many(monkeypatch):
+def test_points_are_sorted_where_their_sites_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same points, each near those before it; points of few sites stay as they are."""
     monkeypatch.setattr(module, "SAMPLES_TO_SORT", 1_000)
     points = sheet(20.0, 20.0, 0.3)
     bounds = bounds_of(points)
 
-    def step(places):
+    def step(places: np.ndarray) -> float:
         return np.linalg.norm(np.diff(places, axis=0), axis=1).mean()
 
     found = module.thin_dense(points, bounds, 0.2, 0.3)

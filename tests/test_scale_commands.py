@@ -5,10 +5,13 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from steps import boundary_of
+from typed import known
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -20,7 +23,7 @@ from scantruss.scan.stream.thinning import thin_points
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
 
-def plate(count=60_000, seed=3, noise=0.02):
+def plate(count: int = 60_000, seed: int = 3, noise: float = 0.02) -> np.ndarray:
     """Points on an arched plate of 40 x 30 with a round hole."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0, 40, count), rng.uniform(0, 30, count)
@@ -30,7 +33,7 @@ def plate(count=60_000, seed=3, noise=0.02):
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder with a scan in it, which is where the command runs."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
@@ -38,7 +41,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def refused(capsys, *words):
+def refused(capsys: pytest.CaptureFixture[str], *words: Any) -> str:
     """Run a command that must be refused; return the one line that it says."""
     names = sorted(entry.name for entry in os.scandir("."))
     assert main(words) == 2
@@ -51,7 +54,7 @@ def refused(capsys, *words):
 # ---- thin ----------------------------------------------------------------------------------------------------------
 
 
-def test_thin_writes_one_point_a_box(place, capsys):
+def test_thin_writes_one_point_a_box(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.save("more.npy", plate(seed=4) + (100, 0, 0))
     both = np.concatenate([plate(), plate(seed=4) + (100, 0, 0)])
     assert main(["thin", "scan.npy", "more.npy", "-o", "thin.npy", "--spacing", "0.5"]) == 0
@@ -82,7 +85,9 @@ def test_thin_writes_one_point_a_box(place, capsys):
         (("scan.npy", "-o", "thin.ply", "--spacing", "1e-16"), "too small for points so far from zero"),
     ],
 )
-def test_thin_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
+def test_thin_refuses_in_one_line_and_writes_nothing(
+    words: tuple[str, ...], line: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert line in refused(capsys, "thin", *words)
 
 
@@ -99,7 +104,7 @@ print(found.read, *peaks)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is told in other units elsewhere")
-def test_memory_follows_the_result_and_not_the_scan(tmp_path):
+def test_memory_follows_the_result_and_not_the_scan(tmp_path: Path) -> None:
     for name, millions in (("small.npy", 2), ("large.npy", 8)):
         rows = np.tile(np.random.default_rng(1).uniform(0, 30, (500_000, 3)).astype("f4"), (2 * millions, 1))
         np.save(tmp_path / name, rows)
@@ -113,7 +118,7 @@ def test_memory_follows_the_result_and_not_the_scan(tmp_path):
 # ---- larger than memory --------------------------------------------------------------------------------------------
 
 
-def curves_of(grid):
+def curves_of(grid: st.Grid) -> float:
     """Mean distance of the rim nodes outside (positive) of the true rim of the plate."""
     nodes = (grid.nodes + grid.origin)[np.concatenate(grid.boundary_loops)]
     x, y = nodes[:, 0], nodes[:, 1]
@@ -121,7 +126,7 @@ def curves_of(grid):
     return -float(inside.mean())
 
 
-def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path):
+def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path: Path) -> None:
     """The cloud is so dense that a box holds 14 points; means alone would lose 0.04 of rim."""
     points = plate(600_000)
     np.save(tmp_path / "scan.npy", points)
@@ -143,7 +148,9 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     assert abs(found.quality.shape_mean - whole.quality.shape_mean) < 0.005
 
 
-def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, monkeypatch):
+def test_the_grid_command_thins_what_is_too_large_and_says_so(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     words = ["grid", "scan.npy", "grid.obj", "--length", "4", "--effort", "quick"]
     assert main([*words, "--memory", "1MB"]) == 0
@@ -157,7 +164,9 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(place, capsys, mon
     assert "thinned" not in capsys.readouterr().out
 
 
-def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatch):
+def test_info_looks_at_what_is_too_large_through_boxes(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     assert main(["info", "scan.npy"]) == 0
     whole = "".join(capsys.readouterr())
@@ -179,7 +188,12 @@ def test_info_looks_at_what_is_too_large_through_boxes(place, capsys, monkeypatc
 
 
 @pytest.mark.parametrize("place_of_all", [(0, 0, 0), (5e5, 5.4e6, 200)])
-def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, monkeypatch, place_of_all):
+def test_a_first_look_does_not_heed_points_that_stand_for_none(
+    place: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    place_of_all: tuple[float, float, float],
+) -> None:
     """One point in a hundred at (0, 0, 0), with others at a far place: no echo."""
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     monkeypatch.setattr(fit, "BULK", 3000)
@@ -198,7 +212,7 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(place, capsys, mo
     assert "thinned while it was read" in capsys.readouterr().err
 
 
-def test_a_first_look_sees_thin_far_ends(place):
+def test_a_first_look_sees_thin_far_ends(place: Path) -> None:
     """A few points of a scan reach as far again as all others: a scanner sees far in few directions."""
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.uniform(-1, 1, (20_000, 3)), rng.uniform(-3, 3, (100, 3))])
@@ -207,7 +221,7 @@ def test_a_first_look_sees_thin_far_ends(place):
     assert found == pytest.approx(np.linalg.norm(np.ptp(points, axis=0)) / fit.LOOK, rel=0.01)
 
 
-def test_what_fits_into_memory_is_taken_as_it_is(place):
+def test_what_fits_into_memory_is_taken_as_it_is(place: Path) -> None:
     settings = st.Settings(length=4.0)
     assert fit.spacing_to_fit(["scan.npy"], settings) == 0.0
     assert fit.spacing_to_fit(["scan.npy"], settings, memory=1.0) == 0.0  # so few are never too many
@@ -215,26 +229,26 @@ def test_what_fits_into_memory_is_taken_as_it_is(place):
     assert same is settings and np.array_equal(cloud.points, st.read_points("scan.npy").points)
 
 
-def test_the_machine_tells_its_memory():
+def test_the_machine_tells_its_memory() -> None:
     assert 1e7 < available_memory() < 1e15
 
 
 @pytest.mark.parametrize(
     ("text", "size"), [("4GB", 4e9), ("500 MB", 5e8), ("1.5g", 1.5e9), ("123456", 123456.0), ("2KiB", 2000.0)]
 )
-def test_sizes_of_memory_are_understood(text, size):
+def test_sizes_of_memory_are_understood(text: str, size: float) -> None:
     assert size_of_memory(text) == size
 
 
 @pytest.mark.parametrize("text", ["much", "-4GB", "0", "4 parsecs", ""])
-def test_other_sizes_are_refused(text, place, capsys):
+def test_other_sizes_are_refused(text: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "such as 4GB" in refused(capsys, "grid", "scan.npy", "grid.obj", "--length", "4", f"--memory={text}")
 
 
 # ---- sweep ---------------------------------------------------------------------------------------------------------
 
 
-def test_a_sweep_tells_of_every_combination(place, capsys):
+def test_a_sweep_tells_of_every_combination(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["sweep", "scan.npy", "--length", "5,7,0.1", "--effort", "quick", "--prefer", "balance,shapes"]
     assert main([*words, "-o", "out", "--workers", "1"]) == 0
     said = capsys.readouterr().out
@@ -251,7 +265,11 @@ def test_a_sweep_tells_of_every_combination(place, capsys):
         "table.csv", "table.md", "index.html", "overview.png",
     }  # fmt: skip
     grid = st.read_grid("out/length-7_prefer-shapes.json")
-    assert (grid.settings.length, grid.settings.prefer, grid.settings.effort) == (7.0, "shapes", "quick")
+    assert (known(grid.settings).length, known(grid.settings).prefer, known(grid.settings).effort) == (
+        7.0,
+        "shapes",
+        "quick",
+    )
     assert rows[3]["nodes"] == str(len(grid.nodes)) and rows[3]["length std/mean"] == f"{grid.quality.length_cv:.4f}"
     page = (place / "out" / "index.html").read_text()
     assert page.count("<img") == 4 and page.count("<tr>") == 7
@@ -259,7 +277,7 @@ def test_a_sweep_tells_of_every_combination(place, capsys):
     assert "wrote 4 grids" in said and "passed" in said
 
 
-def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
+def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place: Path, tmp_path: Path) -> None:
     import warnings
 
     distributed = pytest.importorskip("distributed")
@@ -289,15 +307,17 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place, tmp_path):
         (("--length", "0.1,0.2"), "no grid came out of 2 trials; the first: length 0.1 is too small"),
     ],
 )
-def test_a_sweep_refuses_in_one_line_and_writes_nothing(words, line, place, capsys):
+def test_a_sweep_refuses_in_one_line_and_writes_nothing(
+    words: tuple[str, ...], line: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
 
 
-def test_a_sweep_into_a_file_is_refused(place, capsys):
+def test_a_sweep_into_a_file_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "is a file" in refused(capsys, "sweep", "scan.npy", "--length", "5", "-o", "scan.npy")
 
 
-def test_several_workers_are_announced_and_change_no_byte(place, capsys):
+def test_several_workers_are_announced_and_change_no_byte(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["thin", "scan.npy", "--spacing", "2", "--keep", "nearest", "--boundary"]
     assert main([*words, "-o", "alone.npy", "--workers", "1"]) == 0
     assert "processes" not in capsys.readouterr().err
@@ -306,7 +326,9 @@ def test_several_workers_are_announced_and_change_no_byte(place, capsys):
     assert (place / "shared.npy").read_bytes() == (place / "alone.npy").read_bytes()
 
 
-def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(place, capsys):
+def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = ["sweep", "scan.npy", "--effort", "quick", "-o", "out", "--workers", "1"]
     assert main([*words, "--length", "6,7"]) == 0
     assert main([*words, "--length", "6,7"]) == 0  # the same once more

@@ -249,6 +249,7 @@ def test_patterns_lists_and_odd_names(tmp_path: Path) -> None:
     assert files_of([f"{tmp_path}/[ab].xyz", names[0], names[2]]) == names
     assert files_of(tmp_path / "c[1].xyz") == [names[2]]
     assert files_of("none.xyz") == [Path("none.xyz")]
+    nothing: str | list[str]
     for nothing in ([], f"{tmp_path}/*.laz"):
         with pytest.raises(FormatError, match=r"no scan file|no file fits"):
             files_of(nothing)
@@ -258,7 +259,9 @@ def test_patterns_lists_and_odd_names(tmp_path: Path) -> None:
         read_points(tmp_path / "folder.xyz")
 
 
-def test_a_pattern_makes_the_same_grid_as_one_file(tmp_path: Path, monkeypatch, capsys) -> None:
+def test_a_pattern_makes_the_same_grid_as_one_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     points = plate(6000)
     Path("all.xyz").write_bytes(text(points))

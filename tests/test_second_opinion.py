@@ -7,14 +7,17 @@ import pytest
 from scipy.spatial import cKDTree
 from steps import steps_of
 from surfaces import distance_to_triangles
+from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certify
+from scantruss.grid.certificate import Certificate, Spread
+from scantruss.surface.samples import SurfaceSamples
 
 LENGTH = 1.0
 
 
-def barrel(seed, outliers=0):
+def barrel(seed: int, outliers: int = 0) -> np.ndarray:
     """Points of a plate bent to a barrel, with noise, and some strays above it."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0.0, 7.0, 1200), rng.uniform(0.0, 5.0, 1200)
@@ -23,7 +26,7 @@ def barrel(seed, outliers=0):
     return np.concatenate([points, strays])
 
 
-def spoil(grid, how, rng):
+def spoil(grid: st.Grid, how: str, rng: np.random.Generator) -> st.Grid:
     """Return the grid with some of its nodes moved or triangles taken away."""
     nodes, triangles = grid.nodes.copy(), grid.triangles
     some = rng.integers(len(nodes), size=3)
@@ -42,7 +45,7 @@ def spoil(grid, how, rng):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_every_figure_is_that_of_brute_force(seed):
+def test_every_figure_is_that_of_brute_force(seed: int) -> None:
     settings = st.Settings(length=LENGTH)
     cloud = st.PointCloud.from_array(barrel(seed, outliers=0 if seed % 2 else 30))
     right = st.grid_from_points(cloud.points, settings)
@@ -53,7 +56,9 @@ def test_every_figure_is_that_of_brute_force(seed):
         compare(grid, certify(grid, steps.samples, steps.boundary, settings), cloud, steps.samples, settings)
 
 
-def compare(grid, found, cloud, samples, settings):
+def compare(
+    grid: st.Grid, found: Certificate, cloud: st.PointCloud, samples: SurfaceSamples, settings: st.Settings
+) -> None:
     """Compare a certificate with plain sums over all points, nodes and triangles."""
     corners = grid.nodes[grid.triangles]
     away = np.concatenate(
@@ -63,27 +68,29 @@ def compare(grid, found, cloud, samples, settings):
         ]
     )
     assert found.points == len(cloud.points)
-    check_spread(found.scan_distance, away)
+    check_spread(known(found.scan_distance), away)
     assert found.scan_within_reach == (away <= 0.5 * LENGTH).mean()
     measured = cloud.points[samples.judged == 0]
     tree = cKDTree(measured)
     middles = np.maximum(tree.query(corners.mean(axis=1))[0], tree.query(corners)[0].max(axis=1))
-    check_spread(found.triangle_distance, middles)
+    check_spread(known(found.triangle_distance), middles)
     assert found.grid_within_reach == (middles <= 0.5 * LENGTH).mean()
     near, which = tree.query(grid.nodes, k=12)
     around = measured[which]
     _, sizes, axes = np.linalg.svd(around - around.mean(axis=1, keepdims=True))
     off = np.minimum(np.abs(np.einsum("vi,vi->v", grid.nodes - around.mean(axis=1), axes[:, 2])), near[:, 0])
     noise = sizes[:, 2] / np.sqrt(12)
-    check_spread(found.node_distance, off)
+    check_spread(known(found.node_distance), off)
     assert found.noise == pytest.approx(np.median(noise), abs=1e-7)
     lengths = np.linalg.norm(grid.nodes[grid.edges[:, 0]] - grid.nodes[grid.edges[:, 1]], axis=1)
-    assert (found.shortest_member.value, found.longest_member.value) == pytest.approx((lengths.min(), lengths.max()))
+    assert (known(found.shortest_member).value, known(found.longest_member).value) == pytest.approx(
+        (lengths.min(), lengths.max())
+    )
     sides = corners - np.roll(corners, 1, axis=1)
     cosine = -(sides * np.roll(sides, -1, axis=1)).sum(axis=2)
     norms = np.linalg.norm(sides, axis=2)
     angles = np.degrees(np.arccos(np.clip(cosine / (norms * np.roll(norms, -1, axis=1)), -1.0, 1.0)))
-    assert found.smallest_angle.value == pytest.approx(angles.min(), abs=1e-5)
+    assert known(found.smallest_angle).value == pytest.approx(angles.min(), abs=1e-5)
     expected = {
         "angle": angles.min() < settings.min_angle,
         "short": lengths.min() < settings.min_length * LENGTH,
@@ -99,7 +106,7 @@ def compare(grid, found, cloud, samples, settings):
     assert left_out["far"] == ((samples.judged == 0) & (away > LENGTH)).sum()
 
 
-def check_spread(spread, values):
+def check_spread(spread: Spread, values: np.ndarray) -> None:
     """Compare a median, two quantiles and the largest."""
     assert (spread.p50, spread.p95, spread.p99) == pytest.approx(
         tuple(np.quantile(values, [0.5, 0.95, 0.99])), abs=1e-7

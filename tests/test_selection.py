@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -119,16 +121,18 @@ def test_what_a_las_file_calls_deleted_is_left_out(tmp_path: Path, version: str,
         thinned = thin_scan(path, 1e-5, selection=Selection(classes=classes))
         assert len(thinned.points) == len(expected) and thinned.notes == cloud.notes
     path.write_bytes(las(P, suffix, version=version, withheld=np.ones(len(P), "u1")))
-    for read in (read_points, lambda path: thin_scan(path, 1.0)):
+    readers: tuple[Callable[[Any], object], ...] = (read_points, lambda path: thin_scan(path, 1.0))
+    for read in readers:
         with pytest.raises(InputError, match=r"no point of a.la. is left: of 600 points 600 marked as withheld$"):
             read(path)
     chosen = Selection(classes=(9,))
     other = tmp_path / f"b{suffix}"
     other.write_bytes(las(P, suffix, version=version, classification=CLASS))
-    for read in (
+    readers = (
         lambda names: read_points(names, selection=chosen),
         lambda names: thin_scan(names, 1.0, selection=chosen),
-    ):
+    )
+    for read in readers:
         with pytest.raises(InputError, match=r"of 600 points 600 marked as withheld$"):
             read(path)
         with pytest.raises(InputError, match=r"of 1,200 points .*; some of them have classes 2 5 6, x, y, z from"):
@@ -226,7 +230,7 @@ def test_what_is_no_polygon_is_refused(tmp_path: Path, content: str) -> None:
         {"crop": "polygon:1,2,3,4"}, {"crop": "box:a,b,c,d"},
     ],
 )  # fmt: skip
-def test_values_that_select_nothing_sensible_are_refused(values: dict) -> None:
+def test_values_that_select_nothing_sensible_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InputError):
         Selection(**values)
     with pytest.raises(InputError):
@@ -243,12 +247,15 @@ def test_options_reach_the_selection_and_the_settings(tmp_path: Path) -> None:
     assert taken.classes == (2, 5, 6) and taken.returns == "last" and taken.confidence == 0.5 and taken.z_unit == "foot"
     assert taken.crop == ("box:0.0,0.0,9.0,9.0", polygon_text([RING, HOLE]))
     assert selection_of(parser.read([])) == Selection()
-    settings = Settings(length=2.0, classes="6,2", crop=taken.crop, returns=2)
+    as_written: dict[str, Any] = {"classes": "6,2", "returns": 2}
+    settings = Settings(length=2.0, crop=taken.crop, **as_written)
     again = Settings.from_dict(json.loads(json.dumps(settings.to_dict())))
     assert again == settings and again.selection == Selection(classes=(2, 6), crop=taken.crop, returns="2")
 
 
-def test_saved_settings_select_the_same_without_the_file(tmp_path: Path, monkeypatch, capsys) -> None:
+def test_saved_settings_select_the_same_without_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.las").write_bytes(las(plate(8000), classification=np.arange(8000) % 10 // 9))
     Path("ring.csv").write_text("2,2\n38,2\n38,28\n2,28\n")
@@ -290,7 +297,7 @@ def test_packed_text_and_several_files_select_too(tmp_path: Path) -> None:
     assert written(".csv", P[:5]).startswith(b"x [m],y [m],z [m]\n")
 
 
-def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch) -> None:
+def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of points that are NaN nothing is told, and nobody is warned of them."""
     monkeypatch.setattr(chunks, "POINTS_DESCRIBED", 100)
     rows = np.zeros(600, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("class", "f4"), ("confidence", "f8")])

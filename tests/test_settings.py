@@ -5,6 +5,7 @@ import math
 import runpy
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -30,7 +31,7 @@ def parse(*words: str) -> Settings:
 
 
 @pytest.mark.parametrize("length", [0, -1, math.nan, math.inf, "4", None])
-def test_a_length_that_is_no_positive_number_is_refused(length):
+def test_a_length_that_is_no_positive_number_is_refused(length: Any) -> None:
     with pytest.raises(InputError, match="length must be a positive number"):
         Settings(length=length)
 
@@ -44,18 +45,18 @@ def test_a_length_that_is_no_positive_number_is_refused(length):
         ("fixed", ((1, 2, math.nan),)),
     ],
 )  # fmt: skip
-def test_an_impossible_value_is_refused_by_its_name(name, value):
+def test_an_impossible_value_is_refused_by_its_name(name: str, value: Any) -> None:
     with pytest.raises(InputError, match="fixed" if name == "fixed" else name):
         Settings(length=1.0, **{name: value})
 
 
 @given(lengths, st.lists(st.tuples(coordinates, coordinates, coordinates), max_size=3))
-def test_a_file_keeps_settings_exactly(length, fixed):
+def test_a_file_keeps_settings_exactly(length: float, fixed: list[tuple[float, float, float]]) -> None:
     settings = Settings(length=length, fixed=tuple(fixed), method="paper")
     assert Settings.from_dict(json.loads(json.dumps(settings.to_dict()))) == settings
 
 
-def test_a_file_is_read_on_its_own_or_inside_a_report(tmp_path):
+def test_a_file_is_read_on_its_own_or_inside_a_report(tmp_path: Path) -> None:
     settings = Settings(length=4.7, fixed=((0, 0, 12),))
     (tmp_path / "alone.json").write_text(json.dumps(settings.to_dict()))
     (tmp_path / "report.json").write_text(json.dumps({"settings": settings.to_dict(), "points": 3}))
@@ -63,13 +64,13 @@ def test_a_file_is_read_on_its_own_or_inside_a_report(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"length": 1, "colour": 2}', '{"method": "paper"}', '{"length": []}'])
-def test_a_file_that_holds_no_settings_is_refused(tmp_path, text):
+def test_a_file_that_holds_no_settings_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "bad.json").write_text(text)
     with pytest.raises(InputError):
         Settings.read(tmp_path / "bad.json")
 
 
-def test_every_field_has_words_an_option_and_a_line_in_the_docs():
+def test_every_field_has_words_an_option_and_a_line_in_the_docs() -> None:
     parser = OptionParser("grid", "", "")
     add_settings(parser)
     text = " ".join(parser.format_help().split())
@@ -78,18 +79,18 @@ def test_every_field_has_words_an_option_and_a_line_in_the_docs():
         assert option_of(spec.name) in text
 
 
-def test_the_table_in_the_docs_is_current():
+def test_the_table_in_the_docs_is_current() -> None:
     table = runpy.run_path(str(ROOT / "scripts" / "make_settings_table.py"))["settings_table"]()
     assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == table, "run scripts/make_settings_table.py"
 
 
 @given(lengths, st.tuples(coordinates, coordinates, coordinates))
-def test_options_bring_every_number_through_exactly(length, position):
+def test_options_bring_every_number_through_exactly(length: float, position: tuple[float, float, float]) -> None:
     settings = parse("--length", repr(length), "--fixed", ",".join(map(repr, position)), "--case3", "quadrangle")
     assert settings == Settings(length=length, fixed=(position,), case3="quadrangle")
 
 
-def test_options_override_a_settings_file_field_by_field(tmp_path):
+def test_options_override_a_settings_file_field_by_field(tmp_path: Path) -> None:
     kept = Settings(length=4.7, method="paper", max_deviation=0.1, fixed=((1, 2, 3),))
     (tmp_path / "kept.json").write_text(json.dumps(kept.to_dict()))
     assert parse("--settings", str(tmp_path / "kept.json")) == kept
@@ -111,7 +112,7 @@ def test_options_override_a_settings_file_field_by_field(tmp_path):
         "1, 2, -3, first\n4, 5, 6.5, second\n",
     ],
 )
-def test_fixed_nodes_are_read_from_any_text(tmp_path, text):
+def test_fixed_nodes_are_read_from_any_text(tmp_path: Path, text: str) -> None:
     (tmp_path / "fixed.csv").write_text(text, encoding="utf-8")
     assert read_positions(tmp_path / "fixed.csv") == [(1, 2, -3), (4, 5, 6.5)]
     assert parse("--length", "1", "--fixed", "7,8,9", "--fixed-file", str(tmp_path / "fixed.csv")).fixed == (
@@ -122,7 +123,7 @@ def test_fixed_nodes_are_read_from_any_text(tmp_path, text):
 
 
 @pytest.mark.parametrize("text", ["", "x,y,z\n", "1,2\n", "1,2,3\n4,5\n", "1,2,3\nend\n", "a,b,c\nd,e,f\n1,2,3\n"])
-def test_a_file_without_fixed_nodes_is_refused(tmp_path, text):
+def test_a_file_without_fixed_nodes_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "fixed.csv").write_text(text)
     with pytest.raises(FormatError, match=r"fixed\.csv"):
         read_positions(tmp_path / "fixed.csv")

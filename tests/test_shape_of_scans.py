@@ -2,37 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
+from typed import known
 
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.surface.floor import find_floor
 
 
-def plate(rng, count=12_000, side=10.0):
+def plate(rng: np.random.Generator, count: int = 12_000, side: float = 10.0) -> np.ndarray:
     x, y = rng.uniform(-side, side, count), rng.uniform(-side, side, count)
     return np.column_stack([x, y, 0.02 * x * y])
 
 
-def helix(rng):
+def helix(rng: np.random.Generator) -> np.ndarray:
     turn = np.sort(rng.uniform(0, 60, 6000))
     return np.column_stack([5 * np.cos(turn), 5 * np.sin(turn), 1.5 * turn]) + rng.normal(0, 0.004, (6000, 3))
 
 
-def three_lines(rng):
+def three_lines(rng: np.random.Generator) -> np.ndarray:
     along, which = rng.uniform(-20, 20, 5000), rng.integers(0, 3, 5000)
     return np.column_stack([along, 12.0 * which, 0.1 * along]) + rng.normal(0, 0.004, (5000, 3))
 
 
 @pytest.mark.parametrize("make", [helix, three_lines])
-def test_points_along_lines_are_refused(make):
+def test_points_along_lines_are_refused(make: Callable[[np.random.Generator], np.ndarray]) -> None:
     with pytest.raises(st.InputError, match="the points lie along lines, not on a surface"):
         st.grid_from_points(make(np.random.default_rng(1)), st.Settings(length=1.2))
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])
-def test_points_that_fill_a_volume_are_refused(shape):
+def test_points_that_fill_a_volume_are_refused(shape: str) -> None:
     points = np.random.default_rng(2).uniform(-5, 5, (30_000, 3))
     if shape == "ball":
         points = points[(points**2).sum(axis=1) < 25]
@@ -40,7 +44,7 @@ def test_points_that_fill_a_volume_are_refused(shape):
         st.grid_from_points(points, st.Settings(length=1.5))
 
 
-def test_a_rough_surface_is_no_volume_and_a_narrow_strip_no_line():
+def test_a_rough_surface_is_no_volume_and_a_narrow_strip_no_line() -> None:
     rng = np.random.default_rng(3)
     rough = plate(rng) + rng.normal(0, 0.1, (12_000, 3))
     strip = np.column_stack([rng.uniform(0, 40, 8000), rng.uniform(0, 2.5, 8000), np.zeros(8000)])
@@ -50,7 +54,7 @@ def test_a_rough_surface_is_no_volume_and_a_narrow_strip_no_line():
 
 
 @pytest.mark.parametrize(("apart", "said"), [(0.15, True), (0.4, True), (0.0, False), (3.0, False)])
-def test_two_layers_closer_than_half_a_member_are_told_with_their_distance(apart, said):
+def test_two_layers_closer_than_half_a_member_are_told_with_their_distance(apart: float, said: bool) -> None:
     rng = np.random.default_rng(4)
     points = np.concatenate([plate(rng), plate(rng) + [0, 0, apart]]) + rng.normal(0, 0.004, (24_000, 3))
     samples = st.sample_surface(st.PointCloud.from_array(points), st.Settings(length=1.2))
@@ -59,7 +63,7 @@ def test_two_layers_closer_than_half_a_member_are_told_with_their_distance(apart
     assert not said or distance == pytest.approx(apart, rel=0.1)
 
 
-def room(rng, floor_at=0.0, sides=(9, 6)):
+def room(rng: np.random.Generator, floor_at: float = 0.0, sides: tuple[float, float] = (9, 6)) -> np.ndarray:
     """A curved roof over a level floor, and which points are of the floor."""
     x, y = rng.uniform(-9, 9, 12_000), rng.uniform(-6, 6, 12_000)
     roof = np.column_stack([x, y, 6.0 - 0.03 * x * x - 0.04 * y * y])
@@ -69,18 +73,18 @@ def room(rng, floor_at=0.0, sides=(9, 6)):
 
 
 @pytest.mark.parametrize(("unit", "piece", "pieces"), [("m", "auto", 1), ("m", "all", 2), ("", "auto", 2)])
-def test_a_floor_under_a_roof_is_left_out_and_listed_where_up_is_known(unit, piece, pieces):
+def test_a_floor_under_a_roof_is_left_out_and_listed_where_up_is_known(unit: str, piece: str, pieces: int) -> None:
     points = room(np.random.default_rng(5), sides=(11, 8))
     grid = st.grid_from_points(points, st.Settings(length=1.4, unit=unit, piece=piece, effort="quick"))
-    assert grid.topology.components == pieces and grid.certificate.passed
-    left = {part.kind: part for part in grid.certificate.left_out}
+    assert grid.topology.components == pieces and known(grid.certificate).passed
+    left = {part.kind: part for part in known(grid.certificate).left_out}
     assert ("floor" in left) == (pieces == 1)
     if pieces == 1:
         assert left["floor"].points > 8500 and not left["floor"].asked and grid.scan_nodes[:, 2].min() > 1.0
 
 
 @pytest.mark.parametrize("case", ["above", "inclined", "aside", "curved"])
-def test_what_is_not_below_level_flat_and_covered_is_no_floor(case):
+def test_what_is_not_below_level_flat_and_covered_is_no_floor(case: str) -> None:
     rng = np.random.default_rng(6)
     points = room(rng, floor_at=9.0 if case == "above" else 0.0)
     low = np.arange(len(points)) >= 12_000
@@ -92,7 +96,9 @@ def test_what_is_not_below_level_flat_and_covered_is_no_floor(case):
         assert find_floor(room(rng), low.astype(np.int64), (0, 1), 1.4) == 1
 
 
-def test_the_command_says_what_it_left_out_and_how_to_keep_it(tmp_path, monkeypatch, capsys):
+def test_the_command_says_what_it_left_out_and_how_to_keep_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     np.savetxt("room.xyz", room(np.random.default_rng(7)), fmt="%.4f")
     assert main(["grid", "room.xyz", "a.json", "--length", "1.4", "--effort", "quick", "--unit", "m"]) == 0

@@ -7,6 +7,7 @@ from hypothesis import given, strategies
 from marks import compiled_only
 from small_clouds import sheet
 from steps import steps_of
+from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certify
@@ -18,7 +19,7 @@ from scantruss.surface.samples import sample_surface
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed):
+def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed: int) -> None:
     """Turns .5 to .9 members apart."""
     shape = hard("rolled", seed)
     cloud = st.PointCloud.from_array(shape.points)
@@ -35,7 +36,7 @@ def test_a_roll_has_one_rim_and_no_link_to_its_next_turn(seed):
 
 @compiled_only
 @pytest.mark.parametrize(("method", "share"), [("default", 1.0), ("paper", 1.0), ("default", 1.6)])
-def test_a_roll_is_covered_by_one_grid(method, share):
+def test_a_roll_is_covered_by_one_grid(method: str, share: float) -> None:
     shape = hard("rolled", 1)
     grid = st.grid_from_points(shape.points, st.Settings(length=share * shape.length, method=method, effort="quick"))
     assert (grid.topology.boundary_loops, grid.topology.euler) == (1, 1)
@@ -44,7 +45,7 @@ def test_a_roll_is_covered_by_one_grid(method, share):
     assert area == pytest.approx(shape.area, rel=0.04)
 
 
-def test_a_grid_of_one_sheet_does_not_cover_the_next():
+def test_a_grid_of_one_sheet_does_not_cover_the_next() -> None:
     """Two plates half a member apart; the nodes of the one are near the other, but not on it."""
     plate = sheet(8, 8, 0.1, seed=1, noise=0.01)
     cloud = st.PointCloud.from_array(np.concatenate([plate, plate + [0, 0, 0.5]]))
@@ -60,7 +61,7 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next():
     assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
-def test_thick_sites_give_up_thin_ones_that_stand_over_them():
+def test_thick_sites_give_up_thin_ones_that_stand_over_them() -> None:
     """Site 0 is linked to its own plate and to one site of a plate above: that link goes, and its normal is upright again."""
     flat = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
     low, high = np.column_stack([flat, np.zeros(16)]), np.column_stack([flat, np.full(16, 1.2)])
@@ -79,7 +80,7 @@ def test_thick_sites_give_up_thin_ones_that_stand_over_them():
 
 
 @pytest.mark.parametrize(("rise", "normal", "found"), [(0.0, 1.0, True), (0.5, 1.0, False), (0.0, -1.0, False)])
-def test_a_spike_of_a_rim_is_on_one_sheet(rise, normal, found):
+def test_a_spike_of_a_rim_is_on_one_sheet(rise: float, normal: float, found: bool) -> None:
     """A long tongue .4 wide is a spike; where its sides lie one over the other, or face opposite sides, it is two sheets."""
     x = np.arange(0, 6, 0.1)
     out, back = np.column_stack([x, 0 * x, 0 * x]), np.column_stack([x, 0 * x + 0.4 * (rise == 0), 0 * x + rise])[::-1]
@@ -91,7 +92,7 @@ def test_a_spike_of_a_rim_is_on_one_sheet(rise, normal, found):
 
 
 @given(strategies.integers(0, 10_000), strategies.integers(20, 90), strategies.floats(0.2, 1.2))
-def test_the_widest_spike_is_that_of_a_look_at_all_pairs(seed, count, width):
+def test_the_widest_spike_is_that_of_a_look_at_all_pairs(seed: int, count: int, width: float) -> None:
     """A random closed curve of uneven steps in a plane; of two alike the first counts."""
     rng = np.random.default_rng(seed)
     walk = np.cumsum(rng.normal(size=(count, 2)), axis=0) * 0.1
@@ -107,7 +108,7 @@ def test_the_widest_spike_is_that_of_a_look_at_all_pairs(seed, count, width):
     assert kernels.widest_spike(curve, normals, width, low, high) == (at, gap)
 
 
-def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
+def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused() -> None:
     """The members across a line are gone; nodes on both sides are near in space, far in the grid."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
@@ -117,10 +118,11 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused():
     slit = (abs(x) < 0.6) & (y < 1.5)
     disconnected = grid.replace(triangles=grid.triangles[~slit])
     (fault,) = faults_on_sheets(disconnected, samples, nodes_of_samples(disconnected, samples, 1.0))
-    assert fault.kind == "torn" and abs(fault.where[0]) < 1.5 and fault.where[1] < 2.5
+    x, y, _ = known(fault.where)
+    assert fault.kind == "torn" and abs(x) < 1.5 and y < 2.5
 
 
-def test_certificates_of_one_scan_can_be_made_side_by_side():
+def test_certificates_of_one_scan_can_be_made_side_by_side() -> None:
     """They leave alone what look-ups write to: two threads in one queue had led to nowhere."""
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(6, 6, 0.15, seed=3))

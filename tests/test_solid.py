@@ -3,6 +3,9 @@
 import io
 import json
 import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,17 +14,17 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_piece
 
 import scantruss as st
 from scantruss.cli.demo_files import save_demo
-from scantruss.export.solid import Solid, build_solid, is_watertight
-from scantruss.export.solid_files import encode_3mf, encode_stl, lattice_step, put_on_lattice
+from scantruss.export.solid import build_solid, is_watertight
+from scantruss.export.solid_files import Solid, encode_3mf, encode_stl, lattice_step, put_on_lattice
 from scantruss.grid.certificate import Certificate, Fault
 
 GRIDS = [fan, icosahedron, two_pieces, dome]
-SIZES = {"member_diameter": 0.8, "node_diameter": 1.4}
+SIZES: dict[str, Any] = {"member_diameter": 0.8, "node_diameter": 1.4}
 
 
-def expected_genus(grid):
+def expected_genus(grid: st.Grid) -> tuple[int, int]:
     """E - V + 1 of each piece, summed, by walking from node to node."""
-    neighbours = {}
+    neighbours: dict[int, set[int]] = {}
     for a, b in grid.edges.tolist():
         neighbours.setdefault(a, set()).add(b)
         neighbours.setdefault(b, set()).add(a)
@@ -35,7 +38,7 @@ def expected_genus(grid):
     return len(grid.edges) - len(neighbours) + pieces, pieces
 
 
-def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path):
+def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path: Path) -> None:
     """They differ from those asked for where no grid of the default method passes its certificate."""
     made = st.Settings(length=24.0, unit="mm", method="paper")
     grid = dome(4, 24.0, settings=made)
@@ -45,7 +48,9 @@ def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".3mf", ".stl"])
 @pytest.mark.parametrize("make", GRIDS)
-def test_an_independent_reader_finds_one_watertight_solid_with_every_opening(make, suffix, tmp_path):
+def test_an_independent_reader_finds_one_watertight_solid_with_every_opening(
+    make: Callable[..., st.Grid], suffix: str, tmp_path: Path
+) -> None:
     grid = make()
     solid = st.print_model(grid, tmp_path / f"a{suffix}", **SIZES)
     mesh = trimesh.load(tmp_path / f"a{suffix}", force="mesh")
@@ -58,7 +63,7 @@ def test_an_independent_reader_finds_one_watertight_solid_with_every_opening(mak
 
 
 @pytest.mark.parametrize("make", GRIDS)
-def test_volume_lies_between_the_parts_alone_and_their_sum(make):
+def test_volume_lies_between_the_parts_alone_and_their_sum(make: Callable[..., st.Grid]) -> None:
     grid = make()
     solid = build_solid(grid, **SIZES)
     members, nodes = len(grid.edges), len(np.unique(grid.edges))
@@ -68,7 +73,7 @@ def test_volume_lies_between_the_parts_alone_and_their_sum(make):
     assert outside_nodes + nodes * 0.8 * ball < solid.volume < bar * grid.lengths.sum() + nodes * ball
 
 
-def test_solid_lies_around_the_grid_at_scale():
+def test_solid_lies_around_the_grid_at_scale() -> None:
     grid = fan()
     for scale in (0.5, 1.0, 3.0):
         solid = build_solid(grid, scale=scale, **SIZES)
@@ -78,7 +83,7 @@ def test_solid_lies_around_the_grid_at_scale():
         assert np.all(np.abs(solid.vertices.max(axis=0) - high - 0.7) < 0.05)
 
 
-def test_every_vertex_is_at_the_radius_of_a_part_or_inside_it():
+def test_every_vertex_is_at_the_radius_of_a_part_or_inside_it() -> None:
     grid = icosahedron()
     solid = build_solid(grid, **SIZES)
     start, end = grid.nodes[grid.edges[:, 0]], grid.nodes[grid.edges[:, 1]]
@@ -91,7 +96,7 @@ def test_every_vertex_is_at_the_radius_of_a_part_or_inside_it():
 
 
 @pytest.mark.parametrize("suffix", [".3mf", ".stl"])
-def test_same_grid_same_bytes(suffix, tmp_path):
+def test_same_grid_same_bytes(suffix: str, tmp_path: Path) -> None:
     for name in "ab":
         st.print_model(dome(), tmp_path / f"{name}{suffix}", **SIZES)
     assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
@@ -108,20 +113,20 @@ def test_same_grid_same_bytes(suffix, tmp_path):
         ("", "millimeter"),
     ],
 )
-def test_3mf_carries_the_unit(unit, word):
+def test_3mf_carries_the_unit(unit: str, word: str) -> None:
     package = zipfile.ZipFile(io.BytesIO(encode_3mf(build_solid(fan(unit=unit), **SIZES))))
     assert f'<model unit="{word}"' in package.read("3D/3dmodel.model").decode()
     assert package.namelist()[0] == "[Content_Types].xml"
     assert {entry.date_time for entry in package.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
-def test_stl_has_the_length_its_count_says():
+def test_stl_has_the_length_its_count_says() -> None:
     data = encode_stl(build_solid(fan(), **SIZES))
     assert len(data) == 84 + 50 * int.from_bytes(data[80:84], "little") and not data.startswith(b"solid")
 
 
 @pytest.mark.parametrize("size", [1e-4, 1e-2, 1.0, 1e3, 1e6])
-def test_float32_and_welding_readers_do_not_tear_it_at_any_size(size, tmp_path):
+def test_float32_and_welding_readers_do_not_tear_it_at_any_size(size: float, tmp_path: Path) -> None:
     solid = build_solid(icosahedron(10 * size), member_diameter=0.8 * size, node_diameter=1.4 * size)
     vertices, together = put_on_lattice(solid)
     assert together == 0 and len(np.unique(vertices, axis=0)) == len(vertices)
@@ -130,7 +135,7 @@ def test_float32_and_welding_readers_do_not_tear_it_at_any_size(size, tmp_path):
     assert trimesh.load(tmp_path / "a.stl").is_watertight
 
 
-def near_twins():
+def near_twins() -> Solid:
     """Two tetrahedra that have a corner nearly in common, nearer than float32 can tell."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -139,7 +144,7 @@ def near_twins():
     return Solid(vertices, triangles, "mm", 1 / 3, 2, 0, 2, 0)
 
 
-def test_vertices_that_float32_would_weld_are_moved_apart():
+def test_vertices_that_float32_would_weld_are_moved_apart() -> None:
     solid = near_twins()
     assert is_watertight(solid.triangles)
     _, joined = np.unique(solid.vertices.astype(np.float32), axis=0, return_inverse=True)
@@ -149,13 +154,13 @@ def test_vertices_that_float32_would_weld_are_moved_apart():
     assert together == 0 and joined.max() == 7 and is_watertight(joined.ravel()[solid.triangles])  # ... and are not
 
 
-def test_stl_that_would_be_torn_is_refused(monkeypatch):
+def test_stl_that_would_be_torn_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scantruss.export.solid_files.put_on_lattice", lambda solid: put_on_lattice(solid, rounds=0))
     with pytest.raises(st.FormatError, match=r"1 vertices coincide in float32; write a \.3mf"):
         encode_stl(near_twins())
 
 
-def test_is_watertight_sees_a_hole_a_turned_triangle_and_a_double_one():
+def test_is_watertight_sees_a_hole_a_turned_triangle_and_a_double_one() -> None:
     faces = icosahedron().triangles
     assert is_watertight(faces)
     assert not is_watertight(faces[1:])
@@ -177,26 +182,28 @@ def test_is_watertight_sees_a_hole_a_turned_triangle_and_a_double_one():
         ({"sides": 2}, "sides must be a whole number between 3 and 256, got 2"),
     ],
 )
-def test_sizes_that_do_not_suit_are_refused_in_words_and_figures(change, words, tmp_path):
+def test_sizes_that_do_not_suit_are_refused_in_words_and_figures(
+    change: dict[str, Any], words: str, tmp_path: Path
+) -> None:
     with pytest.raises(st.InputError) as error:
         st.print_model(fan(), tmp_path / "a.3mf", **(SIZES | change))
     assert words in str(error.value) and "\n" not in str(error.value)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_to_print_is_refused(tmp_path):
+def test_nothing_to_print_is_refused(tmp_path: Path) -> None:
     with pytest.raises(st.InputError, match="no members"):
         st.print_model(make_grid([(0, 0, 0)], []), tmp_path / "a.3mf", **SIZES)
 
 
 @pytest.mark.parametrize("name", ["a.obj", "a", "none/a.3mf"])
-def test_the_place_is_looked_at_before_the_work(name, tmp_path, monkeypatch):
+def test_the_place_is_looked_at_before_the_work(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("scantruss.export.solid.build_solid", None)
     with pytest.raises(st.FormatError):
         st.print_model(fan(), tmp_path / name, **SIZES)
 
 
-def test_openings_that_the_thickness_closes_are_said():
+def test_openings_that_the_thickness_closes_are_said() -> None:
     flat = make_grid([(0, 0, 0), (10, 0, 0), (5, 1.2, 0)], [(0, 1, 2)])
     solid = build_solid(flat, member_diameter=2.0, node_diameter=2.0)
     assert (solid.genus, solid.expected_genus) == (0, 1)
@@ -205,7 +212,7 @@ def test_openings_that_the_thickness_closes_are_said():
     ]
 
 
-def test_pieces_that_touch_are_said():
+def test_pieces_that_touch_are_said() -> None:
     a = fan()
     both = make_grid([*a.nodes, *(a.nodes + np.array([0, 0, 0.6]))], [*a.triangles, *(a.triangles + 7)])
     solid = build_solid(both, **SIZES)
@@ -213,13 +220,15 @@ def test_pieces_that_touch_are_said():
     assert solid.notes[0] == "pieces of the grid touch: 2 pieces became 1 bodies"
 
 
-def test_a_grid_that_failed_is_printed_only_where_that_is_asked_for(tmp_path):
+def test_a_grid_that_failed_is_printed_only_where_that_is_asked_for(tmp_path: Path) -> None:
     grid = dome(5)
     fault = Fault("cover", "leaves out 30% of the scan")
-    nothing = dict.fromkeys(("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1)
+    nothing: dict[str, Any] = dict.fromkeys(
+        ("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1
+    )
     failed = Certificate(unit="", manifold=True, orientable=True, faults=(fault,), **nothing)
     grid = grid.replace(certificate=failed)
-    sizes = {"member_diameter": 0.1, "node_diameter": 0.2}
+    sizes: dict[str, Any] = {"member_diameter": 0.1, "node_diameter": 0.2}
     with pytest.raises(st.CertificateError, match="failed its certificate: it leaves out 30% of the scan"):
         st.print_model(grid, tmp_path / "a.stl", **sizes)
     assert not (tmp_path / "a.stl").exists()

@@ -15,11 +15,11 @@ from scantruss.surface.samples import sample_surface
 from scantruss.surface.streamline import is_dense, points_near, streamlined
 
 
-def slow(points, size):
+def slow(points: np.ndarray, size: float) -> list[int]:
     """The first point of each box, by a dictionary; boxes as search boxes divide the extent."""
     lower, extent = points.min(axis=0), np.ptp(points, axis=0)
     step = np.where(extent > 0.5 * size, extent / np.maximum(np.ceil(extent / size), 1), size)
-    first = {}
+    first: dict[tuple[int, ...], int] = {}
     for number, box in enumerate(np.floor((points - lower) * (1.0 / step)).astype(int).tolist()):
         first.setdefault(tuple(box), number)
     return sorted(first.values())
@@ -28,13 +28,13 @@ def slow(points, size):
 @pytest.mark.kernels
 @given(st_.integers(0, 1000), st_.sampled_from([0.2, 0.5, 3.0]))
 @settings(max_examples=10)
-def test_the_first_point_of_each_box_stays(seed, size):
+def test_the_first_point_of_each_box_stays(seed: int, size: float) -> None:
     points = np.random.default_rng(seed).uniform(0, 4, (400, 3)) * [1.0, 0.7, 0.01]
     assert streamlined(points, bounds_of(points), size).tolist() == slow(points, size)
 
 
 @pytest.mark.parametrize("room", [1, 64, 1 << 16])
-def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
+def test_the_same_points_stay_for_any_processors_and_room(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
     points = np.random.default_rng(7).uniform(0, 1, (3000, 3))
     monkeypatch.setattr(streamline, "POINTS_PER_THREAD", 500)
     monkeypatch.setattr(streamline, "LEAST_ROOM", room)
@@ -47,14 +47,14 @@ def test_the_same_points_stay_for_any_processors_and_room(monkeypatch, room):
     assert found[0] == found[1] == found[2] == slow(points, 0.1)
 
 
-def test_a_scan_as_dense_as_its_patches_need_is_taken_whole():
+def test_a_scan_as_dense_as_its_patches_need_is_taken_whole() -> None:
     assert not is_dense(0.5, 1.0) and is_dense(0.3, 1.0) and not is_dense(0.0, 1.0)
     shape = make("cloth", 20_000, seed=0)
     samples = sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length))
     assert len(samples.surface.points) == 20_000
 
 
-def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
+def test_a_grid_of_a_dense_scan_is_that_of_the_surface() -> None:
     """Eight times as many points as patches take: fewer are kept, corners, rim and surface are as true."""
     shape = make("l_plate", 300_000, seed=2)
     settings = st.Settings(length=1.5 * shape.length, effort="quick")
@@ -69,7 +69,7 @@ def test_a_grid_of_a_dense_scan_is_that_of_the_surface():
         assert np.linalg.norm(nodes - corner, axis=1).min() < 0.05 * settings.length
 
 
-def test_the_rim_of_a_dense_scan_is_found_with_all_its_points():
+def test_the_rim_of_a_dense_scan_is_found_with_all_its_points() -> None:
     """A disc: its rim lies no farther inside than that of a scan that is taken whole, though patches have few of the points."""
     rng = np.random.default_rng(5)
     angle, radius = rng.uniform(0, 2 * np.pi, 400_000), 10.0 * np.sqrt(rng.uniform(0, 1, 400_000))
@@ -82,7 +82,7 @@ def test_the_rim_of_a_dense_scan_is_found_with_all_its_points():
     assert -0.001 < inside.mean() < 0.012  # a spacing is .016
 
 
-def test_points_near_some_places_are_all_listed():
+def test_points_near_some_places_are_all_listed() -> None:
     rng = np.random.default_rng(3)
     points, places = rng.uniform(0, 1, (5000, 3)), rng.uniform(0, 1, (7, 3))
     near = points_near(points, places, 0.05)

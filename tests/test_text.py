@@ -183,7 +183,7 @@ def test_a_running_number_that_is_a_coordinate_stays_one() -> None:
 
 
 def test_integers_at_the_start_do_not_hide_the_decimal_comma() -> None:
-    points = np.column_stack([np.arange(30_000) // 150, np.arange(30_000) % 150, np.zeros(30_000)])
+    points = np.column_stack([np.arange(30_000.0) // 150, np.arange(30_000.0) % 150, np.zeros(30_000)])
     points[15_000:] += 0.5
     text = "\n".join("{:g};{:g};{:g}".format(*p) for p in points).replace(".", ",")
     assert np.array_equal(read(text), points)

@@ -6,7 +6,9 @@ import gzip
 import json
 import pickle
 import warnings
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from test_bad_input import FILES as WHOLE
 from test_scan_units import FOOT, GEOGRAPHIC, HEIGHT, METRE, SURVEY, plane, wkt, woods
 from test_selection import CASES, CLASS, COUNT, FILES, HOLE, NUMBER, RING
 
+from scantruss import PointCloud
 from scantruss.cli.main import main
 from scantruss.cli.sweep import sweep_parser, trials_of_words
 from scantruss.errors import FormatError, InputError, ScanTrussError
@@ -43,20 +46,22 @@ class Others(Workers):
     alone = False
     count = 3
 
-    def run(self, work, jobs, shared=None):
+    def run(self, work: Any, jobs: Iterable[Any], shared: Any = None) -> Iterator[tuple[int, Any]]:
         for number, job in reversed(list(enumerate(jobs))):
             yield number, pickle.loads(pickle.dumps(work(*pickle.loads(pickle.dumps((job, shared))))))
 
 
 @pytest.fixture(autouse=True)
-def small_tiles(monkeypatch, tmp_path):
+def small_tiles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Tiles so small that a file has several."""
     monkeypatch.setattr(streaming, "SMALLEST", 70)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
     monkeypatch.chdir(tmp_path)
 
 
-def check(names, unit="", selection=None, keep="mean"):
+def check(
+    names: str | list[str], unit: str = "", selection: Selection | None = None, keep: str = "mean"
+) -> tuple[Any, PointCloud]:
     """Thin a scan, here and by others, and hold it against the scan in memory; return both."""
     held = read_points(names, unit, selection)
     found = thin_scan(names, S, keep=keep, unit=unit, selection=selection)
@@ -72,7 +77,7 @@ def check(names, unit="", selection=None, keep="mean"):
 
 @pytest.mark.parametrize("name", [*sorted(FILES), "a.csv.gz"])
 @pytest.mark.parametrize("case", CASES)
-def test_a_thinned_selection_is_the_thinning_of_the_selected_points(name, case):
+def test_a_thinned_selection_is_the_thinning_of_the_selected_points(name: str, case: str) -> None:
     selection = CASES[case][0]
     Path(name).write_bytes(gzip.compress(FILES["a.csv"]) if name.endswith(".gz") else FILES[name])
     if name == "a.las" and case == "confidence":
@@ -82,20 +87,20 @@ def test_a_thinned_selection_is_the_thinning_of_the_selected_points(name, case):
     check(name, selection=selection, keep="nearest" if case in ("classes", "box") else "mean")
 
 
-def test_packed_las_is_selected_too():
+def test_packed_las_is_selected_too() -> None:
     Path("a.laz").write_bytes(las(P, ".laz", classification=CLASS, return_number=NUMBER, number_of_returns=COUNT))
     ring = polygon_text([RING, HOLE])
     found, held = check("a.laz", selection=Selection(classes=(6,), returns="last", crop=(ring, "box:0,0,99,20")))
     assert len(found.notes) == 4 and 10 < len(held.points) < 200
 
 
-def test_two_crops_of_one_kind_are_counted_together():
+def test_two_crops_of_one_kind_are_counted_together() -> None:
     np.save("a.npy", P)
     _, held = check("a.npy", selection=Selection(crop=("box:0,0,30,30", "box:10,0,40,30")))
     assert held.notes == (f"{600 - len(held.points)} points outside the box are left out",)
 
 
-def test_nothing_left_and_nothing_to_select_by():
+def test_nothing_left_and_nothing_to_select_by() -> None:
     Path("a.las").write_bytes(FILES["a.las"])
     Path("a.xyz").write_bytes(text(P))
     with pytest.raises(
@@ -119,7 +124,7 @@ def test_nothing_left_and_nothing_to_select_by():
         ("", "", ""),
     ],
 )
-def test_heights_and_units_are_brought_together_as_in_memory(system, unit, z_unit):
+def test_heights_and_units_are_brought_together_as_in_memory(system: Any, unit: str, z_unit: str) -> None:
     Path("a.las").write_bytes(las(P, records=(wkt(system),) if system else ()))
     box = ("box:0,0,0,30,30,2.5",)  # in the unit of the result
     found, _ = check("a.las", unit, Selection(z_unit=z_unit, crop=box))
@@ -128,7 +133,7 @@ def test_heights_and_units_are_brought_together_as_in_memory(system, unit, z_uni
     )
 
 
-def test_what_has_no_lengths_or_no_common_system_is_refused_before_it_is_read(monkeypatch):
+def test_what_has_no_lengths_or_no_common_system_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streaming, "read_chunks", None)
     for name, system in (("a", plane(METRE)), ("b", plane(METRE, "32633")), ("c", GEOGRAPHIC)):
         Path(f"{name}.las").write_bytes(las(P, records=(wkt(system),)))
@@ -143,7 +148,7 @@ def test_what_has_no_lengths_or_no_common_system_is_refused_before_it_is_read(mo
         thin_scan("a.xyz", S, selection=Selection(z_unit="foot"))
 
 
-def test_files_of_different_units_come_together_in_any_order():
+def test_files_of_different_units_come_together_in_any_order() -> None:
     Path("a.ply").write_bytes(written(".ply", P))
     Path("b.ply").write_bytes(written(".ply", 1000 * P).replace(b"comment unit m\n", b"comment unit mm\n"))
     Path("c.xyz").write_bytes(text(P))
@@ -160,16 +165,16 @@ def test_files_of_different_units_come_together_in_any_order():
         assert len(held.points) == 7 * (P[:, 0] <= 20).sum()
 
 
-def test_heights_that_look_like_feet_are_noticed():
+def test_heights_that_look_like_feet_are_noticed() -> None:
     points, returns = woods(0.3048)
     Path("a.las").write_bytes(las(points, number_of_returns=np.minimum(returns, 7)))
-    for options in ({}, {"unit": "m"}):
-        assert "look like feet" in thin_scan("a.las", 5.0, **options).notes[0]
+    for unit in ("", "m"):
+        assert "look like feet" in thin_scan("a.las", 5.0, unit=unit).notes[0]
     assert not thin_scan("a.las", 5.0, unit="foot").notes
     assert len(thin_scan("a.las", 5.0, unit="m", selection=Selection(z_unit="foot")).notes) == 1
 
 
-def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_path):
+def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(FILES["a.csv"])
     layout = find_layout(path, ("class",))
@@ -185,7 +190,7 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch, tmp_
 FEW = ("long-line.xyz",)  # has points, but too few for a grid
 
 
-def test_count_lines_of_several_scans_in_a_text_are_kept():
+def test_count_lines_of_several_scans_in_a_text_are_kept() -> None:
     lines = text(P).splitlines(keepends=True)
     Path("a.pts").write_bytes(b"".join([b"200\n", *lines[:200], b"400\n", *lines[200:]]))
     check("a.pts")
@@ -196,7 +201,7 @@ def test_count_lines_of_several_scans_in_a_text_are_kept():
 
 
 @pytest.mark.parametrize("name", sorted(set(BROKEN).difference(FEW)))
-def test_a_broken_file_is_refused_in_one_line(name):
+def test_a_broken_file_is_refused_in_one_line(name: str) -> None:
     Path(name).write_bytes(BROKEN[name])
     with pytest.raises(ScanTrussError) as caught:
         thin_scan(name, S)
@@ -204,7 +209,7 @@ def test_a_broken_file_is_refused_in_one_line(name):
 
 
 @pytest.mark.parametrize("name", sorted(WHOLE))
-def test_whole_files_are_thinned_and_parts_of_them_are_not(name):
+def test_whole_files_are_thinned_and_parts_of_them_are_not(name: str) -> None:
     whole = WHOLE[name]
     Path(name).write_bytes(whole)
     check(name)
@@ -225,7 +230,7 @@ def test_whole_files_are_thinned_and_parts_of_them_are_not(name):
 # ---- the commands --------------------------------------------------------------------------------------------------
 
 
-def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys):
+def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.las").write_bytes(las(P, records=(wkt(BOTH),), classification=CLASS))
     Path("ring.txt").write_text("\n".join(f"{x} {y}" for x, y in RING))
     words = ["--spacing", "1.7", "--class", "2,6", "--crop", "ring.txt"]
@@ -248,7 +253,9 @@ def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys):
         assert line in capsys.readouterr().err and sorted(Path().iterdir()) == names
 
 
-def test_grid_thins_what_is_selected_and_repeats_it(capsys, monkeypatch):
+def test_grid_thins_what_is_selected_and_repeats_it(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 100)
     points = plate(20_000)
     Path("a.las").write_bytes(las(points, records=(wkt(BOTH),), classification=np.arange(len(points)) % 3))
@@ -267,7 +274,7 @@ def test_grid_thins_what_is_selected_and_repeats_it(capsys, monkeypatch):
     assert Path("again.obj").read_bytes() == Path("a.obj").read_bytes()
 
 
-def test_a_sweep_selects_once_for_all_trials():
+def test_a_sweep_selects_once_for_all_trials() -> None:
     words = ["a.las", "-o", "out", "--length", "4,5", "--class", "2,6", "--returns", "last", "--z-unit", "foot"]
     trials, varied = trials_of_words(sweep_parser().read([*words, "--unit", "m", "--confidence", "0.5"]))
     assert varied == ("length",)
@@ -276,7 +283,7 @@ def test_a_sweep_selects_once_for_all_trials():
         assert trial.settings.unit == "m"
 
 
-def test_files_that_do_not_lie_together_are_named():
+def test_files_that_do_not_lie_together_are_named() -> None:
     for number, aside in enumerate((0.0, 25.0, 50.0, 900.0)):  # 20 long: three in a row, and one elsewhere
         np.save(f"{number}.npy", P / np.ptp(P[:, 0]) * 20.0 + (aside, 0, 0))
     np.save("4.npy", P + np.nan)
@@ -291,7 +298,7 @@ def test_files_that_do_not_lie_together_are_named():
     assert said.startswith("0.npy and 2 more files lie about 8.3e+02")
 
 
-def test_a_wrong_byte_order_is_told_in_one_line(tmp_path):
+def test_a_wrong_byte_order_is_told_in_one_line(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.random.default_rng(0).random((2000, 3)).astype(">f4").view("<f4"))
     with warnings.catch_warnings(), pytest.raises(InputError, match="its byte order wrong"):
         warnings.simplefilter("error")

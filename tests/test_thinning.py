@@ -1,5 +1,8 @@
 """Thinning to one point a box: against slow twins, and the same to the byte for any order and parts."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import naive
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ pytestmark = pytest.mark.kernels
 
 
 @some.composite
-def scans(draw):
+def scans(draw: some.DrawFn) -> tuple[np.ndarray, float]:
     """Points of any place and proportion, some twice, some on the sides of boxes, and a spacing."""
     rng = np.random.default_rng(draw(some.integers(0, 10_000)))
     count, spacing = draw(some.integers(1, 80)), draw(some.sampled_from([0.25, 0.3, 2.0]))
@@ -23,7 +26,9 @@ def scans(draw):
     return np.concatenate([points, points[: count // 4], on_sides]), spacing
 
 
-def in_parts(points, spacing, cuts, *, merged, boundary=False):
+def in_parts(
+    points: np.ndarray, spacing: float, cuts: Sequence[int] | np.ndarray, *, merged: bool, boundary: bool = False
+) -> Rows:
     """Rows of points that are added in parts, or thinned part by part and then put together."""
     whole = Thinning(spacing, boundary=boundary)
     for part in np.split(points, cuts):
@@ -36,12 +41,12 @@ def in_parts(points, spacing, cuts, *, merged, boundary=False):
     return whole.take_rows()
 
 
-def same_rows(one: Rows, other: Rows):
+def same_rows(one: Rows, other: Rows) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(one[:2], other[:2], strict=True)) and one[2:] == other[2:]
 
 
 @given(scans())
-def test_each_box_has_the_mean_of_its_points(scan):
+def test_each_box_has_the_mean_of_its_points(scan: tuple[np.ndarray, float]) -> None:
     points, spacing = scan
     found, wanted = thin_points(points, spacing), naive.means_by_box(points, spacing)
     assert found.shape == wanted.shape
@@ -49,7 +54,7 @@ def test_each_box_has_the_mean_of_its_points(scan):
 
 
 @given(scans())
-def test_the_nearest_point_of_each_box_is_the_nearest_to_its_mean(scan):
+def test_the_nearest_point_of_each_box_is_the_nearest_to_its_mean(scan: tuple[np.ndarray, float]) -> None:
     points, spacing = scan
     found = thin_points(points, spacing, keep="nearest")
     means, boxes = thin_points(points, spacing), np.floor(points / spacing)
@@ -61,7 +66,7 @@ def test_the_nearest_point_of_each_box_is_the_nearest_to_its_mean(scan):
 
 
 @given(scans(), some.integers(0, 1000))
-def test_any_order_and_any_parts_give_the_same_bytes(scan, seed):
+def test_any_order_and_any_parts_give_the_same_bytes(scan: tuple[np.ndarray, float], seed: int) -> None:
     points, spacing = scan
     rng = np.random.default_rng(seed)
     mixed = points[rng.permutation(len(points))]
@@ -76,7 +81,7 @@ def test_any_order_and_any_parts_give_the_same_bytes(scan, seed):
 
 
 @given(scans())
-def test_extremes_are_the_outermost_points_of_a_box(scan):
+def test_extremes_are_the_outermost_points_of_a_box(scan: tuple[np.ndarray, float]) -> None:
     points, spacing = scan
     rows = in_parts(points, spacing, [], merged=False, boundary=True)
     boxes = np.floor(points / spacing).astype(np.int64)
@@ -89,14 +94,14 @@ def test_extremes_are_the_outermost_points_of_a_box(scan):
             assert extremes[side].tolist() == min(ties.tolist())
 
 
-def test_a_table_grows_as_it_fills():
+def test_a_table_grows_as_it_fills() -> None:
     points = np.random.default_rng(5).uniform(-40, 40, (9000, 3))
     found = thin_points(points, 1.0)
     assert len(found) > 8000
     assert np.allclose(found, naive.means_by_box(points, 1.0), atol=1e-9)
 
 
-def test_points_that_are_no_numbers_are_left_out_and_counted():
+def test_points_that_are_no_numbers_are_left_out_and_counted() -> None:
     points = np.array([[0.1, 0.2, 0.3], [np.nan, 0, 0], [0, np.inf, 0], [0.3, 0.2, 0.1]])
     thinning = Thinning(1.0)
     thinning.add(points)
@@ -105,23 +110,23 @@ def test_points_that_are_no_numbers_are_left_out_and_counted():
 
 
 @pytest.mark.parametrize("spacing", [0, -1.0, np.nan, np.inf, "1"])
-def test_a_spacing_that_does_not_do_is_refused(spacing):
+def test_a_spacing_that_does_not_do_is_refused(spacing: Any) -> None:
     with pytest.raises(InputError, match="spacing must be a positive number"):
         Thinning(spacing)
 
 
-def test_a_spacing_too_small_for_the_coordinates_is_refused():
+def test_a_spacing_too_small_for_the_coordinates_is_refused() -> None:
     with pytest.raises(InputError, match="too small for points so far from zero"):
         thin_points(np.array([[1e9, 0.0, 0.0]]), 1e-8)
 
 
-def test_a_scan_that_has_changed_between_two_readings_is_refused():
+def test_a_scan_that_has_changed_between_two_readings_is_refused() -> None:
     rows = in_parts(np.array([[0.5, 0.5, 0.5], [3.5, 0.5, 0.5]]), 1.0, [], merged=False)
     with pytest.raises(InputError, match="changed while it was read"):
         nearest_points(2, [nearest_in([np.array([[0.5, 0.5, 0.5]])], rows.rows, 1.0)])
 
 
-def plate(count, seed=1):
+def plate(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """Points on an inclined plate of 20 x 15 with a round hole; their distance inside the rim."""
     rng = np.random.default_rng(seed)
     flat = rng.uniform(0, (20, 15), (count, 2))
@@ -132,7 +137,7 @@ def plate(count, seed=1):
     return np.column_stack([flat, np.zeros(len(flat))]) @ turn.T, inside
 
 
-def test_the_rim_is_kept_and_nothing_but_the_rim():
+def test_the_rim_is_kept_and_nothing_but_the_rim() -> None:
     points, inside = plate(12_000)
     rows = in_parts(points, 1.0, [], merged=False, boundary=True)
     kept = points_at_boundary(rows, 1.0)
@@ -147,6 +152,6 @@ def test_the_rim_is_kept_and_nothing_but_the_rim():
     assert len(np.unique(kept, axis=0)) == len(kept)
 
 
-def test_a_single_point_is_its_own_mean_and_not_kept_twice():
+def test_a_single_point_is_its_own_mean_and_not_kept_twice() -> None:
     points = np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.6, 0.5]])
     assert np.allclose(thin_points(points, 1.0, boundary=True), points, atol=1e-9)

@@ -1,5 +1,8 @@
 """Tiles of a file hold its points, wherever they are cut; damaged files are refused in words."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 from copc_file import copc
@@ -15,12 +18,12 @@ from scantruss.scan.stream.tiles import find_source, tiles_of
 COUNT = 700
 
 
-def cloud(count=COUNT, seed=2):
+def cloud(count: int = COUNT, seed: int = 2) -> np.ndarray:
     rng = np.random.default_rng(seed)
     return np.round(rng.uniform((400, 500, -3), (420, 517, 6), (count, 3)), 3)
 
 
-def write_las(path, points, point_format=3):
+def write_las(path: Path, points: np.ndarray, point_format: int = 3) -> None:
     laspy = pytest.importorskip("laspy")
     header = laspy.LasHeader(point_format=point_format, version="1.4")
     header.scales, header.offsets = [0.001] * 3, [400, 500, 0]
@@ -29,7 +32,9 @@ def write_las(path, points, point_format=3):
     las.write(path)
 
 
-def write_ply(path, points, order="<", kind="<f8", more="", axes="xyz"):
+def write_ply(
+    path: Path, points: np.ndarray, order: str = "<", kind: str = "<f8", more: str = "", axes: str = "xyz"
+) -> None:
     word = {"<": "little", ">": "big"}[order]
     names = [("x", order + kind[1:]), ("y", order + kind[1:]), ("quality", "u1"), ("z", order + kind[1:])]
     rows = np.zeros(len(points), names)
@@ -41,19 +46,27 @@ def write_ply(path, points, order="<", kind="<f8", more="", axes="xyz"):
     path.write_bytes(f"{head}{more}end_header\n".encode() + rows.tobytes())
 
 
-def write_structured(path, points):
+def write_structured(path: Path, points: np.ndarray) -> None:
     rows = np.zeros(len(points), [("class", "u1"), ("x", "f8"), ("y", "f8"), ("z", "f8")])
     rows["x"], rows["y"], rows["z"] = points.T
     np.save(path, rows)
 
 
-def write_ascii_ply(path, points):
+def write_ascii_ply(path: Path, points: np.ndarray) -> None:
     lines = "\n".join(" ".join(map(repr, row)) for row in points.tolist())
     head = f"ply\nformat ascii 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\nproperty double z\n"
     path.write_text(f"{head}end_header\n{lines}\n")
 
 
-def write_text(path, points, head="", sign=" ", form="%.3f", numbered=False, end="\n"):
+def write_text(
+    path: Path,
+    points: np.ndarray,
+    head: str = "",
+    sign: str = " ",
+    form: str = "%.3f",
+    numbered: bool = False,
+    end: str = "\n",
+) -> None:
     rows = np.column_stack([np.arange(1, len(points) + 1), points, points[:, 2]]) if numbered else points
     text = [sign.join((form % value).replace(".", "," if sign == ";" else ".") for value in row) for row in rows]
     if numbered:
@@ -61,11 +74,11 @@ def write_text(path, points, head="", sign=" ", form="%.3f", numbered=False, end
     path.write_bytes((head + end.join(text) + end).encode())
 
 
-def write_copc(path, points):
+def write_copc(path: Path, points: np.ndarray) -> None:
     path.write_bytes(copc(points)[0])
 
 
-WAYS = {
+WAYS: dict[str, tuple[str, Callable[[Path, np.ndarray], None]]] = {
     "las": ("scan.las", write_las),
     "laz": ("scan.laz", write_las),
     "copc": ("scan.copc.laz", write_copc),
@@ -93,7 +106,9 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(way, tmp_path, monkeypatch):
+def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(
+    way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     name, write = WAYS[way]
     path = tmp_path / name
     write(path, cloud())
@@ -108,12 +123,12 @@ def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(way, tmp_path,
 
 
 @pytest.mark.parametrize("axes", ["xyz", "XYZ", "xYZy"])
-def test_binary_ply_is_entered_anywhere_whatever_its_letters(axes, tmp_path):
+def test_binary_ply_is_entered_anywhere_whatever_its_letters(axes: str, tmp_path: Path) -> None:
     write_ply(tmp_path / "scan.ply", cloud(), axes=axes)
     assert len(list(tiles_of([find_source(tmp_path / "scan.ply")], 100))) == COUNT / 100
 
 
-def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path, monkeypatch):
+def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     points = cloud()
     np.save(tmp_path / "all.npy", points)
     np.save(tmp_path / "tile-2.npy", points[:300])
@@ -127,12 +142,12 @@ def test_the_order_of_files_and_their_cuts_do_not_matter(tmp_path, monkeypatch):
     assert whole.boundary and len(whole.points) - whole.boundary == len(thin_scan([tmp_path / "all.npy"], 2.0).points)
 
 
-def damaged_las(path):
+def damaged_las(path: Path) -> None:
     write_las(path, cloud())
     path.write_bytes(path.read_bytes()[:-3000])
 
 
-def boastful_las(path):
+def boastful_las(path: Path) -> None:
     """A header that claims 10^12 points."""
     write_las(path, cloud())
     data = bytearray(path.read_bytes())
@@ -140,12 +155,12 @@ def boastful_las(path):
     path.write_bytes(data)
 
 
-def damaged_ply(path):
+def damaged_ply(path: Path) -> None:
     write_ply(path, cloud())
     path.write_bytes(path.read_bytes()[:-1])
 
 
-def damaged_npy(path):
+def damaged_npy(path: Path) -> None:
     np.save(path, cloud())
     path.write_bytes(path.read_bytes()[:-1])
 
@@ -168,14 +183,14 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("way", BROKEN)
-def test_a_damaged_file_is_refused_in_words(way, tmp_path):
+def test_a_damaged_file_is_refused_in_words(way: str, tmp_path: Path) -> None:
     name, write = BROKEN[way]
     write(tmp_path / name)
     with pytest.raises(FormatError, match="scan"):
         thin_scan([tmp_path / name], 1.0)
 
 
-def test_thinned_points_are_those_of_the_scan_in_memory(tmp_path):
+def test_thinned_points_are_those_of_the_scan_in_memory(tmp_path: Path) -> None:
     """By way of a file as by way of an array."""
     from scantruss.scan.stream.thinning import thin_points
 

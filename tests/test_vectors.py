@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typed import xyz
 
 from scantruss.kernels.geometry.vectors import (
     across,
@@ -24,7 +25,7 @@ vector = st.tuples(number, number, number)
 
 
 @given(vector, vector, number)
-def test_arithmetic_is_that_of_numpy(a, b, t):
+def test_arithmetic_is_that_of_numpy(a: tuple[float, float, float], b: tuple[float, float, float], t: float) -> None:
     u, v = np.array(a), np.array(b)
     assert np.allclose(subtract(a, b), u - v)
     assert np.allclose(along(a, t, b), u + t * v)
@@ -35,20 +36,20 @@ def test_arithmetic_is_that_of_numpy(a, b, t):
 
 
 @given(vector)
-def test_unit_has_length_one_and_keeps_the_direction(a):
+def test_unit_has_length_one_and_keeps_the_direction(a: tuple[float, float, float]) -> None:
     length = np.linalg.norm(a)
     if length > 1e-100:
         assert np.allclose(np.array(unit(a)) * length, a)
         assert np.isclose(np.linalg.norm(unit(a)), 1)
 
 
-def test_the_zero_vector_stays_zero():
+def test_the_zero_vector_stays_zero() -> None:
     assert unit((0.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
     assert norm((0.0, 0.0, 0.0)) == 0.0
 
 
 @given(vector)
-def test_across_is_a_unit_vector_at_right_angles(a):
+def test_across_is_a_unit_vector_at_right_angles(a: tuple[float, float, float]) -> None:
     if np.linalg.norm(a) > 1e-6:
         n = unit(a)
         u = across(n)
@@ -58,12 +59,12 @@ def test_across_is_a_unit_vector_at_right_angles(a):
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_across_works_along_every_axis(axis):
-    n = tuple(float(axis == k) for k in range(3))
+def test_across_works_along_every_axis(axis: int) -> None:
+    n = xyz(axis == k for k in range(3))
     assert np.isclose(norm(across(n)), 1) and dot(across(n), n) == 0
 
 
-def assert_smallest(matrix):
+def assert_smallest(matrix: np.ndarray) -> None:
     """The vector is a unit vector, and its Rayleigh quotient is the smallest eigenvalue of numpy."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = matrix.tolist()
     v = np.array(smallest_eigenvector(xx, xy, xz, yy, yz, zz))
@@ -73,20 +74,20 @@ def assert_smallest(matrix):
 
 
 @given(st.lists(vector, min_size=1, max_size=12))
-def test_smallest_eigenvector_agrees_with_numpy(rows):
+def test_smallest_eigenvector_agrees_with_numpy(rows: list[tuple[float, float, float]]) -> None:
     points = np.array(rows)
     points -= points.mean(axis=0)
     assert_smallest(points.T @ points)
 
 
 @given(st.tuples(number, number, number), st.integers(0, 50))
-def test_smallest_eigenvector_of_a_turned_diagonal_matrix(values, seed):
+def test_smallest_eigenvector_of_a_turned_diagonal_matrix(values: tuple[float, float, float], seed: int) -> None:
     turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     matrix = turn @ np.diag(values) @ turn.T
     assert_smallest((matrix + matrix.T) / 2)
 
 
-def test_smallest_eigenvector_where_eigenvalues_coincide():
+def test_smallest_eigenvector_where_eigenvalues_coincide() -> None:
     assert_smallest(np.diag([2.0, 2.0, 2.0]))
     assert_smallest(np.diag([2.0, 2.0, 1.0]))
     assert_smallest(np.diag([1.0, 1.0, 2.0]))  # points on a line: any normal of it
@@ -95,13 +96,13 @@ def test_smallest_eigenvector_where_eigenvalues_coincide():
 
 @pytest.mark.parametrize("line", [(1, 0, 0), (0, 1, -1), (1, -1, 0), (1, 1, -2), (1, 1, 1), (-3, 2, 1)])
 @pytest.mark.parametrize("length", [1.0, 1 / 3, 0.7, 123.4])
-def test_smallest_eigenvector_of_points_on_a_line_is_across_it(line, length):
+def test_smallest_eigenvector_of_points_on_a_line_is_across_it(line: tuple[float, float, float], length: float) -> None:
     points = np.array([[-1.0], [0.0], [1.0]]) * np.array(line) * length
     assert_smallest(points.T @ points)
 
 
 @pytest.mark.parametrize("scale", [1e-190, 1e-90, 1e-12, 1.0, 1e12, 1e90, 1e190])
-def test_smallest_eigenvector_does_not_depend_on_the_scale(scale):
+def test_smallest_eigenvector_does_not_depend_on_the_scale(scale: float) -> None:
     rng = np.random.default_rng(1)
     points = rng.normal(size=(20, 3)) * [1.0, 0.7, 0.1]
     matrix = points.T @ points

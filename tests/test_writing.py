@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
@@ -52,7 +53,8 @@ def test_other_readers_find_the_same(tmp_path: Path) -> None:
 
 
 def test_the_unit_of_a_text_does_not_keep_others_from_its_numbers(tmp_path: Path) -> None:
-    for suffix, options in ((".xyz", {}), (".txt", {}), (".csv", {"delimiter": ",", "skiprows": 1})):
+    own: dict[str, dict[str, Any]] = {".xyz": {}, ".txt": {}, ".csv": {"delimiter": ",", "skiprows": 1}}
+    for suffix, options in own.items():
         write_points(tmp_path / f"a{suffix}", POINTS, normals=NORMALS, unit="mm")
         assert np.array_equal(np.loadtxt(tmp_path / f"a{suffix}", **options), np.hstack([POINTS, NORMALS]))
     assert (tmp_path / "a.csv").read_text().startswith("x [mm],y [mm],z [mm],nx,ny,nz\n")

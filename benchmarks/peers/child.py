@@ -62,7 +62,7 @@ def measured(job: dict[str, Any]) -> dict[str, Any]:
         chosen.warm()
     before, _ = memory()
     scan = Scan(np.load(job["points"]), job["length"], job["nodes"], job["spacing"])
-    seconds = []  # of each call
+    seconds: list[float] = []  # of each call
     least = 2 if chosen.warm is not None and job["repeats"] else 1  # what compiles is never told by its first call
     try:
         while len(seconds) < least or (len(seconds) <= job["repeats"] and seconds[0] < SHORT):

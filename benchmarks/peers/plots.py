@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from .runs import Row
 from .tables import OURS
@@ -21,7 +22,12 @@ def scatter(rows: Sequence[Row], across: tuple[str, str], up: tuple[str, str], f
     matplotlib.use("Agg")
     from matplotlib import pyplot, ticker
 
-    settings = {"svg.hashsalt": "scantruss", "svg.fonttype": "path", "font.size": 9, "font.family": "DejaVu Sans"}
+    settings: dict[Any, Any] = {
+        "svg.hashsalt": "scantruss",
+        "svg.fonttype": "path",
+        "font.size": 9,
+        "font.family": "DejaVu Sans",
+    }
     with pyplot.rc_context(settings):
         figure, axes = pyplot.subplots(figsize=(9, 5), layout="constrained")
         drawn = 0

@@ -203,7 +203,8 @@ def all_rows(
     kept: Path = KEPT,
 ) -> Iterator[Row]:
     """Yield the rows of all ways on all clouds; those known already are not run again unless `fresh`."""
-    ways, store, rows = tuple(ways), Store(kept / "rows.jsonl"), []
+    ways, store = tuple(ways), Store(kept / "rows.jsonl")
+    rows: list[Row] = []
     for cloud in clouds:
         for way in ways:
             key = key_of(cloud, way, limit, repeats)
