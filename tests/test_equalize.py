@@ -27,12 +27,8 @@ from scantruss.kernels.boundary import curves
 from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search
 from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
-<<<<<<< HEAD
-from scantruss.kernels.mesh.trial import total_energy
-from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
-=======
 from scantruss.kernels.mesh.trial import Scratch, total_energy
->>>>>>> wc
+from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 
 MAKERS: dict[str, Callable[..., Rough]] = {
     "disc": rough_disc,
@@ -288,13 +284,8 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
         assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.PATCH_REACH - 0.01, False)])
-def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away, moves):
-=======
-@pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.LEASH - 0.01, False)])
 def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away: float, moves: bool) -> None:
->>>>>>> wc
     rough = rough_disc()
     mesh, length = rough.mesh(), rough.settings.length
     net = mesh.net

@@ -11,12 +11,8 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 from scipy.spatial import Delaunay
 from small_grids import dome, fan, make_grid
 
-<<<<<<< HEAD
-from scantruss.improve.flips import LEAST_COSINE, flip_by_angle, flip_edges
-=======
 from scantruss import Grid
-from scantruss.improve.flips import FOLD, flip_by_angle, flip_edges
->>>>>>> wc
+from scantruss.improve.flips import LEAST_COSINE, flip_by_angle, flip_edges
 from scantruss.improve.working_mesh import open_net
 from scantruss.kernels.mesh import flips as kernels
 from scantruss.kernels.mesh.grid import Net, flip, may_flip

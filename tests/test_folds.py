@@ -9,11 +9,7 @@ import pytest
 
 import scantruss as st
 from scantruss.kernels.surface import folds
-<<<<<<< HEAD
-from scantruss.kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, fit_patch
-=======
-from scantruss.kernels.surface.local_surface import PATCH, Surface, fit_patch
->>>>>>> wc
+from scantruss.kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch
 
 pytestmark = pytest.mark.kernels
 

@@ -14,11 +14,7 @@ from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
 from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
 from scantruss.surface.linked_samples import link_samples
-<<<<<<< HEAD
-from scantruss.surface.samples import SPARSE_SPACING, sample_surface, samples_with, with_whole_boundary
-=======
-from scantruss.surface.samples import SPARSE, SurfaceSamples, sample_surface, samples_with, with_whole_boundary
->>>>>>> wc
+from scantruss.surface.samples import SPARSE_SPACING, SurfaceSamples, sample_surface, samples_with, with_whole_boundary
 
 
 def apart(samples: SurfaceSamples) -> float:

@@ -15,11 +15,8 @@ from scantruss.kernels.surface.local_surface import (
     HEIGHTS,
     NORMAL,
     PATCH,
-<<<<<<< HEAD
     TANGENT,
-=======
     Surface,
->>>>>>> wc
     fit_patch,
     flood,
     linked,
@@ -39,20 +36,11 @@ def nearest_sample(surface: Surface, place: Iterable[float]) -> int:
     return int(((surface.mean - xyz(place)) ** 2).sum(axis=1).argmin())
 
 
-<<<<<<< HEAD
-def foot_of(surface, place, sample=None):
+def foot_of(surface: Surface, place: Iterable[float], sample: int | None = None) -> np.ndarray:
     """Foot of a place by a fresh patch, on the sheet of a sample or of the nearest one."""
-    patch, place = np.zeros(PATCH), tuple(float(c) for c in place)
-    fit_patch(surface, patch, nearest_sample(surface, place) if sample is None else sample, place)
-    return np.array(onto_patch(patch, place))
-=======
-def foot_of(surface: Surface, place: Iterable[float], patches: np.ndarray | None = None) -> np.ndarray:
-    """Foot of a place by a fresh patch."""
-    patches = np.zeros((1, PATCH)) if patches is None else patches
-    if patches[0, 16] == 0:
-        patches[0, 15] = nearest_sample(surface, place)
-    return np.array(onto_surface(surface, patches, 0, *xyz(place)))
->>>>>>> wc
+    patch, at = np.zeros(PATCH), xyz(place)
+    fit_patch(surface, patch, nearest_sample(surface, at) if sample is None else sample, at)
+    return np.array(onto_patch(patch, at))
 
 
 def inner_places(rng: np.random.Generator, width: float, count: int) -> np.ndarray:
@@ -145,13 +133,8 @@ def test_the_normal_of_a_patch_is_that_of_the_ball() -> None:
 
 
 @pytest.mark.kernels
-<<<<<<< HEAD
-def test_a_patch_is_fitted_where_the_place_is_not_where_its_sample_is():
+def test_a_patch_is_fitted_where_the_place_is_not_where_its_sample_is() -> None:
     """The foot depends on the place alone: the sample from which it is looked for only tells the sheet."""
-=======
-def test_a_patch_is_fitted_anew_where_the_place_has_gone() -> None:
-    """The foot depends on where the place is, not on where the patch was fitted first."""
->>>>>>> wc
     surface = samples_of(ball(3.0, 1500)).surface
     start = nearest_sample(surface, (0.0, 0.0, 3.1))
     for angle in np.linspace(0, 2.5, 26):

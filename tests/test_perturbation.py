@@ -37,13 +37,8 @@ def trace(net: Net) -> Any:
     return used.tolist(), rings, net.nodes[used].tobytes(), net.arc[used].tobytes(), net.degree[used].tobytes()
 
 
-<<<<<<< HEAD
-def energy_of(mesh, scratch):
-    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
-=======
 def energy_of(mesh: WorkingMesh, scratch: Scratch) -> float:
-    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, WEIGHT)[0]
->>>>>>> wc
+    return total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
 
 
 def perturb(mesh: WorkingMesh, scratch: Scratch, area: Area, v: int, worth: float, temperature: float = 0.0) -> bool:

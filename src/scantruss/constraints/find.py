@@ -65,9 +65,7 @@ def ridges_that_are_kept(samples: SurfaceSamples, settings: Settings) -> list[Ri
     return find_ridges(samples, settings) if wanted else []
 
 
-def find_lines(
-    samples: SurfaceSamples, boundary: Boundary, ridges: list[Ridge], settings: Settings
-) -> Lines:
+def find_lines(samples: SurfaceSamples, boundary: Boundary, ridges: list[Ridge], settings: Settings) -> Lines:
     """Return the fixed lines and the ridges of a scan, each a curve that becomes a chain of members."""
     if not settings.fixed_lines and not ridges:
         return NO_LINES

@@ -154,9 +154,7 @@ def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray
             if _meet(together, ends, length):
                 for member in together:
                     group[member] = together
-    return {
-        (ends[i].line, ends[i].at): meeting([ends[k] for k in together]) for i, together in group.items()
-    }
+    return {(ends[i].line, ends[i].at): meeting([ends[k] for k in together]) for i, together in group.items()}
 
 
 def _cost(one: End, two: End, length: float) -> float | None:

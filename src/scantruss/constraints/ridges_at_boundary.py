@@ -10,8 +10,8 @@ import numpy as np
 from ..boundary.find import Boundary, Loop
 
 if TYPE_CHECKING:
-    from .ridge_ends import Ridge
     from ..surface.samples import SurfaceSamples
+    from .ridge_ends import Ridge
 
 AT_BOUNDARY = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
 TUBE = 0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
@@ -24,9 +24,7 @@ BENT = 1.0  # length over which the boundary is bent to the end of a ridge [memb
 FARTHEST = 0.4  # the boundary is not bent by more than this [member lengths]
 
 
-def with_ridge_ends(
-    boundary: Boundary, ridges: list[Ridge], samples: SurfaceSamples, length: float
-) -> Boundary:
+def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSamples, length: float) -> Boundary:
     """Return the boundary, bent to the places where ridges leave the scan."""
     loops = list(boundary.loops)
     for ridge in ridges:
@@ -40,7 +38,7 @@ def with_ridge_ends(
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:
-    """Return the place (3,) where the scan ends along the continuation of a line (K, 3) beyond its last point; None if that cannot be told."""
+    """Return where the scan ends (3,) along the continuation of a line (K, 3); None if that cannot be told."""
     from_there = line[-1]
     ahead = from_there - line[max(len(line) - AIM, 0)]
     size = float(np.linalg.norm(ahead))

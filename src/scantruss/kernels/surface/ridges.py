@@ -272,7 +272,9 @@ def fit_fold(
     rounding = FIRST_ROUNDING * surface.length / radius
     for turn in range(FOLD_FITS):
         if turn == FOLD_FITS - 1 and least < np.inf:
-            least, rounding = best_rounding(buffer, taken, turned_frame(c, n, angle), shift, radius, surface.length, matrix)
+            least, rounding = best_rounding(
+                buffer, taken, turned_frame(c, n, angle), shift, radius, surface.length, matrix
+            )
         at_angle, at_shift = angle, shift
         for i in range(TURNS):
             for j in range(SHIFTS):
