@@ -11,7 +11,6 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
-from ..surface.samples import ALL
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
 # radii around a place within which folds are fitted, in turn until one fits: the second for rounded folds, then for places near corners
 RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
 FEWEST_SPACINGS = 2.6  # least radius, in distances between points
+POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
+FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FITS = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
 STRIDE = 0.25  # step from place to place along a fold [member lengths]
 TURNS = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
@@ -30,7 +31,7 @@ BETTER = 10.0  # how much better a fold must fit than a smooth surface (F statis
 ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
-PATIENCE = 40  # places that look folded and are no ridge, after which the search stops: the scan is rough
+PATIENCE = 16  # places that look folded and are no ridge, after which the search stops: the scan is rough
 MISSED = 2  # places in a row at which a fold may not be seen and still goes on
 TURNED = 0.94  # least cosine of the turn of a fold from place to place
 RING = 6  # places along the shortest ring
@@ -46,23 +47,29 @@ class Tracer:
     """Fits folds to a scan and goes along them."""
 
     def __init__(self, samples: SurfaceSamples, settings: Settings) -> None:
-        self.surface = samples.surface._replace(patch_points=ALL)
+        self.surface = samples.surface
         self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
         self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in RADII]
+        of_sample = samples.area / len(samples.surface.mean)
+        self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
         self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty((6000, COLUMNS))
 
     def fold_at(
-        self, sample: int, place: np.ndarray, towards: np.ndarray, radii: list[float] | None = None
+        self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0
     ) -> np.ndarray | None:
-        """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits."""
+        """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
+
+        first : number of the radius that is tried first
+        """
         found, best = np.zeros(FOUND), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
-        for radius in radii or self.radii:
-            fits = kernels.fit_fold(self.surface, sample, (x, y, z), (a, b, c), radius, self.buffer, found)
+        for radius, most in list(zip(self.radii, self.most, strict=True))[first:]:
+            surface = self.surface._replace(patch_points=max(most, FEWEST_OF_A_SAMPLE))
+            fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, found)
             if fits and found[GAIN] >= BETTER and found[OFF] <= ROUGHEST * self.length:
                 if found[OFF] <= self.fits and found[BEND] >= WEAK * self.angle:
                     return found
@@ -102,7 +109,7 @@ class Tracer:
         ahead = (last - first) / np.linalg.norm(last - first)
         for share in BETWEEN:
             place = first + share * (last - first)
-            fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, self.radii[-1:])
+            fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, len(self.radii) - 1)
             if fold is None or fold[BEND] < WEAK * self.angle or abs(fold[3:6] @ ahead) < TURNED:
                 return False
             if np.linalg.norm(fold[:3] - place) > 0.6 * STRIDE * self.length:
@@ -195,8 +202,12 @@ CORNER = 25.0  # by how much a line turns more in a corner than before and after
 LONG = 1.0  # least length of a line of folds [member lengths]
 FULL = 0.75  # least length of it with the full angle [member lengths]
 SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
-EVEN = 4.0  # median change of the bend from place to place, at most [degree]
-SURE = 30.0  # median gain, at least (F statistic)
+# median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
+# are as sharp as blunt ridges that were made, but not as even
+EVEN = (0.5, 3.5)
+BLUNT, ACUTE = 50.0, 70.0  # [degree]
+BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
+SURE = 100.0  # median gain, at least (F statistic)
 
 
 def parts_of(folds: np.ndarray) -> list[np.ndarray]:
@@ -226,8 +237,9 @@ def is_even(folds: np.ndarray, angle: float) -> bool:
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     bends = np.cross(ahead[1:], ahead[:-1])
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
-    turns_back = float(np.median(angles)) >= np.radians(SHARPEST)
-    return bool(np.median(folds[:, GAIN]) >= SURE and uneven <= np.radians(EVEN) and not turns_back)
+    gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
+    most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN)) + BY_NOISE / np.sqrt(max(gain, 1.0))
+    return bool(gain >= SURE and uneven <= most and bend < SHARPEST)
 
 
 def smoothed(places: np.ndarray) -> np.ndarray:
