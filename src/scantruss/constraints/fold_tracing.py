@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # radii around a place within which folds are fitted, in turn until one fits: the second for rounded folds, then for places near corners
 RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
 FEWEST_SPACINGS = 2.6  # least radius, in distances between points
+CLOSER = 2  # number of the first of the radii for places near corners
 POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FITS = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
@@ -26,6 +27,7 @@ STRIDE = 0.25  # step from place to place along a fold [member lengths]
 TURNS = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
 LIKELY = 0.35  # share of the ridge angle above which a fold is looked at more closely
 WEAK = 0.6  # share of the ridge angle from which a fold is followed
+SHARP = 1.5  # share of it from which no larger radius is tried
 FADED = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
 BETTER = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
@@ -57,25 +59,35 @@ class Tracer:
         self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty((6000, COLUMNS))
 
-    def fold_at(
-        self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0
-    ) -> np.ndarray | None:
+    def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.ndarray | None:
         """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
 
         first : number of the radius that is tried first
         """
-        found, best = np.zeros(FOUND), None
+        fold, best = np.zeros(FOUND), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
-        for radius, most in list(zip(self.radii, self.most, strict=True))[first:]:
+        for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
+            if number < first or (number >= CLOSER and best is not None and self._is_clear(best)):
+                continue
             surface = self.surface._replace(patch_points=max(most, FEWEST_OF_A_SAMPLE))
-            fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, found)
-            if fits and found[GAIN] >= BETTER and found[OFF] <= ROUGHEST * self.length:
-                if found[OFF] <= self.fits and found[BEND] >= WEAK * self.angle:
-                    return found
-                if best is None or found[OFF] < best[OFF]:
-                    best = found.copy()
+            fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, fold)
+            if not fits or fold[GAIN] < BETTER or fold[OFF] > ROUGHEST * self.length:
+                continue
+            if self._is_clear(fold) and fold[BEND] >= SHARP * self.angle:
+                return fold
+            if best is None or self._rank(fold) > self._rank(best):
+                best = fold.copy()
         return best
+
+    def _is_clear(self, fold: np.ndarray) -> bool:
+        """Whether a fold fits and is one to follow."""
+        return bool(fold[OFF] <= self.fits and fold[BEND] >= WEAK * self.angle)
+
+    def _rank(self, fold: np.ndarray) -> tuple[bool, float]:
+        """What is better of two folds: clear ones that bend most, else those that fit best."""
+        clear = self._is_clear(fold)
+        return clear, float(fold[BEND] if clear else -fold[OFF])
 
     def trace(self) -> list[np.ndarray]:
         """The folds (K, FOUND) a stride apart along each line of folds that is long and sharp enough to be a ridge."""
@@ -207,7 +219,7 @@ SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: t
 EVEN = (0.5, 3.5)
 BLUNT, ACUTE = 50.0, 70.0  # [degree]
 BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
-SURE = 100.0  # median gain, at least (F statistic)
+SURE = 20.0  # median gain, at least (F statistic)
 
 
 def parts_of(folds: np.ndarray) -> list[np.ndarray]:

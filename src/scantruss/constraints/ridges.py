@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 BESIDE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
 NEARLY = 0.9  # share of the ridge angle that counts as full: noise takes some away
-SHARE = 0.55  # least share of a ridge that has the full angle
+SHARE = 0.55  # least share of a ridge that has the full angle ...
+LONG_FULL = 2.5  # ... unless it has it over this length [member lengths]
 SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]
 SHORTEST = 0.35  # shortest such ridge [member lengths]
 
@@ -79,4 +80,5 @@ def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
 def _is_sharp(folds: np.ndarray, angle: float) -> bool:
     """Whether a line of folds (K, FOUND) has the full angle along enough of it."""
     full = folds[:, BEND] >= NEARLY * angle
-    return bool(full.sum() * STRIDE >= FULL and full.mean() >= SHARE)
+    size = float(full.sum()) * STRIDE
+    return bool(size >= LONG_FULL or (size >= FULL and full.mean() >= SHARE))

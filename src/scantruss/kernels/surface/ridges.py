@@ -25,9 +25,10 @@ TERMS = 8
 # surface (F statistic), rms distance of the points [scan unit]
 BEND, GAIN, OFF, FOUND = 6, 7, 8, 9
 ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
+CLEARLY = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
 FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
-FOLD_FITS = 3
+SEARCHES, FOLD_FITS = 2, 5  # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
 NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
 MIDDLE = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
 FEWEST_OF_FLANK = 6  # fewest points of a side
@@ -239,11 +240,11 @@ def best_rounding(
     length: float,
     matrix: np.ndarray,
 ) -> tuple[float, float]:
-    """Least error of the folds of all roundings along a line, and that rounding [radius]."""
+    """Error of the folds along a line of the sharpest rounding that fits, and that rounding [radius]."""
     least, best = np.inf, 0.0
     for w in ROUNDINGS:
         error = fold_error(buffer, taken, frame, shift, radius, True, w * length / radius, matrix)
-        if error < least:
+        if error < CLEARLY * least:
             least, best = error, w * length / radius
     return least, best
 
@@ -271,10 +272,12 @@ def fit_fold(
     least = np.inf
     rounding = FIRST_ROUNDING * surface.length / radius
     for turn in range(FOLD_FITS):
+        if turn == SEARCHES and least < np.inf:
+            rounding = 0.0
+            least = fold_error(buffer, taken, turned_frame(c, n, angle), shift, radius, True, rounding, matrix)
         if turn == FOLD_FITS - 1 and least < np.inf:
-            least, rounding = best_rounding(
-                buffer, taken, turned_frame(c, n, angle), shift, radius, surface.length, matrix
-            )
+            frame = turned_frame(c, n, angle)
+            least, rounding = best_rounding(buffer, taken, frame, shift, radius, surface.length, matrix)
         at_angle, at_shift = angle, shift
         for i in range(TURNS):
             for j in range(SHIFTS):
@@ -284,7 +287,8 @@ def fit_fold(
                 error = fold_error(buffer, taken, frame, b, radius, True, rounding, matrix)
                 if error < least:
                     least, angle, shift = error, a, b
-        reach, swing = 0.4 * reach, 0.4 * swing
+        if turn != SEARCHES:  # a sharp fold may lie a little beside
+            reach, swing = 0.4 * reach, 0.4 * swing
     if least == np.inf:
         return False
     frame = turned_frame(c, n, angle)
