@@ -51,7 +51,7 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
     As (0, 0, 0) for no echo in a scan with national coordinates. Sparse far ends count.
     """
     some = points[:: max(len(points) // BULK, 1)]
-    lower, upper = bulk_of(some)
+    lower, upper = bulk_of(some[:: max(len(some) // POINTS_OF_EXTENT, 1)])
     away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
     near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
     return np.stack([near.min(axis=0), near.max(axis=0)])

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .checks import CAUSE, check_sensible, find_invalid, find_no_data, invalid_values_note, no_data_note
+from .checks import CAUSE, check_sensible, find_invalid, find_no_data, invalid_values_note, no_data_note, usual_extent
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
@@ -60,6 +60,12 @@ class PointCloud:
     def extent(self) -> float:
         """Longest side of the box around the points [scan unit]."""
         return float((self.bounds[1] - self.bounds[0]).max())
+
+    @cached_property
+    def usual_extent(self) -> float:
+        """The same of the bulk of the points, where a few lie so far away that they are none of the scan; measured once [scan unit]."""
+        usual = float(np.ptp(usual_extent(self.points), axis=0).max())
+        return usual if 0.0 < usual < 0.5 * self.extent else self.extent
 
     @cached_property
     def spacing(self) -> float:
