@@ -57,7 +57,17 @@ def lengths_of(cloud: st.PointCloud, count: int) -> list[float]:
 def run(scan: Path, length: float, folder: Path, effort: str) -> dict[str, Any]:
     """Make a grid by the command line and return what it says."""
     stem = folder / f"{scan.stem}_{length:g}"
-    words = ["grid", str(scan), f"{stem}.json", f"{stem}.obj", f"{stem}.png", "--length", f"{length:g}", "--effort", effort]
+    words = [
+        "grid",
+        str(scan),
+        f"{stem}.json",
+        f"{stem}.obj",
+        f"{stem}.png",
+        "--length",
+        f"{length:g}",
+        "--effort",
+        effort,
+    ]
     said, noted, started = io.StringIO(), io.StringIO(), perf_counter()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(noted):
         status = scantruss_main([*words, "--force"])
@@ -92,7 +102,9 @@ def objections(row: dict[str, Any]) -> list[str]:
     other, length, found = row.get("check", {}), row["length"], row["certificate"]
     if "error" in other or not other:
         return [f"not checked: {other.get('error', '')}"] if other else []
-    off = min(other["node_dev_max"], other["node_to_point"])  # a plane through 24 points lies off a fold, the nearest point never
+    off = min(
+        other["node_dev_max"], other["node_to_point"]
+    )  # a plane through 24 points lies off a fold, the nearest point never
     limits = (
         (other["angle_min"] < LEAST_ANGLE, f"angle {other['angle_min']:.1f}"),
         (other["L_min"] < SHORTEST * length, f"member {other['L_min'] / length:.2f} L"),
@@ -111,7 +123,9 @@ def objections(row: dict[str, Any]) -> list[str]:
         ("pieces", found["pieces"], other["components"], 0),
     )
     said = [words for wrong, words in limits if wrong]
-    return said + [f"{name} {ours:.4g}, not {theirs:.4g}" for name, ours, theirs, room in pairs if abs(ours - theirs) > room]
+    return said + [
+        f"{name} {ours:.4g}, not {theirs:.4g}" for name, ours, theirs, room in pairs if abs(ours - theirs) > room
+    ]
 
 
 def rows_so_far(file: Path) -> Iterator[dict[str, Any]]:

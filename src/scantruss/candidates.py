@@ -113,8 +113,10 @@ def _same_scan(settings: Settings) -> Iterator[Attempt]:
 
 
 class Hope:
-    """Which attempts are still worth making: after two in a row that come nowhere near a grid that passes, others of the same
-    settings would come no nearer; after three such settings none would.
+    """Which attempts are still worth making.
+
+    After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three such
+    settings none would.
     """
 
     def __init__(self) -> None:
