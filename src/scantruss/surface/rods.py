@@ -17,7 +17,7 @@ MOST = 0.4  # share of the samples from which on they are no rods but the scan
 ROUNDS = 3  # times that ends of rods are looked for
 
 
-def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
+def rod_points(found: Linked, points: int, length: float, supports: np.ndarray | None = None) -> np.ndarray:
     """Return which points (N,) bool belong to rods: to samples along a line, and to the ends of these where they meet a sheet.
 
     Parameters
@@ -28,8 +28,11 @@ def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
         How many points there are.
     length : float
         Desired member length [scan unit].
+    supports : (S,) bool, optional
+        Samples that are known for supports, though they are no thinner than a member.
     """
-    rod = _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE * length)[0])
+    known = np.zeros(len(found.mean), np.bool_) if supports is None else supports
+    rod = known | _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE * length)[0])
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= _thin(_spreads(found, ~rod, FINE * length)[0])
     for _ in range(ROUNDS if rod.any() else 0):
@@ -40,15 +43,15 @@ def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
         if not ends.any():
             break
         rod |= ends
-    rod &= _long_groups(found, rod, length)
+    rod &= _long_groups(found, rod, known, length)
     if rod.mean() > MOST:
         rod[:] = False
     marked: np.ndarray = np.where(found.owner >= 0, rod[found.owner], False)
     return marked if len(marked) == points else np.zeros(points, np.bool_)
 
 
-def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples belong to a group of rods at least a member long, (S,) bool; others are corners of a sheet."""
+def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples belong to a group of rods at least a member long or known, (S,) bool; others are corners of a sheet."""
     beside = found.neighbors
     one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
     label = component_labels(len(rod), one, beside[one, other])
@@ -57,6 +60,7 @@ def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
     sizes = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(found.mean[order], first)
     long = np.zeros(len(rod), np.bool_)
     long[label[order[first]]] = sizes.max(axis=1) >= length
+    long[label[known]] = True
     marked: np.ndarray = long[label]
     return marked
 

@@ -41,6 +41,7 @@ from .rods import rod_points
 from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
+from .supports import support_samples
 
 # distance from the points already taken within which all points of the boundary are taken [their spacings]
 BESIDE_SAMPLES = 1.5
@@ -324,7 +325,9 @@ def _prepare(
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
     """Return which points (N, 3) belong to rods, (N,) bool."""
     radius = max((asked.box_size or SAMPLE_SPACING) * asked.length, 0.25 * spacing)
-    return rod_points(link_samples(points, radius, asked.length, spacing), len(points), asked.length)
+    found = link_samples(points, radius, asked.length, spacing)
+    supports = support_samples(found, asked.length) if asked.z_is_up else None
+    return rod_points(found, len(points), asked.length, supports)
 
 
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
