@@ -152,6 +152,7 @@ def make_grid(
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
         except FrontError as error:
+            note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)
             note_nearby(bars, cloud, settings)
             raise error

@@ -10,7 +10,16 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .checks import CAUSE, check_sensible, find_invalid, find_no_data, invalid_values_note, no_data_note, usual_extent
+from .checks import (
+    CAUSE,
+    check_sensible,
+    find_invalid,
+    find_no_data,
+    have_one_height,
+    invalid_values_note,
+    no_data_note,
+    usual_extent,
+)
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
@@ -108,7 +117,7 @@ class PointCloud:
         dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
-            left_out = ((INVALID, int(invalid.sum())),)
+            left_out = ((NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:
