@@ -9,6 +9,7 @@ import scantruss as st
 from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
 from scantruss.kernels.surface.rods import spreads_around
+from scantruss.scan.member_length import length_range
 from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.rods import rod_points
 from scantruss.surface.supports import support_samples
@@ -55,6 +56,14 @@ def test_a_sheet_is_no_rod_however_its_edge_runs(width):
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0, 12, 8000), rng.uniform(0, width * LENGTH, 8000)
     assert not rods_of(np.column_stack([x, y, 0.05 * x * x]), LENGTH).any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_thin_spots_of_a_sparse_sheet_are_no_rods(seed):
+    """However short the members."""
+    points = roof(np.random.default_rng(seed))
+    low, _ = length_range(st.PointCloud.from_array(points))
+    assert not any(rods_of(points, share * low).any() for share in (1.0, 1.1, 1.2, 1.4, 1.6))
 
 
 def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall):

@@ -9,6 +9,7 @@ from ..kernels.surface.rods import spreads_around
 from .linked_samples import Linked
 
 COARSE, FINE = 1.0, 0.6  # distances within which the samples around one tell whether it is a rod [member lengths]
+ENOUGH = 24  # samples around a usual one that tell a rod from a sheet
 FEWEST = 6  # fewest samples around one, rods aside, that make a sheet
 THIN = 0.15  # spread across a rod over that along it, of squares; half a disc, as at a boundary, has 0.28
 STUB = 1.3  # distance from a rod at which samples may be its ends [member lengths]
@@ -32,7 +33,9 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         Samples that are known for supports, though they are no thinner than a member.
     """
     known = np.zeros(len(found.mean), np.bool_) if supports is None else supports
-    rod = known | _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE * length)[0])
+    spreads, _, count = _spreads(found, np.ones(len(found.mean), np.bool_), COARSE * length)
+    tells = np.median(count) >= ENOUGH  # of fewer samples around each a sheet may look thin too
+    rod = known | (_thin(spreads) & tells)
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= _thin(_spreads(found, ~rod, FINE * length)[0])
     for _ in range(ROUNDS if rod.any() else 0):
