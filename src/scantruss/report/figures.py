@@ -113,7 +113,7 @@ def first_line(certificate: Certificate) -> list[str]:
     """Return what a user must know first: that ScanTruss left out much of the scan by its own judgement; nothing where it did not."""
     if certificate.judged_out <= WARN_LEFT_OUT:
         return []
-    own = [part for part in certificate.left_out if not part.asked and part.kind != "duplicates"]
+    own = [part for part in certificate.left_out if part.points and not part.asked and part.kind != "duplicates"]
     kinds = dict.fromkeys(part.words for part in own)
     return [
         f"{certificate.judged_out:.1%} of the scan, {sum(part.points for part in own):,} of {certificate.points:,} points,"

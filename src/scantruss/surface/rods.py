@@ -14,6 +14,7 @@ FEWEST = 6  # fewest samples around one, rods aside, that make a sheet
 THIN = 0.15  # spread across a rod over that along it, of squares; half a disc, as at a boundary, has 0.28
 STUB = 1.3  # distance from a rod at which samples may be its ends [member lengths]
 OFF_SHEET = 0.1  # distance from the sheet around at which a sample near a rod is an end of it [member lengths]
+APART = 0.8  # distance from all sheets to which a rod stands off, at one place at least [member lengths]
 MOST = 0.4  # share of the samples from which on they are no rods but the scan
 ROUNDS = 3  # times that ends of rods are looked for
 
@@ -54,7 +55,10 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
 
 
 def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples belong to a group of rods at least a member long or known, (S,) bool; others are corners of a sheet."""
+    """Return which samples belong to a group of rods, (S,) bool: known, or a member long and standing off all sheets.
+
+    Others are corners of a sheet, or where it has few points.
+    """
     beside = found.neighbors
     one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
     label = component_labels(len(rod), one, beside[one, other])
@@ -63,6 +67,9 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     sizes = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(found.mean[order], first)
     long = np.zeros(len(rod), np.bool_)
     long[label[order[first]]] = sizes.max(axis=1) >= length
+    off = np.zeros(len(rod), np.bool_)
+    off[label[rod & (_moments(found, ~rod, APART * length)[2] == 0)]] = True
+    long &= off
     long[label[known]] = True
     marked: np.ndarray = long[label]
     return marked
