@@ -1,5 +1,7 @@
 """Holes that are closed: the surface goes on smoothly where it is known what it was, and what is made up is told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from marks import compiled_only
@@ -10,7 +12,8 @@ import scantruss as st
 from scantruss.boundary.holes import _lattice as lattice
 from scantruss.boundary.holes import _thin_plate as thin_plate
 from scantruss.boundary.holes import fill_holes
-from scantruss.report.figures import left_out_lines
+from scantruss.grid.certificate import LeftOut
+from scantruss.report.figures import first_line, left_out_lines
 
 RADIUS = 15 / (2 * np.pi)  # of a hole with a rim of 15 members of length 1
 
@@ -175,3 +178,8 @@ def test_of_many_small_holes_the_largest_are_listed_and_the_others_counted():
     assert len(closed) == 6 and (more := closed[-1].number) > 1
     said = [line for line in left_out_lines(grid.certificate) if "hole" in line]
     assert said[0].startswith("hole closed, near (") and said[-1].startswith(f"{more} more holes closed, up to ")
+    stray = replace(grid.certificate, left_out=(LeftOut("outliers", 500, 0.02), *closed), points=25_000)
+    (line,) = first_line(stray)  # a hole has no points that could be missing
+    assert (
+        line.startswith("2.0% of the scan, 500 of 25,000 points, is not in the grid: outliers") and "hole" not in line
+    )
