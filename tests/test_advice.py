@@ -109,3 +109,14 @@ def test_a_refused_length_comes_with_one_that_passes(
     named = said.split("a grid passes with --length ")[1].split()[0]
     assert float(named) != failing
     assert main([*words, named]) == 0
+
+
+def test_in_place_of_a_length_that_holes_in_the_sampling_spoil_one_is_tried_first_that_they_do_not(monkeypatch):
+    cloud = cloud_of("limpet")
+    advice, tried = Advice(cloud, st.Settings(length=1.0)), []
+    monkeypatch.setattr(Advice, "try_length", lambda _, length: tried.append(length))
+    assert advice.nearby(4.0 * cloud.spacing) is None
+    assert tried[0] == pytest.approx(8.0 * cloud.spacing, rel=0.1) and len(tried) == 11
+    tried.clear()
+    assert advice.nearby(20.0 * cloud.spacing) is None
+    assert tried[0] == pytest.approx(22.4 * cloud.spacing, rel=0.1) and len(tried) == 10

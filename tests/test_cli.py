@@ -254,6 +254,19 @@ def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(
         member_length.check_length(cloud, st.Settings(length=0.999 * least))
 
 
+def test_a_quick_look_at_many_points_takes_no_length_that_all_of_them_refuse() -> None:
+    rng = np.random.default_rng(4)
+    cloud = PointCloud.from_array(np.column_stack([rng.uniform(0, 30, (50_000, 2)), np.zeros(50_000)]))
+    low, high = member_length.exact_range(cloud)
+    for share in np.geomspace(0.3, 0.999, 8):
+        with pytest.raises(st.InputError, match="too small"):
+            member_length.check_length(cloud, st.Settings(length=share * low))
+        with pytest.raises(st.InputError, match="too large"):
+            member_length.check_length(cloud, st.Settings(length=high / share))
+    for length in np.geomspace(1.001 * low, 0.999 * high, 8):
+        member_length.check_length(cloud, st.Settings(length=length))
+
+
 def test_the_gap_is_that_of_a_known_pattern() -> None:
     x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
     triangular = np.stack([(x + 0.5 * (y % 2)).ravel(), (y * np.sqrt(0.75)).ravel(), 0 * x.ravel()], axis=1)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from scantruss.cli.commands import COMMANDS
+from scantruss.grid.certificate import KINDS_LEFT_OUT
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SOURCE = DOCS.parent / "src" / "scantruss"
@@ -58,3 +59,24 @@ def test_each_message_in_the_page_on_troubles_is_one_of_ours() -> None:
 def test_every_page_is_in_the_navigation() -> None:
     named = set(re.findall(r"([\w/-]+\.md)", (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")))
     assert {str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")} == named
+
+
+def test_every_line_of_a_result_is_explained():
+    """Each name of a figure, each kind of what is left out, each kind of fault and warning is on a page."""
+    page = (DOCS / "result.md").read_text(encoding="utf-8").lower()
+    figures = (SOURCE / "report" / "figures.py").read_text(encoding="utf-8")
+    names = re.findall(r'^        \("([a-z][a-z, /]+)", (?:"|certificate\.|_largest)', figures, re.MULTILINE)
+    assert len(names) > 15
+    names = [name.split(",")[0] for name in names]  # mean, std and smallest share a row
+    names += [words.split(",")[0] for words in KINDS_LEFT_OUT.values()]
+    names += [
+        "points to grid",
+        "triangles to scan",
+        "nodes to scan",
+        "look there",
+        "certificate:",
+        "left out",
+        "seconds",
+        "wrote",
+    ]
+    assert [name for name in names if name.lower() not in page] == []

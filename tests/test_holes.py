@@ -1,6 +1,7 @@
 """Holes that are closed: the surface goes on smoothly where it is known what it was, and what is made up is told apart."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ import scantruss as st
 from scantruss.boundary.holes import _lattice as lattice
 from scantruss.boundary.holes import _thin_plate as thin_plate
 from scantruss.boundary.holes import fill_holes
+from scantruss.grid.certificate import LeftOut
+from scantruss.report.figures import first_line, left_out_lines
 
 RADIUS = 15 / (2 * np.pi)  # of a hole with a rim of 15 members of length 1
 
@@ -147,3 +150,43 @@ def test_lengths_of_holes_that_are_none_are_refused() -> None:
     for wrong in several:
         with pytest.raises(st.InputError, match="fill_holes"):
             st.Settings(length=1.0, fill_holes=wrong)
+
+
+def holed(rng: np.random.Generator, holes: list[tuple[float, float, float]]) -> np.ndarray:
+    """A plate of 24 x 18 with round holes of x, y, radius."""
+    points = np.column_stack([rng.uniform(0, 24, 40_000), rng.uniform(0, 18, 40_000), np.zeros(40_000)])
+    points[:, 2] = 0.01 * points[:, 0] ** 2
+    away = [np.hypot(points[:, 0] - x, points[:, 1] - y) > radius for x, y, radius in holes]
+    return points[np.logical_and.reduce(away)]
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_small_holes_that_are_bridged_are_listed_with_place_and_size(method: str) -> None:
+    holes = [(6.0, 5.0, 0.52), (17.0, 12.0, 0.53)]
+    settings = st.Settings(length=1.0, method=method, effort="quick")
+    grid = st.grid_from_points(holed(np.random.default_rng(2), holes), settings)
+    assert grid.topology.boundary_loops == 1
+    closed = [part for part in known(grid.certificate).left_out if part.kind == "hole"]
+    assert len(closed) == len(holes) and [part.number for part in closed] == [1, 1]
+    for (x, y, radius), part in zip(sorted(holes), sorted(closed, key=lambda part: known(part.where)), strict=True):
+        middle = known(part.where)
+        assert np.hypot(middle[0] - x, middle[1] - y) < 0.2
+        assert part.size == pytest.approx(2 * radius, abs=0.35)
+    kept = st.grid_from_points(holed(np.random.default_rng(2), holes), settings.replace(length=0.7))
+    assert kept.topology.boundary_loops == 3 and not known(kept.certificate).left_out
+
+
+def test_of_many_small_holes_the_largest_are_listed_and_the_others_counted() -> None:
+    holes = [(x, y, 0.54) for x in (3.0, 9.0, 15.0, 21.0) for y in (4.0, 9.0, 14.0)]
+    grid = st.grid_from_points(holed(np.random.default_rng(3), holes), st.Settings(length=1.0, effort="quick"))
+    certificate = known(grid.certificate)
+    closed = [part for part in certificate.left_out if part.kind == "hole"]
+    assert sum(part.number for part in closed) + grid.topology.boundary_loops - 1 == len(holes)
+    assert len(closed) == 6 and (more := closed[-1].number) > 1
+    said = [line for line in left_out_lines(certificate) if "hole" in line]
+    assert said[0].startswith("hole closed, near (") and said[-1].startswith(f"{more} more holes closed, up to ")
+    stray = replace(certificate, left_out=(LeftOut("outliers", 500, 0.02), *closed), points=25_000)
+    (line,) = first_line(stray)  # a hole has no points that could be missing
+    assert (
+        line.startswith("2.0% of the scan, 500 of 25,000 points, is not in the grid: outliers") and "hole" not in line
+    )

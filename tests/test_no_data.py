@@ -21,7 +21,7 @@ def frame_of(points: np.ndarray, width: int = 2) -> np.ndarray:
     return ~inside
 
 
-@pytest.mark.parametrize("value", [0.0, -9999.0, 681.0, 1200.0])
+@pytest.mark.parametrize("value", [0.0, -9999.0, 681.0, 1200.0, 3.4e38, -1e30])
 def test_a_frame_is_left_out_and_told_with_its_value(value: float) -> None:
     """Even where the value is hardly below the ground."""
     points = terrain()

@@ -104,3 +104,18 @@ def test_a_folder_in_a_file_is_refused_at_the_start(
     unread: Path, capsys: pytest.CaptureFixture[str], words: str
 ) -> None:
     assert "b.xyz is a file; name a folder" in refused(capsys, words.split())
+
+
+def test_each_stage_of_a_run_is_told_to_who_looks_on(tmp_path, monkeypatch):
+    """Also writing pictures and solids, which take long."""
+    from scantruss.report.terminal import Bars
+
+    monkeypatch.chdir(tmp_path)
+    rng, told = np.random.default_rng(1), []
+    monkeypatch.setattr(Bars, "__call__", lambda _, stage, share: told.append(stage))
+    np.save("scan.npy", np.column_stack([rng.uniform(0, 12, (4000, 2)), np.zeros(4000)]))
+    assert main(["grid", "scan.npy", "a.json", "a.png", "--length", "1.5", "--effort", "quick"]) == 0
+    assert list(dict.fromkeys(told)) == ["read", "boundary", "front", "optimize", "write"]
+    told.clear()
+    assert main(["print", "a.json", "a.3mf", "--member-diameter", "0.1", "--node-diameter", "0.2"]) == 0
+    assert told == ["solid"]

@@ -86,6 +86,12 @@ def test_open_shells_are_seen_from_the_side_they_face() -> None:
         assert np.allclose(axes @ axes.T, np.eye(3)) and np.linalg.det(axes) == pytest.approx(1)
 
 
+def test_a_shell_whose_triangles_look_down_is_seen_from_where_others_are() -> None:
+    grid, up = dome(), np.array([0.0, 0.0, 1.0])
+    usual, turned = (choose_camera(grid.nodes, t, up) for t in (grid.triangles, grid.triangles[:, ::-1]))
+    assert turned.back[2] == pytest.approx(usual.back[2]) and turned.back[2] > 0.5 and turned.up[2] > 0.5
+
+
 def test_what_is_closed_and_long_stands_upright() -> None:
     ball = icosahedron()
     for axis in range(3):

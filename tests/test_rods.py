@@ -12,8 +12,10 @@ import scantruss as st
 from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
 from scantruss.kernels.surface.rods import spreads_around
+from scantruss.scan.member_length import length_range
 from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.rods import rod_points
+from scantruss.surface.supports import support_samples
 
 LENGTH = 1.4
 
@@ -59,6 +61,14 @@ def test_a_sheet_is_no_rod_however_its_edge_runs(width: float) -> None:
     rng = np.random.default_rng(0)
     x, y = rng.uniform(0, 12, 8000), rng.uniform(0, width * LENGTH, 8000)
     assert not rods_of(np.column_stack([x, y, 0.05 * x * x]), LENGTH).any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_thin_spots_of_a_sparse_sheet_are_no_rods(seed: int) -> None:
+    """However short the members."""
+    points = roof(np.random.default_rng(seed))
+    low, _ = length_range(st.PointCloud.from_array(points))
+    assert not any(rods_of(points, share * low).any() for share in (1.0, 1.1, 1.2, 1.4, 1.6))
 
 
 def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tuple[np.ndarray, np.ndarray]) -> None:
@@ -122,3 +132,40 @@ def test_spreads_around_are_those_of_plain_sums() -> None:
         if len(near):
             assert middle[s] == pytest.approx(near.mean(axis=0))
             assert moments[s] == pytest.approx(np.cov(near.T, bias=True), abs=1e-9) if len(near) > 1 else True
+
+
+def thick_hall(rng: np.random.Generator, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """A roof over a floor with four columns, and which points are of the columns."""
+    floor = np.column_stack([rng.uniform(-11, 11, 9000), rng.uniform(-8, 8, 9000), rng.normal(0.0, 0.004, 9000)])
+    columns = np.concatenate([pole(rng, x, y, 0.0, 4.2, radius, 1500) for x in (-6, 6) for y in (-4, 4)])
+    parts = [roof(rng), floor, columns]
+    return np.concatenate(parts), np.repeat([False, False, True], [len(part) for part in parts])
+
+
+@pytest.mark.parametrize("radius", [0.42, 0.6])
+def test_columns_as_thick_as_a_member_are_cut_off_with_the_floor(radius: float) -> None:
+    points, column = thick_hall(np.random.default_rng(3), radius)
+    grid = st.grid_from_points(points, st.Settings(length=LENGTH, effort="quick", unit="m"))
+    certificate = known(grid.certificate)
+    assert certificate.passed and grid.topology.components == 1 and not known(grid.settings).keep_rods
+    assert grid.scan_nodes[:, 2].min() > 1.5
+    left = {part.kind: part.points for part in certificate.left_out}
+    assert left["floor"] > 8500 and 0.75 * column.sum() < left["rods"] < 1.2 * column.sum()
+
+
+@pytest.mark.parametrize("shape", ["dome", "roof", "foot"])
+def test_a_shell_that_comes_down_to_the_floor_has_no_supports(shape: str) -> None:
+    """Nor has one without a floor."""
+    rng = np.random.default_rng(4)
+    floor = np.column_stack([rng.uniform(-11, 11, 9000), rng.uniform(-8, 8, 9000), np.zeros(9000)])
+    if shape == "dome":
+        height, turn = rng.uniform(0, 6, 15_000), rng.uniform(0, 2 * np.pi, 15_000)
+        away = np.sqrt(36 - height**2)
+        points = np.concatenate([np.column_stack([away * np.cos(turn), away * np.sin(turn), height]), floor])
+    elif shape == "roof":
+        points = roof(rng)
+    else:
+        x, y = rng.uniform(-9, 9, 20_000), rng.uniform(-5, 5, 20_000)
+        points = np.concatenate([np.column_stack([x, y, 5 * (1 - (x / 9) ** 2)]), floor])
+    cloud = st.PointCloud.from_array(points)
+    assert not support_samples(link_samples(cloud.points, 0.2 * LENGTH, LENGTH, cloud.spacing), LENGTH).any()

@@ -1,13 +1,18 @@
-"""Every figure of the certificate against brute force, on a hundred grids, most of them spoilt on purpose."""
+"""Every figure of the certificate against brute force, on two hundred grids, most of them spoilt on purpose."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from dataclasses import fields
+from itertools import combinations
+
+import networkx as nx  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from steps import steps_of
+from steps import Steps, steps_of
 from surfaces import distance_to_triangles
-from typed import known
+from typed import known, xyz
 
 import scantruss as st
 from scantruss.check.certify import certify
@@ -15,6 +20,7 @@ from scantruss.grid.certificate import Certificate, Spread
 from scantruss.surface.samples import SurfaceSamples
 
 LENGTH = 1.0
+SPOILT = ("none", "off", "near", "collapsed", "holed", "split", "flap", "crossed", "folded", "mirrored")
 
 
 def barrel(seed: int, outliers: int = 0) -> np.ndarray:
@@ -39,21 +45,51 @@ def spoil(grid: st.Grid, how: str, rng: np.random.Generator) -> st.Grid:
         nodes[a] += 0.97 * (nodes[b] - nodes[a])
     elif how == "holed":
         triangles = np.delete(triangles, rng.integers(len(triangles), size=8), axis=0)
-    elif how == "lifted":
-        nodes += [0.0, 0.0, rng.uniform(0.0, 1.5)]
+    elif how == "split":
+        middle = nodes[triangles].mean(axis=1)[:, 0]
+        triangles = triangles[abs(middle - np.median(middle)) > 0.5]
+    elif how == "flap":  # a third triangle at a member, or two fans at a node
+        a, b, _ = triangles[len(triangles) // 2]
+        c, d = np.argsort(((nodes - nodes[a]) ** 2).sum(axis=1))[-2:]
+        triangles = np.concatenate([triangles, [[a, b if rng.random() < 0.5 else d, c]]])
+    elif how == "crossed":
+        inside = np.setdiff1d(triangles, np.concatenate(grid.boundary_loops))
+        nodes[rng.choice(inside)] += [1.3, 0.2, 0.05]
+    elif how == "folded":
+        inside = np.setdiff1d(triangles, np.concatenate(grid.boundary_loops))
+        nodes[rng.choice(inside)] += [0.0, 0.0, 2.5]
+    elif how == "mirrored":  # one triangle looks the other way
+        triangles = triangles.copy()
+        triangles[5] = triangles[5][::-1]
     return grid.replace(nodes=nodes, triangles=triangles, deviation=None)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_every_figure_is_that_of_brute_force(seed: int) -> None:
-    settings = st.Settings(length=LENGTH)
+    settings = st.Settings(length=LENGTH, min_fold=30.0, max_length=1.9)
     cloud = st.PointCloud.from_array(barrel(seed, outliers=0 if seed % 2 else 30))
     right = st.grid_from_points(cloud.points, settings)
     steps = steps_of(cloud, settings)
     rng = np.random.default_rng(seed)
-    for how in ("none", "off", "near", "collapsed", "holed"):
+    for how in SPOILT:
         grid = spoil(right, how, rng)
-        compare(grid, certify(grid, steps.samples, steps.boundary, settings), cloud, steps.samples, settings)
+        place = xyz(right.nodes[right.boundary_loops[0][0]] + right.origin + [0.0, 0.0, 0.01 * seed])
+        wanted = settings.replace(fixed=[place] if seed % 3 == 0 else [])
+        found = certify(grid, steps.samples, steps.boundary, wanted)
+        compare(grid, found, cloud, steps.samples, settings)
+        compare_topology(grid, found, steps)
+        compare_members(grid, found)
+        compare_rest(grid, found, wanted)
+
+
+def test_no_figure_of_the_certificate_is_left_without_a_second_opinion() -> None:
+    """A figure that is new must be compared above before it is added here."""
+    assert {spec.name for spec in fields(Certificate)} == {
+        "unit", "reach", "manifold", "orientable", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles",
+        "faults", "warnings", "widened", "points", "left_out", "crossings", "scan_within_reach", "missing", "grid_within_reach",
+        "scan_distance", "triangle_distance", "node_distance", "noise", "shortest_member", "longest_member", "smallest_angle",
+        "largest_angle", "sharpest_fold", "fixed_error", "irregular", "irregular_forced",
+    }  # fmt: skip
 
 
 def compare(
@@ -68,19 +104,21 @@ def compare(
         ]
     )
     assert found.points == len(cloud.points)
-    check_spread(known(found.scan_distance), away)
+    check_spread(known(found.scan_distance), away, cloud.points + cloud.origin)
+    beyond = (samples.judged == 0) & (away > 0.5 * LENGTH)
+    assert found.missing == pytest.approx(beyond.mean(), abs=1e-12)
     assert found.scan_within_reach == (away <= 0.5 * LENGTH).mean()
     measured = cloud.points[samples.judged == 0]
     tree = cKDTree(measured)
     middles = np.maximum(tree.query(corners.mean(axis=1))[0], tree.query(corners)[0].max(axis=1))
-    check_spread(known(found.triangle_distance), middles)
+    check_spread(known(found.triangle_distance), middles, corners.mean(axis=1) + grid.origin)
     assert found.grid_within_reach == (middles <= 0.5 * LENGTH).mean()
     near, which = tree.query(grid.nodes, k=12)
     around = measured[which]
     _, sizes, axes = np.linalg.svd(around - around.mean(axis=1, keepdims=True))
     off = np.minimum(np.abs(np.einsum("vi,vi->v", grid.nodes - around.mean(axis=1), axes[:, 2])), near[:, 0])
     noise = sizes[:, 2] / np.sqrt(12)
-    check_spread(known(found.node_distance), off)
+    check_spread(known(found.node_distance), off, grid.nodes + grid.origin)
     assert found.noise == pytest.approx(np.median(noise), abs=1e-7)
     lengths = np.linalg.norm(grid.nodes[grid.edges[:, 0]] - grid.nodes[grid.edges[:, 1]], axis=1)
     assert (known(found.shortest_member).value, known(found.longest_member).value) == pytest.approx(
@@ -106,9 +144,143 @@ def compare(
     assert left_out["far"] == ((samples.judged == 0) & (away > LENGTH)).sum()
 
 
-def check_spread(spread: Spread, values: np.ndarray) -> None:
-    """Compare a median, two quantiles and the largest."""
+def compare_topology(grid: st.Grid, found: Certificate, steps: Steps) -> None:
+    """Compare pieces, loops, Euler number, sides and irregular nodes with what plain graphs of nodes and triangles say."""
+    at: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)  # triangles at a member, and whether they run along it
+    for number, triangle in enumerate(grid.triangles.tolist()):
+        for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True):
+            at[min(a, b), max(a, b)].append((number, a < b))
+    net, rim, sides = nx.Graph(list(at)), nx.Graph(), nx.Graph()
+    beside: dict[int, nx.Graph] = defaultdict(nx.Graph)
+    for (a, b), uses in at.items():
+        if len(uses) == 1:
+            rim.add_edge(a, b)
+        for (one, _), (other, _) in combinations(uses, 2):
+            beside[a].add_edge(one, other)
+            beside[b].add_edge(one, other)
+        for (one, along), (other, as_well) in combinations(
+            uses, 2
+        ):  # each triangle as it stands (0) and turned over (1)
+            turn = int(along == as_well)
+            sides.add_edge((one, 0), (other, turn))
+            sides.add_edge((one, 1), (other, 1 - turn))
+    for number, triangle in enumerate(grid.triangles.tolist()):
+        for v in triangle:
+            beside[v].add_node(number)
+        sides.add_nodes_from([(number, 0), (number, 1)])
+    fans = [nx.number_connected_components(beside[v]) for v in net]
+    manifold = max(map(len, at.values())) <= 2 and max(fans) == 1
+    orientable = not any(nx.has_path(sides, (number, 0), (number, 1)) for number in range(len(grid.triangles)))
+    pieces = nx.number_connected_components(net)
+    loops = nx.number_connected_components(rim) + sum(max(d // 2 - 1, 0) for _, d in rim.degree)
+    euler = net.number_of_nodes() - len(at) + len(grid.triangles)
+    assert (found.manifold, found.orientable, found.pieces, found.boundary_loops, found.euler) == (
+        manifold, orientable, pieces, loops, euler,
+    )  # fmt: skip
+    assert found.handles == ((2 * pieces - loops - euler) // 2 if manifold and orientable else None)
+    assert found.scan_pieces == len(steps.samples.pieces) and found.scan_loops == len(steps.boundary.loops)
+    charge = {v: 6 - net.degree[v] for v in net}
+    for v in {v for member, uses in at.items() if len(uses) != 2 for v in member}:
+        angle = sum(
+            grid.angles[number, list(triangle).index(v)]
+            for number, triangle in enumerate(grid.triangles.tolist())
+            if v in triangle
+        )
+        charge[v] = max(int(angle / 60.0 + 0.5), 1) + 1 - net.degree[v]
+    assert found.irregular == sum(map(abs, charge.values()))
+    assert found.irregular_forced == sum(abs(sum(charge[v] for v in piece)) for piece in nx.connected_components(net))
+
+
+def compare_members(grid: st.Grid, found: Certificate) -> None:
+    """Compare the worst members, angles and fold and their places with plain sums over all of them."""
+    corners = grid.nodes[grid.triangles]
+    members = {(min(pair), max(pair)) for t in grid.triangles.tolist() for pair in combinations(t, 2)}
+    lengths = {(a, b): float(np.linalg.norm(grid.nodes[a] - grid.nodes[b])) for a, b in members}
+    for worst, (a, b) in (
+        (known(found.shortest_member), min(lengths, key=lengths.__getitem__)),
+        (known(found.longest_member), max(lengths, key=lengths.__getitem__)),
+    ):
+        assert worst.value == pytest.approx(lengths[a, b])
+        if list(lengths.values()).count(lengths[a, b]) == 1:
+            assert worst.where == pytest.approx(0.5 * (grid.nodes[a] + grid.nodes[b]) + grid.origin)
+    angles = []
+    for triangle in corners:
+        for k in range(3):
+            u, w = triangle[(k + 1) % 3] - triangle[k], triangle[(k + 2) % 3] - triangle[k]
+            angles.append(np.degrees(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w)))
+    assert known(found.smallest_angle).value == pytest.approx(min(angles), abs=1e-5)
+    largest = known(found.largest_angle)
+    assert largest.value == pytest.approx(max(angles), abs=1e-5)
+    assert largest.where == pytest.approx(corners.reshape(-1, 3)[int(np.argmax(angles))] + grid.origin)
+    ways = [pair for t in grid.triangles.tolist() for pair in zip(t, t[1:] + t[:1], strict=True)]
+    if not found.manifold or len(set(ways)) < len(ways):  # neighbours run the same way: one looks to the other side
+        assert not found.passed
+        return
+    folds = []
+    for one, other in combinations(grid.triangles.tolist(), 2):
+        shared = [v for v in one if v in other]
+        if len(shared) == 2:
+            c, d = next(v for v in one if v not in shared), next(v for v in other if v not in shared)
+            a, b = (grid.nodes[v] for v in shared)
+            along = (b - a) / np.linalg.norm(b - a)
+            arms = [grid.nodes[v] - a - ((grid.nodes[v] - a) @ along) * along for v in (c, d)]
+            folds.append(np.degrees(np.arctan2(np.linalg.norm(np.cross(*arms)), arms[0] @ arms[1])))
+    assert known(found.sharpest_fold).value == pytest.approx(min(folds), abs=1e-4)
+    assert ("folded" in {fault.kind for fault in found.faults}) == (min(folds) < 30.0)
+
+
+def compare_rest(grid: st.Grid, found: Certificate, settings: st.Settings) -> None:
+    """Compare cuts, fixed positions, and what the settings widened."""
+    low, high = (pick(grid.nodes[grid.triangles], axis=1) for pick in (np.min, np.max))
+    touch = (low[:, None] <= high).all(axis=2) & (low <= high[:, None]).all(axis=2)  # boxes around two triangles
+    near = [(grid.triangles[i].tolist(), grid.triangles[j].tolist()) for i, j in np.argwhere(np.triu(touch, 1))]
+    cuts = [pair for pair in near if cut_each_other(grid.nodes, *pair)]
+    assert found.crossings == min(len(cuts), 100)
+    assert ("crossing" in {fault.kind for fault in found.faults}) == bool(cuts)
+    if settings.fixed:
+        among = grid.nodes[grid.fixed] if grid.fixed.any() else grid.nodes
+        assert known(found.fixed_error).value == pytest.approx(
+            min(np.linalg.norm(among + grid.origin - np.array(settings.fixed[0]), axis=1))
+        )
+    else:
+        assert found.fixed_error is None
+    assert found.widened == ("max length 1.9 instead of 1.8",)
+    assert (found.unit, found.reach) == ("", 0.5 * LENGTH)
+    assert found.passed == (not found.faults)
+    poor = {
+        "angle": 15.0 <= known(found.smallest_angle).value < 25.0,
+        "short": 0.5 <= known(found.shortest_member).value < 0.6,
+        "long": 1.6 < known(found.longest_member).value <= 1.9,
+    }
+    kinds = {warning.kind for warning in found.warnings}
+    assert {kind for kind in poor if kind in kinds} == {kind for kind, is_so in poor.items() if is_so}
+
+
+def cut_each_other(nodes: np.ndarray, one: list[int], other: list[int]) -> bool:
+    """Whether a side of one triangle goes through another, apart from the nodes that they share; none lie in one plane here."""
+    shared = set(one) & set(other)
+    if len(shared) > 1:
+        return False
+    for triangle, against in ((one, other), (other, one)):
+        corner = nodes[against]
+        normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+        for a, b in combinations(triangle, 2):
+            if shared & {a, b}:
+                continue
+            above, below = (nodes[a] - corner[0]) @ normal, (nodes[b] - corner[0]) @ normal
+            if above * below < 0:
+                place = nodes[a] + above / (above - below) * (nodes[b] - nodes[a])
+                turns = [np.cross(corner[k] - corner[k - 1], place - corner[k - 1]) @ normal for k in range(3)]
+                if min(turns) > 0:
+                    return True
+    return False
+
+
+def check_spread(spread: Spread, values: np.ndarray, places: np.ndarray) -> None:
+    """Compare a median, two quantiles, and the largest with its place."""
     assert (spread.p50, spread.p95, spread.p99) == pytest.approx(
         tuple(np.quantile(values, [0.5, 0.95, 0.99])), abs=1e-7
     )
     assert spread.largest.value == pytest.approx(values.max(), abs=1e-7)
+    if np.sort(values)[-2] < values.max() - 1e-6:
+        assert spread.largest.where == pytest.approx(places[values.argmax()])

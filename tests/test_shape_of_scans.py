@@ -11,6 +11,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.scan.member_length import length_range
 from scantruss.surface.floor import find_floor
 
 
@@ -36,12 +37,22 @@ def test_points_along_lines_are_refused(make: Callable[[np.random.Generator], np
 
 
 @pytest.mark.parametrize("shape", ["box", "ball"])
-def test_points_that_fill_a_volume_are_refused(shape: str) -> None:
+@pytest.mark.parametrize("length", [None, 0.6, 1.0, 1.5, 2.2])
+def test_points_that_fill_a_volume_are_refused_at_every_length(shape: str, length: float | None) -> None:
     points = np.random.default_rng(2).uniform(-5, 5, (30_000, 3))
     if shape == "ball":
         points = points[(points**2).sum(axis=1) < 25]
+    cloud = st.PointCloud.from_array(points)
+    length = length_range(cloud)[0] if length is None else length  # None: the least
     with pytest.raises(st.InputError, match="the points fill a volume and lie on no surface"):
-        st.grid_from_points(points, st.Settings(length=1.5))
+        st.sample_surface(cloud, st.Settings(length=length))
+
+
+@pytest.mark.parametrize("length", [1.0, 2.0, 4.0])
+def test_a_surface_among_strays_is_no_volume_however_long_the_members(length: float) -> None:
+    rng = np.random.default_rng(9)
+    points = np.concatenate([plate(rng, 40_000), rng.uniform(-10, 10, (4000, 3))])
+    st.sample_surface(st.PointCloud.from_array(points), st.Settings(length=length))
 
 
 def test_a_rough_surface_is_no_volume_and_a_narrow_strip_no_line() -> None:

@@ -63,6 +63,7 @@ class Boundary:
     """All boundary loops of a cloud."""
 
     loops: tuple[Loop, ...]
+    bridged: tuple[np.ndarray, ...] = ()  #: (M, 3) closed curves around holes so small that the front runs over them
 
     @property
     def external(self) -> tuple[Loop, ...]:
@@ -151,25 +152,29 @@ def find_boundary(
 
 def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSamples, Boundary]:
     """Return samples with small holes closed, and the boundary that is left."""
-    loops = _external_first(_find_loops(samples, settings))
+    found, bridged = _find_loops(samples, settings)
+    loops = _external_first(found)
     holes = [loop for loop in loops if loop.length < settings.closed_boundary_length and _is_hole(loop, samples)]
     if holes:
         made_up = fill_holes(samples, [loop.points for loop in holes])
         samples = samples_with(samples, made_up, settings)
-        loops = _external_first([loop for loop in _find_loops(samples, settings) if not _over_filling(loop, samples)])
-    return samples, Boundary(loops)
+        found, bridged = _find_loops(samples, settings)
+        loops = _external_first([loop for loop in found if not _over_filling(loop.points, samples)])
+        bridged = [curve for curve in bridged if not _over_filling(curve, samples)]
+    return samples, Boundary(loops, tuple(bridged))
 
 
-def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
-    """All loops except those of small gaps; none is marked external yet."""
+def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop], list[np.ndarray]]:
+    """All loops except those of small gaps, none marked external yet; and the curves (M, 3) around these gaps."""
     length = settings.length
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
     found: list[tuple[np.ndarray, int, SamplingBias]] = []
     surface = samples.surface._replace(normals=broad_normals(samples.surface))
-    rolled = boundary_loops(surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length)
-    loops = [(loop, piece) for loop, piece in rolled if piece in samples.pieces]
+    rolled, short = boundary_loops(surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length)
+    loops = [loop for loop in rolled if loop.piece in samples.pieces]
+    bridged = [surface.mean[loop.samples] for loop in short if loop.piece in samples.pieces]
     disc = max(0.5 * radius, 2.5 * samples.spacing)
-    slid = boundary_points(samples, surface, [loop for loop, _ in loops], disc, CURVE_STEP * length)
+    slid = boundary_points(samples, surface, [loop.samples for loop in loops], disc, CURVE_STEP * length)
     for points, (loop, piece) in zip(slid, loops, strict=True):
         if len(points) < 3:
             continue
@@ -182,7 +187,9 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
             paper = settings.method == "paper"
             bias = NO_BIAS if paper else sampling_bias_of(surface, points, samples.density, disc)
             found.append((curve, piece, bias))
-    return [kept for each in found if (kept := smooth_loop(*each, settings, surface)) is not None]
+    smoothed = [smooth_loop(*each, settings, surface) for each in found]
+    bridged += [curve for (curve, _, _), loop in zip(found, smoothed, strict=True) if loop is None]
+    return [loop for loop in smoothed if loop is not None], bridged
 
 
 def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
@@ -191,14 +198,14 @@ def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
 
-def _over_filling(loop: Loop, samples: SurfaceSamples) -> bool:
-    """Whether a loop runs mostly over generated samples."""
+def _over_filling(curve: np.ndarray, samples: SurfaceSamples) -> bool:
+    """Whether a curve (M, 3) runs mostly over generated samples."""
     surface, over = samples.surface, 0
-    sample = nearest_sample(surface, *loop.points[0].tolist())
-    for place in loop.points:
+    sample = nearest_sample(surface, *curve[0].tolist())
+    for place in curve:
         sample = walk(surface, sample, tuple(place))
         over += sample >= samples.measured
-    return over > 0.5 * len(loop.points)
+    return over > 0.5 * len(curve)
 
 
 def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..kernels.boundary import loops as kernels
@@ -16,11 +18,17 @@ TRIES = 20  # attempts to roll the disc away from one place
 TRAP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 
 
-def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: float) -> list[tuple[np.ndarray, int]]:
-    """Return the samples of each loop (H,) in order, as the rolled disc touches them, and the piece that they bound.
+class Rolled(NamedTuple):
+    """A loop of samples along which a disc rolled."""
 
-    Loops shorter than `least` are left out.
-    """
+    samples: np.ndarray  #: (H,) in order
+    piece: int  #: that they bound
+
+
+def boundary_loops(
+    surface: Surface, piece: np.ndarray, radius: float, least: float
+) -> tuple[list[Rolled], list[Rolled]]:
+    """Return the loops of samples that the rolled disc touches: those that are kept, and those no longer than `least`."""
     free = np.empty(len(surface.mean))
     radii = disc_radii(surface, radius)
 
@@ -30,19 +38,22 @@ def boundary_loops(surface: Surface, piece: np.ndarray, radius: float, least: fl
 
     in_parts(len(free), SAMPLES_PER_THREAD, look)
     rolling = _RollingDisc(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
-    loops = []
+    loops, short, closed = list[Rolled](), list[Rolled](), np.zeros(len(free), np.bool_)
     for sample in np.flatnonzero(free < 9.0).tolist():
         if rolling.following[sample] >= 0:
             continue
         loop = rolling.loop_at(sample, free[sample], radius)
-        if len(loop) < 3 or length_around(surface.mean[loop]) <= least:
-            continue  # a small gap is closed over
+        if len(loop) < 3 or length_around(surface.mean[loop]) <= least:  # a small gap is closed over
+            if len(loop) >= 3 and not closed[loop].any():
+                short.append(Rolled(loop, int(piece[loop[0]])))
+            closed[loop] = True
+            continue
         loop = np.roll(loop, -int(loop.argmin()))  # the same wherever the disc began
         fresh = rolling.following[loop] < 0
         rolling.following[loop], rolling.preceding[loop] = np.roll(loop, -1), np.roll(loop, 1)
         if fresh.mean() > 0.5:
-            loops.append((loop, int(piece[loop[0]])))
-    return loops
+            loops.append(Rolled(loop, int(piece[loop[0]])))
+    return loops, short
 
 
 class _RollingDisc:

@@ -70,7 +70,7 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
         lambda: find_crossings(grid.nodes, grid.triangles),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
     )
-    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, found, length))
+    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, found, length))
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
@@ -119,7 +119,7 @@ def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     )
 
 
-def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> dict[str, Any]:
+def _apart(grid: Grid, samples: SurfaceSamples, boundary: Boundary, found: Distances, length: float) -> dict[str, Any]:
     """Return how far the scan lies from the grid and the grid from the scan, and what is left out."""
     at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     at_triangles = at_nodes[grid.triangles].mean(axis=1)
@@ -127,7 +127,7 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     beyond = (samples.judged == KEPT) & (found.scan > COVER_REACH * members)
-    left_out = parts_left_out(samples, found, members, COVER_REACH * members)
+    left_out = parts_left_out(samples, boundary, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
         "left_out": left_out,

@@ -13,6 +13,7 @@ from ..kernels.scan.nearby import nearest_places
 from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
 
 if TYPE_CHECKING:
+    from ..boundary.find import Boundary
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
 
@@ -21,7 +22,7 @@ MOST_PLACES = 5  # places of a kind that are listed one by one; the others are o
 
 
 def parts_left_out(
-    samples: SurfaceSamples, found: Distances, members: np.ndarray, reach: np.ndarray
+    samples: SurfaceSamples, boundary: Boundary, found: Distances, members: np.ndarray, reach: np.ndarray
 ) -> tuple[LeftOut, ...]:
     """Return what a grid leaves out, the most points first; what the settings asked for and holes that are closed come last.
 
@@ -33,7 +34,7 @@ def parts_left_out(
     return (
         *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
         *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
-        *_closed_holes(samples),
+        *_closed_holes(samples, boundary),
     )
 
 
@@ -113,13 +114,21 @@ def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:
     return np.where(owner >= 0, label[position[owner]] if len(chosen) else -1, -1)
 
 
-def _closed_holes(samples: SurfaceSamples) -> list[LeftOut]:
-    """Return the holes that were closed: where samples of made-up points hang together."""
+def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
+    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them."""
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
-    holes = []
-    for each in np.unique(group):
-        mean = samples.surface.mean[made_up[group == each]]
-        where = place_of(mean.mean(axis=0) + samples.origin)
-        holes.append(LeftOut("hole", 0, 0.0, where, float(np.ptp(mean, axis=0).max()), asked=True))
-    return holes
+    filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
+    holes = [_hole(places, samples, asked=True) for places in filled]
+    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged]
+    holes.sort(key=lambda hole: -(hole.size or 0.0))
+    if len(more := holes[MOST_PLACES:]) < 2:
+        return holes
+    rest = replace(more[0], where=None, number=len(more), asked=all(hole.asked for hole in more))
+    return [*holes[:MOST_PLACES], rest]
+
+
+def _hole(places: np.ndarray, samples: SurfaceSamples, *, asked: bool) -> LeftOut:
+    """Return a hole of places (K, 3) in it or around it as an entry."""
+    where, size = place_of(places.mean(axis=0) + samples.origin), float(np.ptp(places, axis=0).max())
+    return LeftOut("hole", 0, 0.0, where, size, asked=asked)

@@ -104,8 +104,9 @@ def grid(values: Namespace) -> None:
     from ..export.formats import write
 
     written: list[Path] = []
-    with SaveTogether("" if values.force else "result") as save:
-        for out in outs:
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        for number, out in enumerate(outs):
+            bars("write", number / len(outs))
             written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud, style=style)]
         save.json(settings_file, (result.settings or settings).to_dict())
         if report is not None:
@@ -152,6 +153,7 @@ def make_grid(
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
         except FrontError as error:
+            note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)
             note_nearby(bars, cloud, settings)
             raise error

@@ -30,7 +30,7 @@ def print_parser() -> Parser:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
-    from ..report.terminal import print_lines
+    from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether, check_place
 
     outs = [check_place(out, (".3mf", ".stl")) for out in outs_of(values)]
@@ -43,8 +43,9 @@ def print_solid(values: Namespace) -> None:
     from ..export.solid import print_model
 
     result = read_grid(values.grid)
-    with SaveTogether("" if values.force else "result") as save:
-        for out in outs:
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        for number, out in enumerate(outs):
+            bars("solid", number / len(outs))
             solid = print_model(
                 result,
                 save.beside(out),

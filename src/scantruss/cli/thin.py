@@ -54,7 +54,7 @@ def thin(values: Namespace) -> None:
     from ..runtime.files import SaveTogether
     from ..scan.formats.writing import write_points
     from ..scan.stream.opened import open_scan
-    from ..scan.stream.thin_scan import thin_open_scan
+    from ..scan.stream.thin_scan import check_enough, thin_open_scan
     from ..scan.stream.thinning import check_spacing
     from .options import selection_of
 
@@ -73,6 +73,7 @@ def thin(values: Namespace) -> None:
             result = thin_open_scan(
                 scan, values.spacing, keep=values.keep, boundary=values.boundary, workers=workers, progress=bars
             )
+        check_enough(result, values.spacing, "--spacing")
         report_cloud(bars, result)
         bars("write", 0.0)
         with SaveTogether("" if values.force else "cloud") as save:

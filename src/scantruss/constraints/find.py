@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,7 +56,7 @@ def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Sett
     boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
     lines = find_lines(samples, boundary, ridges, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
-    return Boundary(ended), Constraints(positions, lines)
+    return replace(boundary, loops=ended), Constraints(positions, lines)
 
 
 def ridges_that_are_kept(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:

@@ -219,7 +219,7 @@ SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: t
 EVEN = (0.5, 3.5)
 BLUNT, ACUTE = 50.0, 70.0  # [degree]
 BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
-SURE = 20.0  # median gain, at least (F statistic)
+SURE = 25.0  # median gain, at least (F statistic)
 
 
 def parts_of(folds: np.ndarray) -> list[np.ndarray]:

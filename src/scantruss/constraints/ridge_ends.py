@@ -148,12 +148,11 @@ def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray
                     pairs.append((cost, k, ends.index(two, k + 1)))
     group: dict[int, list[int]] = {}
     for _, i, j in sorted(pairs):
-        one, two = group.get(i), group.get(j)
-        together = sorted({*(one or [i]), *(two or [j])})
-        if one is not two or one is None:
-            if _meet(together, ends, length):
-                for member in together:
-                    group[member] = together
+        known, other = group.get(i), group.get(j)
+        together = sorted({*(known or [i]), *(other or [j])})
+        if (known is None or known is not other) and _meet(together, ends, length):
+            for member in together:
+                group[member] = together
     return {(ends[i].line, ends[i].at): meeting([ends[k] for k in together]) for i, together in group.items()}
 
 

@@ -51,10 +51,13 @@ class LeftOut:
     size: float | None = None  #: longest side of the box around it [scan unit]
     farthest: float | None = None  #: largest distance from the grid [scan unit]
     asked: bool = False  #: a setting asked for it; else it was ScanTruss's own judgement
+    number: int = 1  #: holes, where it is several
 
     @property
     def words(self) -> str:
         """Say what it is."""
+        if self.number > 1:
+            return f"{self.number:,} more holes closed"
         return KINDS_LEFT_OUT.get(self.kind, self.kind)
 
 

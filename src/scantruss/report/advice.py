@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..check.certify import SURE_PER_SPACING
 from ..errors import FrontError
 from ..pipeline import grid_from_cloud
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
@@ -113,9 +114,11 @@ class Advice:
         return usual if first is None or first.passed else some
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not; None if none of those tried does."""
-        for share in NEARBY:
-            trial = self.try_length(_two_digits(share * length))
+        """Return the nearest length that passes in place of one that does not; None if none of those tried did."""
+        sure = round_length(SURE_PER_SPACING * self._cloud.spacing, "up")
+        first = (sure,) if length < sure else ()  # holes in the sampling spoil the others first
+        for each in (*first, *(_two_digits(share * length) for share in NEARBY)):
+            trial = self.try_length(each)
             if trial is not None and trial.passed:
                 return trial.length
         return None

@@ -113,7 +113,7 @@ def first_line(certificate: Certificate) -> list[str]:
     """Return what a user must know first: that ScanTruss, by its own judgement, left out much of the scan; else nothing."""
     if certificate.judged_out <= WARN_LEFT_OUT:
         return []
-    own = [part for part in certificate.left_out if not part.asked and part.kind != "duplicates"]
+    own = [part for part in certificate.left_out if part.points and not part.asked and part.kind != "duplicates"]
     kinds = dict.fromkeys(part.words for part in own)
     return [
         f"{certificate.judged_out:.1%} of the scan, {sum(part.points for part in own):,} of {certificate.points:,} points,"
@@ -144,6 +144,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
         if part.kind == "far" and part.where is not None:  # a warning reports it
             continue
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {part.size:.3g}{unit} across"
+        place = f", up to {part.size:.3g}{unit} across" if part.number > 1 else place
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
         lines.append(f"left out: {count}{part.words}{place}" if count else f"{part.words}{place}")
     return lines
@@ -230,7 +231,7 @@ def result_of(trial: Trial | None) -> str:
     if trial.grid is None or trial.grid.certificate is None:
         return "no grid passes"
     found = trial.grid.certificate
-    holes = sum(part.kind == "hole" for part in found.left_out)
+    holes = sum(part.number for part in found.left_out if part.kind == "hole")
     said = ["passes with warnings" if found.warnings else "passes"]
     said += [f"{100 * found.judged_out:.2g} % of the scan left out"] * (found.judged_out > 0)
     said += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)

@@ -51,7 +51,7 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
     As (0, 0, 0) for no echo in a scan with national coordinates. Sparse far ends count.
     """
     some = points[:: max(len(points) // BULK, 1)]
-    lower, upper = bulk_of(some)
+    lower, upper = bulk_of(some[:: max(len(some) // POINTS_OF_EXTENT, 1)])
     away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
     near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
     return np.stack([near.min(axis=0), near.max(axis=0)])
@@ -117,7 +117,9 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
         if not width > 0 or max(np.max(upper - middle), np.max(middle - lower)) <= FARTHEST_FROM_MIDDLE * width:
             return None
         invalid: np.ndarray = (np.abs(points - middle) > FARTHEST_FROM_MIDDLE * width).any(axis=1)
-    if (count := int(invalid.sum())) > MOST_INVALID_SHARE * len(points):
+    count = int(invalid.sum())
+    most_no_data = NO_DATA[1] * len(points) if have_one_height(points[invalid]) else 0.0
+    if count > max(MOST_INVALID_SHARE * len(points), most_no_data):
         most = np.abs(points[invalid]).max()
         raise InputError(
             f"{said}{count:,} of {len(points):,} points lie a million times farther away than half of the scan is wide,"
@@ -126,8 +128,15 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     return invalid
 
 
+def have_one_height(points: np.ndarray) -> bool:
+    """Whether invalid points (K, 3) are some that have the same height, as where a raster has no data."""
+    return len(points) >= FEWEST_NO_DATA and bool(points[:, 2].min() == points[:, 2].max())
+
+
 def invalid_values_note(points: np.ndarray) -> str:
     """Return a note on points that are left out for this."""
+    if have_one_height(points):
+        return no_data_note(len(points), float(points[0, 2]))
     most = np.abs(points).max()
     return (
         f"{len(points):,} points with coordinates up to {most:.3g}, a million times farther away than the scan is wide,"

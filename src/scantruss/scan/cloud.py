@@ -10,7 +10,16 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.parallel import in_parts, processors
-from .checks import CAUSE, check_sensible, find_invalid, find_no_data, invalid_values_note, no_data_note
+from .checks import (
+    CAUSE,
+    check_sensible,
+    find_invalid,
+    find_no_data,
+    have_one_height,
+    invalid_values_note,
+    no_data_note,
+    usual_extent,
+)
 from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
@@ -62,6 +71,12 @@ class PointCloud:
         return float((self.bounds[1] - self.bounds[0]).max())
 
     @cached_property
+    def usual_extent(self) -> float:
+        """The same of the bulk of the points, where a few lie so far away that they are none of the scan; measured once [scan unit]."""
+        usual = float(np.ptp(usual_extent(self.points), axis=0).max())
+        return usual if 0.0 < usual < 0.5 * self.extent else self.extent
+
+    @cached_property
     def spacing(self) -> float:
         """Typical distance between neighbouring points [scan unit]; measured once."""
         return measure_spacing(self.points, self.bounds)
@@ -102,7 +117,7 @@ class PointCloud:
         dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
-            left_out = ((INVALID, int(invalid.sum())),)
+            left_out = ((NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import numpy as np
-
 from ..errors import InputError
 from ..settings import Settings, shortest_and_longest
-from .cloud import PointCloud
+from .cloud import PointCloud, measure_gap
 
 SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be told from a gap
 GAPS = 1.75  #: ... and, for random points, this many distances to the sixth neighbour
 USUAL_GAPS = 3.5  #: the same for a suggested length, which suits evenly meshed scans
 USUAL = 25.0  #: members along the longest side of a scan, for a suggested length
 LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape
+SOME_POINTS = 8_000  #: points of a first look at how far apart they lie
+SURELY_FEWER = 4  #: times as many in a scan: then they lie closer than in that look
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:
@@ -26,13 +26,15 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     InputError
         The length is too small for the distance between the points, or too large for the extent of the scan.
     """
-    low, high = exact_range(cloud)
     shortest, longest, what = settings.length, settings.length, "length"
     if settings.length_field:
         field = shortest_and_longest(settings.length_field)
         longest, what = settings.length * field[1] / field[0], "the {} length of the length field,"
+    if _surely_carries(cloud, shortest, longest):
+        return
+    low, high = exact_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
-    extent = f"a scan whose longest side is {_usual_extent(cloud):.4g}{unit}"
+    extent = f"a scan whose longest side is {cloud.usual_extent:.4g}{unit}"
     apart = f"points that are {cloud.spacing:.3g}{unit} apart"
     if low > high:
         raise InputError(
@@ -52,7 +54,7 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
 
 def exact_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest possible member length of a scan [scan unit]."""
-    return max(SPACINGS * cloud.spacing, GAPS * cloud.gap), _usual_extent(cloud) / LARGEST_PER_EXTENT
+    return max(SPACINGS * cloud.spacing, GAPS * cloud.gap), cloud.usual_extent / LARGEST_PER_EXTENT
 
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
@@ -61,18 +63,18 @@ def length_range(cloud: PointCloud) -> tuple[float, float]:
     return round_length(low, "up"), round_length(high, "down")
 
 
-def _usual_extent(cloud: PointCloud) -> float:
-    """Return the longest side of a scan, or of its bulk if a few points lie too far away to belong to it [scan unit]."""
-    from .checks import usual_extent
-
-    usual = float(np.ptp(usual_extent(cloud.points), axis=0).max())
-    return usual if 0.0 < usual < 0.5 * cloud.extent else cloud.extent
+def _surely_carries(cloud: PointCloud, shortest: float, longest: float) -> bool:
+    """Whether members of such lengths are possible by a quick look: if some of the points lie near enough for them, all do."""
+    every = len(cloud.points) // SOME_POINTS
+    if every < SURELY_FEWER or longest * LARGEST_PER_EXTENT > cloud.usual_extent or shortest < SPACINGS * cloud.spacing:
+        return False
+    return GAPS * measure_gap(cloud.points[::every]) <= shortest
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
     low, high = length_range(cloud)
-    wished = max(_usual_extent(cloud) / USUAL, USUAL_GAPS * cloud.gap)
+    wished = max(cloud.usual_extent / USUAL, USUAL_GAPS * cloud.gap)
     return max(round_length(min(wished, high), "nearest"), low)
 
 

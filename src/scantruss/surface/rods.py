@@ -16,9 +16,11 @@ END_REACH = 1.3  # distance from a rod up to which samples may be its ends [memb
 END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is an end of it [member lengths]
 MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
 END_ROUNDS = 3  # most rounds in which ends of rods are looked for
+ENOUGH = 24  # samples in a usual neighbourhood from which a rod can be told from a sheet
+APART = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
-def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
+def rod_points(found: Linked, points: int, length: float, supports: np.ndarray | None = None) -> np.ndarray:
     """Return which points (N,) bool belong to rods: to samples along a line, or to the ends of a rod where it meets a sheet.
 
     Parameters
@@ -29,9 +31,14 @@ def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
         How many points there are.
     length : float
         Desired member length [scan unit].
+    supports : (S,) bool, optional
+        Samples that are known for supports, though they are no thinner than a member.
     """
-    rod = _thin(_spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)[0])
-    if rod.any():  # then also the joints of scaffold, where rods leave to all sides
+    known = np.zeros(len(found.mean), np.bool_) if supports is None else supports
+    spreads, _, count = _spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)
+    tells = np.median(count) >= ENOUGH  # of fewer samples around each a sheet may look thin too
+    rod = known | (_thin(spreads) & tells)
+    if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= _thin(_spreads(found, ~rod, FINE_REACH * length)[0])
     for _ in range(END_ROUNDS if rod.any() else 0):
         near = ~rod & (_moments(found, rod, END_REACH * length)[2] > 0)
@@ -41,15 +48,18 @@ def rod_points(found: Linked, points: int, length: float) -> np.ndarray:
         if not ends.any():
             break
         rod |= ends
-    rod &= _long_groups(found, rod, length)
+    rod &= _long_groups(found, rod, known, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
     marked: np.ndarray = np.where(found.owner >= 0, rod[found.owner], False)
     return marked if len(marked) == points else np.zeros(points, np.bool_)
 
 
-def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples belong to connected rods at least a member long, (S,) bool; shorter ones are corners of a sheet."""
+def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples belong to a group of rods, (S,) bool: known, or a member long and standing off all sheets.
+
+    Others are corners of a sheet, or where it has few points.
+    """
     beside = found.neighbors
     one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
     label = component_labels(len(rod), one, beside[one, other])
@@ -58,6 +68,10 @@ def _long_groups(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
     sizes = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(found.mean[order], first)
     long = np.zeros(len(rod), np.bool_)
     long[label[order[first]]] = sizes.max(axis=1) >= length
+    off = np.zeros(len(rod), np.bool_)
+    off[label[rod & (_moments(found, ~rod, APART * length)[2] == 0)]] = True
+    long &= off
+    long[label[known]] = True
     marked: np.ndarray = long[label]
     return marked
 

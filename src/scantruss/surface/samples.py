@@ -40,6 +40,7 @@ from .rods import rod_points
 from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
+from .supports import support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
@@ -325,7 +326,9 @@ def _prepare(
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
     """Return which points (N, 3) belong to rods, (N,) bool."""
     radius = max((asked.box_size or SAMPLE_SPACING) * asked.length, 0.25 * spacing)
-    return rod_points(link_samples(points, radius, asked.length, spacing), len(points), asked.length)
+    found = link_samples(points, radius, asked.length, spacing)
+    supports = support_samples(found, asked.length) if asked.z_is_up else None
+    return rod_points(found, len(points), asked.length, supports)
 
 
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:

@@ -19,6 +19,9 @@ LINE_VARIANCE = 0.02  # largest second variance of points along a line [first va
 VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, within a member [largest variance]
 NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
 DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
+VOLUME_PLACES = 0.35  # the same for a volume: places near its surface see only half of it
+FEW = 30  # samples within a member below which all that lie there are looked at
+NEAREST = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
@@ -39,23 +42,23 @@ def check_is_surface(samples: SurfaceSamples) -> None:
         return
     some = mean[:: len(mean) // SAMPLES_LOOKED_AT + 1]
     lines = volumes = looked = 0
-    for place in mean[_spread_evenly(len(mean))]:
-        distance = np.linalg.norm(some - place, axis=1) / samples.surface.length
-        if np.count_nonzero(distance <= 1.0) < 5:
+    for place in mean[_of_most_points(samples.surface)]:
+        near = _within(some, place, samples.surface.length)
+        near = near if len(near) >= FEW else _within(mean, place, samples.surface.length)
+        if len(near) < 5:
             continue
         looked += 1
-        least, second, largest = _spread(some[distance <= 1.0])
+        least, second, largest = _spread(near)
         lines += bool(second <= LINE_VARIANCE * largest)
-        if least >= VOLUME_VARIANCE * largest:  # two sheets do so too, but not within half a member
-            points = _points_near(samples.surface, place, 0.5 * samples.surface.length)
-            least, _, largest = _spread(points)
+        if least >= VOLUME_VARIANCE * largest:  # so do two sheets, but not from half as far
+            least, _, largest = _spread(_nearest_points(samples.surface, place))
             volumes += bool(least >= NEAR_VOLUME_VARIANCE * largest)
     if lines > DECISIVE_SHARE * looked:
         raise InputError(
             "the points lie along lines, not on a surface; a grid needs a scan of a surface, or longer members if these are"
             " the lines of a scanner"
         )
-    if volumes > DECISIVE_SHARE * looked:
+    if volumes > VOLUME_PLACES * looked:
         raise InputError(
             "the points fill a volume and lie on no surface; a grid needs the points of a surface alone, such as the outermost"
         )
@@ -64,6 +67,18 @@ def check_is_surface(samples: SurfaceSamples) -> None:
 def _spread(points: np.ndarray) -> np.ndarray:
     """Return the three principal variances of points (N, 3), least first; zeros for fewer than five points."""
     return np.linalg.eigvalsh(np.cov(points.T)) if len(points) >= 5 else np.zeros(3)
+
+
+def _within(places: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
+    """Return those of some places (N, 3) within a radius of one."""
+    return places[((places - place) ** 2).sum(axis=1) <= radius**2]
+
+
+def _nearest_points(surface: Surface, place: np.ndarray) -> np.ndarray:
+    """Return the points (N, 3) within half a member of a place, or the nearest few where these are more."""
+    points = _points_near(surface, place, surface.length)
+    away = ((points - place) ** 2).sum(axis=1)
+    return points[away <= max((0.5 * surface.length) ** 2, np.sort(away)[min(NEAREST, len(away)) - 1])]
 
 
 def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
@@ -101,6 +116,12 @@ def _layer_distance(points: np.ndarray) -> float:
     distance = float(above.mean() - below.mean())
     thickness = max(float(below.std()), float(above.std()))
     return distance if distance > LAYER_DISTANCE * thickness and float(gaps.max()) > 0.4 * distance else 0.0
+
+
+def _of_most_points(surface: Surface) -> np.ndarray:
+    """Return the numbers of the samples of some points from everywhere: outliers have few points, though many samples."""
+    points = np.linspace(0, surface.start[-1] - 1, PLACES_LOOKED_AT).astype(np.int64)
+    return np.unique(np.searchsorted(surface.start, points, side="right") - 1)
 
 
 def _spread_evenly(count: int) -> np.ndarray:

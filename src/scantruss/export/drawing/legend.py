@@ -58,6 +58,11 @@ def marks_of(grid: Grid) -> list[Mark]:
         placed = [Mark(fault.words, fault.where, colour) for fault in kind if fault.where is not None]
         marks += placed[:MOST_MARKS]
     unit = f" {grid.unit}" if grid.unit else ""
+    marks += [
+        Mark(f"{part.words}, {part.size:.3g}{unit} across", part.where, INK)
+        for part in found.left_out
+        if part.kind == "hole" and part.where is not None
+    ]
     worst = (
         ("shortest member", found.shortest_member, unit),
         ("longest member", found.longest_member, unit),

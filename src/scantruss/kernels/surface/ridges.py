@@ -31,6 +31,8 @@ SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
 SEARCHES, FOLD_FITS = 2, 5  # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
 NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
 MIDDLE = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
+BESIDE, FARTHEST_MEETING = 0.2, 0.4  # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
+SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet can be told [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
 POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
 
@@ -138,8 +140,10 @@ def flank(
     crest: tuple[float, float],
     radius: float,
     side: float,
-) -> tuple[float, float, bool]:
-    """Direction of one side (1 or -1) of a fold in the plane across it and how much it bends [radian]; whether it can be told.
+) -> tuple[float, float, float, float, bool]:
+    """One side (1 or -1) of a fold in the plane across it, as far as it can be told, which is returned last.
+
+    Its direction and how much it bends [radian]; how far across and how high its middle is [radius].
 
     crest : place of the line across and its height [radius]. Taken are the points between NEAR and 1 radius from it.
     """
@@ -165,26 +169,32 @@ def flank(
         for k in range(4):
             up[r, k] = across[r, k]
     if points < FEWEST_OF_FLANK or not solve(across, 4) or not solve(up, 4):
-        return 0.0, 0.0, False
+        return 0.0, 0.0, 0.0, 0.0, False
     half = 1.0 - MIDDLE
     outer = math.atan2(up[1, 4] + 2.0 * half * up[2, 4], across[1, 4] + 2.0 * half * across[2, 4])
     inner = math.atan2(up[1, 4] - 2.0 * half * up[2, 4], across[1, 4] - 2.0 * half * across[2, 4])
-    return math.atan2(up[1, 4], across[1, 4]), outer - inner, True
+    return math.atan2(up[1, 4], across[1, 4]), outer - inner, across[0, 4], up[0, 4], True
 
 
 @kernel
 def bend_of(
     buffer: np.ndarray, taken: int, frame: tuple[Vector, Vector, Vector], crest: tuple[float, float], radius: float
-) -> float:
-    """Angle between both sides of a fold, less what they would turn if they bent on as they do themselves [radian]."""
-    left, left_bend, fits_left = flank(buffer, taken, frame, crest, radius, -1.0)
-    right, right_bend, fits_right = flank(buffer, taken, frame, crest, radius, 1.0)
+) -> tuple[float, float]:
+    """Angle between both sides of a fold [radian], and how far across its line both sides would meet [radius].
+
+    The angle is less what the sides would turn if they bent on between them as they do themselves.
+    """
+    left, left_bend, left_at, left_up, fits_left = flank(buffer, taken, frame, crest, radius, -1.0)
+    right, right_bend, right_at, right_up, fits_right = flank(buffer, taken, frame, crest, radius, 1.0)
     if not (fits_left and fits_right):
-        return 0.0
+        return 0.0, 0.0
     turn, own = left + right, 0.5 * (left_bend + right_bend)
     if turn < 0.0:
         turn, own = -turn, -own
-    return max(turn - max(own, 0.0) * MIDDLE / (1.0 - MIDDLE), 0.0)
+    # right: up = right_up + (u - right_at) tan(right); left: up = left_up - (u + left_at) tan(left)
+    apart = math.tan(right) + math.tan(left)
+    meet = (left_up - left_at * math.tan(left) - right_up + right_at * math.tan(right)) / apart if apart != 0.0 else 0.0
+    return max(turn - max(own, 0.0) * MIDDLE / (1.0 - MIDDLE), 0.0), meet
 
 
 @kernel
@@ -299,12 +309,18 @@ def fit_fold(
         total += buffer[i, WEIGHT]
     across, ahead, _ = frame
     crest = matrix[0, TERMS] + matrix[6, TERMS] * rounding
+    found[BEND], meet = bend_of(buffer, taken, frame, (shift, crest), radius)
+    aside = rounding > 0.0 or abs(meet) > BESIDE  # then the line is not yet the crest
+    if aside and abs(meet) < FARTHEST_MEETING and found[BEND] > SHARP_ENOUGH:
+        size = math.sqrt(meet * meet + rounding * rounding)
+        crest = matrix[0, TERMS] + meet * (matrix[3, TERMS] + meet * matrix[4, TERMS])
+        crest += size * (matrix[6, TERMS] + meet * matrix[7, TERMS])
+        shift += meet
     at = along(along(place, shift * radius, across), crest * radius, n)
     found[0], found[1], found[2] = at
     found[3], found[4], found[5] = unit(along(ahead, matrix[1, TERMS], n))
     found[GAIN] = min((smooth - least) * taken / max(least, 1e-12), 1e9)
     found[OFF] = radius * math.sqrt(least / max(total, 1e-300))
-    found[BEND] = bend_of(buffer, taken, frame, (shift, crest), radius)
     return True
 
 

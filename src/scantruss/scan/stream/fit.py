@@ -21,7 +21,7 @@ from ..formats.table import PACKED
 from .chunks import Reading, count_unread, read_chunks
 from .opened import open_scan
 from .source import Source
-from .thin_scan import Share, thin_scan
+from .thin_scan import Share, check_enough, thin_scan
 from .tiles import find_source, tiles_of
 
 if TYPE_CHECKING:
@@ -110,6 +110,7 @@ def read_thinned(names: Names, settings: Settings, progress: Progress | None = N
         selection=settings.selection,
         progress=progress,
     )
+    check_enough(thinned, float(settings.thin_spacing or 0.0), "--thin-spacing")
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
     notes = (*thinned.notes, *cloud.notes, *degrees_note(cloud))
     return replace(cloud, dropped=thinned.dropped, notes=notes), thinned.read

@@ -25,6 +25,7 @@ from .tiles import TILE, tiles_of
 
 KEEP = ("mean", "nearest")
 SMALLEST = 500_000  # fewest points of a tile that are worth a worker
+FEWEST = 24  # fewest points of a surface
 TILES = 4  # for each worker at least, so that all end at about the same time
 
 
@@ -39,6 +40,21 @@ class Thinned:
     boundary: int  #: points that stand for the boundary, the last of `points`
     unit: str = ""  #: of the coordinates; "" if neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
+
+
+def check_enough(thinned: Thinned, spacing: float, option: str) -> None:
+    """Refuse a spacing that leaves hardly a point of a scan.
+
+    Raises
+    ------
+    InputError
+        Fewer points are left than a surface needs, of more that were read.
+    """
+    left, read = len(thinned.points), thinned.read - thinned.dropped
+    if left < FEWEST <= read:
+        raise InputError(
+            f"{option} {spacing:g} leaves {left} of {read:,} points, too few for a surface; give a smaller spacing, in the unit of the scan"
+        )
 
 
 def thin_scan(

@@ -1,0 +1,73 @@
+"""Supports: columns and legs as thick as a member between a shell and a level floor, told by where they stand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels.geometry.components import component_labels
+from .linked_samples import Linked
+
+CELL = 0.25  # width of the cells in plan [member lengths]
+UNDER = 0.6  # height below the highest sample around from which on a sample lies under the shell [member lengths]
+OFF_FLOOR = 0.3  # height above the floor from which on a sample is none of it [member lengths]
+LEVEL = 0.1  # half the thickness of a floor [member lengths]
+FLOOR = 0.05  # least share of the samples in a floor
+SLENDER = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
+MOST = 0.2  # share of the samples from which on they are no supports but the shell
+
+
+def support_samples(found: Linked, length: float) -> np.ndarray:
+    """Return which samples (S,) bool belong to supports: narrow in plan, between a level floor and a shell above.
+
+    Parameters
+    ----------
+    found : Linked
+        The samples, z upwards.
+    length : float
+        Desired member length [scan unit].
+    """
+    mean, none = found.mean, np.zeros(len(found.mean), np.bool_)
+    under = mean[:, 2] < _highest_around(mean, CELL * length) - UNDER * length
+    if (floor := _floor_height(mean[under, 2], LEVEL * length, FLOOR * len(mean))) is None:
+        return none
+    between = under & (mean[:, 2] > floor + OFF_FLOOR * length)
+    which = np.flatnonzero(between)
+    group = _beside_each_other(mean[which, :2], CELL * length)
+    support = none.copy()
+    for each in np.unique(group):
+        own = which[group == each]
+        support[own] = np.ptp(mean[own, :2], axis=0).max() <= SLENDER * length
+    return support if support.mean() <= MOST else none
+
+
+def _highest_around(mean: np.ndarray, cell: float) -> np.ndarray:
+    """Return the height of the highest sample in the cell in plan of each (S,) and in those around it."""
+    columns = np.floor((mean[:, :2] - mean[:, :2].min(axis=0)) / cell).astype(np.int64) + 1
+    wide = columns.max(axis=0) + 2
+    top = np.full(tuple(wide), -np.inf)
+    np.maximum.at(top, (columns[:, 0], columns[:, 1]), mean[:, 2])
+    around: np.ndarray = np.max(
+        [top[columns[:, 0] + i, columns[:, 1] + j] for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0
+    )
+    return around
+
+
+def _beside_each_other(plan: np.ndarray, cell: float) -> np.ndarray:
+    """Return a number for each place in plan (K,): the same where their cells touch each other one after the other."""
+    cells, number = np.unique(np.floor(plan / cell).astype(np.int64), axis=0, return_inverse=True)
+    there = {(i, j): k for k, (i, j) in enumerate(cells.tolist())}
+    steps = ((1, -1), (1, 0), (1, 1), (0, 1))
+    pairs = [(k, there[i + a, j + b]) for (i, j), k in there.items() for a, b in steps if (i + a, j + b) in there]
+    one, other = np.array(pairs, np.int64).reshape(-1, 2).T
+    label: np.ndarray = component_labels(len(cells), one, other)[number.ravel()]
+    return label
+
+
+def _floor_height(heights: np.ndarray, half: float, fewest: float) -> float | None:
+    """Return the middle of the layer, two halves thick, that holds the most of some heights (K,), and at least the fewest; else None."""
+    ordered = np.sort(heights)
+    if not len(ordered):
+        return None
+    count = np.searchsorted(ordered, ordered + 2.0 * half, side="right") - np.arange(len(ordered))
+    first = int(count.argmax())
+    return float(ordered[first]) + half if count[first] >= fewest else None
