@@ -215,6 +215,9 @@ class ConstraintSettings(_Checked):
         "polylines that must become chains of members, in the frame of the scan; closed if the last point is the first",
         unit="scan unit",
     )
+    line_names: Sequence[str] = _setting(
+        (), "names of the fixed lines in their order, and so of the sets of their nodes; none: line 1, line 2, ..."
+    )
     ridge_angle: float = _setting(
         40.0,
         "a fold sharper than this is a ridge and becomes a chain of members; 0: no ridges (default method only)",
@@ -334,6 +337,7 @@ class Settings(
         super().__post_init__()
         object.__setattr__(self, "fixed", _positions(self.fixed))
         object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
+        object.__setattr__(self, "line_names", _names(self.line_names, len(self.fixed_lines)))
 
     def __repr__(self) -> str:
         """Name the settings that are not the default."""
@@ -426,6 +430,15 @@ def _line(line: Any) -> tuple[tuple[float, ...], ...]:
     if len(points) < 2:
         raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
     return points
+
+
+def _names(given: Any, count: int) -> tuple[str, ...]:
+    """Return the names of so many fixed lines, or none at all."""
+    if isinstance(given, str) or not all(isinstance(name, str) and name.strip() for name in given):
+        raise InputError(f"line_names must be words, one for each fixed line, got {given!r}")
+    if len(given) not in (0, count):
+        raise InputError(f"line_names has {len(given)} names for {count} fixed lines")
+    return tuple(given)
 
 
 def check_length_field(given: Any) -> str | Lengths:

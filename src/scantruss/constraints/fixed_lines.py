@@ -36,6 +36,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
     """
     patches = narrow_surface(samples, FIT)
     for number, line in enumerate(settings.fixed_lines, 1):
+        name = settings.line_names[number - 1] if settings.line_names else f"line {number}"
         given = np.array(line, float) - samples.origin
         _check_on_scan(given, line, number, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
@@ -46,7 +47,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
         corners = find_corners(points, vertices, closed, settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
-            network.add(part, ring, own)
+            network.add(part, ring, own, name=name)
 
 
 def _unit(unit: str) -> str:

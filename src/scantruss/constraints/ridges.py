@@ -196,10 +196,10 @@ def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[tuple[np.nd
 
 def add_ridges(network: Network, ridges: list[tuple[np.ndarray, bool]]) -> None:
     """Add ridges to a network of lines."""
-    for places, ring in ridges:
+    for number, (places, ring) in enumerate(ridges, 1):
         step = LINE_STEP * network.length
         points, _ = divide(np.concatenate([places, places[:1]]) if ring else places, ring, step)
-        network.add(points, ring, [], sharp=True)
+        network.add(points, ring, [], name=f"ridge {number}", sharp=True)
 
 
 def join_ends(ridges: list[np.ndarray], length: float) -> list[np.ndarray]:

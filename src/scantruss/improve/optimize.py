@@ -16,7 +16,7 @@ from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_by_angle
 from .perturbation import search_widely
-from .sliding_nodes import with_boundary_members
+from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
 from .working_mesh import WorkingMesh
 
@@ -137,6 +137,7 @@ def improve_last(
 
     closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
     grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
+    grid = with_line_sets(grid, constraints.lines, settings.length)
     return grid.replace(settings=settings, before=before)
 
 

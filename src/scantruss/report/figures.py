@@ -10,6 +10,7 @@ from .. import __version__
 from ..check.limits import WARN_LEFT_OUT
 from ..errors import words_of_place
 from ..grid.certificate import near
+from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
     from .advice import Advice, Trial
+
+
+MOST_LINES = 6  # lines of a kind that are named one by one
 
 
 def report_of(grid: Grid, points: int) -> dict[str, Any]:
@@ -36,6 +40,8 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
         "members": len(grid.edges),
         "triangles": len(grid.triangles),
         "line_members": len(grid.lines),
+        "fixed_lines": sets_of(grid, FIXED_LINE),
+        "ridges": sets_of(grid, RIDGE),
         "quality": grid.quality.to_dict(),
         "before": grid.before.to_dict() if grid.before is not None else None,
         "topology": grid.topology.to_dict(),
@@ -94,8 +100,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
             else "closed"
         ),
     ]
-    if len(grid.lines):
-        lines.append(f"{len(grid.lines)} members along lines and ridges")
+    lines += line_lines(grid)
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
     if bridging:
         lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
@@ -106,6 +111,27 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
         lines += warning_lines(grid.certificate)
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
+    return lines
+
+
+def line_lines(grid: Grid) -> list[str]:
+    """Return how many fixed lines and ridges there are, with their nodes and lengths; that no ridge is there where one was looked for."""
+    unit, lines = f" {grid.unit}" if grid.unit else "", []
+    for kind in (FIXED_LINE, RIDGE):
+        sets = sets_of(grid, kind)
+        each = [f"{line['name']} {len(line['nodes'])} nodes, {line['length']:.4g}{unit}" for line in sets[:MOST_LINES]]
+        each += [f"and {len(sets) - MOST_LINES} more"] * (len(sets) > MOST_LINES)
+        if sets:
+            total = sum(line["length"] for line in sets)
+            count = (
+                f"{len(sets)} {kind}{'s' if len(sets) > 1 else ''}, {total:.4g}{unit} in all"
+                if len(sets) > 1
+                else f"1 {kind}"
+            )
+            lines.append(f"{count}: {'; '.join(each)}")
+    made = grid.settings
+    if made is not None and made.ridge_angle > 0.0 and made.method == "default" and not sets_of(grid, RIDGE):
+        lines.append(f"no ridge is folded by more than {made.ridge_angle:g} degrees")
     return lines
 
 
