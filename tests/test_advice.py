@@ -7,6 +7,7 @@ import pytest
 from shapes import make
 
 import scantruss as st
+from scantruss import pipeline
 from scantruss.cli.main import main
 from scantruss.report.advice import Advice
 from scantruss.scan.member_length import length_range
@@ -99,3 +100,64 @@ def test_a_refused_length_comes_with_one_that_passes(place, capsys, monkeypatch)
     named = said.split("a grid passes with --length ")[1].split()[0]
     assert float(named) != failing
     assert main([*words, named]) == 0
+
+
+def counted_runs(monkeypatch, passes):
+    """Let grids come out only of lengths that pass; returns the lengths of all attempts."""
+    made, make_grid = [], pipeline.make_grid
+
+    def tried(cloud, attempt, **others):
+        made.append(attempt.settings.length)
+        if not passes(attempt.settings.length):
+            raise st.FrontError("the front cannot close")
+        return make_grid(cloud, attempt, **others)
+
+    monkeypatch.setattr(pipeline, "make_grid", tried)
+    return made
+
+
+def test_the_length_nearby_is_the_nearest_that_passes_and_costs_no_more_than_twenty_quick_runs(monkeypatch):
+    cloud = cloud_of("limpet")
+    failing = Advice(cloud, st.Settings(length=1.0)).suggest()
+    made = counted_runs(monkeypatch, lambda length: length > 1.15 * failing)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) == pytest.approx(1.25 * failing, rel=0.03)
+    cost = sum(max(1.0, (failing / length) ** 2) for length in made)
+    assert cost <= 20.0
+    made = counted_runs(monkeypatch, lambda length: False)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) is None
+    assert sum(max(1.0, (failing / length) ** 2) for length in made) <= 20.0 and len(set(made)) >= 4
+
+
+def test_the_suggested_length_passes_also_where_the_usual_one_and_its_neighbours_do_not(monkeypatch):
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    counted_runs(monkeypatch, lambda length: length > 1.5 * usual)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    length = advice.suggest()
+    assert (
+        length > 1.5 * usual
+        and advice.try_length(length).passed
+        and advice.try_length(advice.next_above(length)).passed
+    )
+
+
+def test_info_says_which_lengths_pass_and_why_others_do_not(place, capsys, monkeypatch):
+    usual = Advice(st.read_points("limpet.xyz"), st.Settings(length=1.0)).suggest()
+    counted_runs(monkeypatch, lambda length: length < 1.2 * usual)
+    assert main(["info", "limpet.xyz"]) == 0
+    said = capsys.readouterr().out
+    span = next(line for line in said.splitlines() if line.startswith("passes, of the"))
+    low, high = (float(word) for word in span.split(": ")[1].split(" to "))
+    assert low < usual <= high < 1.2 * usual
+    longer = [line for line in said.splitlines() if "no grid passes: the front cannot close" in line]
+    assert longer and all(float(line.split()[0]) > high for line in longer)
+
+
+def test_a_length_out_of_range_is_refused_with_the_nearest_that_passes(place, capsys):
+    low, high = length_range(st.read_points("limpet.xyz"))
+    for asked, side in ((0.3 * low, low), (2.0 * high, high)):
+        assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", f"{asked:.3g}"]) == 2
+        said = capsys.readouterr().err
+        named = float(said.split("a grid passes with --length ")[1].split()[0])
+        assert low <= named <= high and abs(np.log(named / side)) < np.log(1.5)
+        assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", str(named)]) == 0

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from rough import rough_disc
 
 from scantruss import InputError, Settings, grid_from_points, write
+from scantruss.boundary.polylines import divide, find_corners, simplify
 from scantruss.cli.positions import read_lines
-from scantruss.constraints.fixed_lines import divide, find_corners, simplify
 from scantruss.constraints.network import Network, curves_of
 from scantruss.errors import FormatError
 from scantruss.export.json import encode_json, read_grid

@@ -194,6 +194,11 @@ class BoundarySettings(_Checked):
         40.0, "the boundary has a corner where it turns by more than this", unit="degree", source="Sec. 3.3",
         low=10.0, high=180.0,
     )  # fmt: skip
+    boundary: Sequence[Sequence[Sequence[float]]] = _setting(
+        (),
+        "the true boundary, closed polylines that take the place of that of the scan; those inside others are holes",
+        unit="scan unit",
+    )
     fill_holes: float | None = _setting(
         None,
         f"close holes with a shorter boundary than this; 0 keeps all; none: {HOLE:g} member lengths",
@@ -336,7 +341,8 @@ class Settings(
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         super().__post_init__()
         object.__setattr__(self, "fixed", _positions(self.fixed))
-        object.__setattr__(self, "fixed_lines", tuple(map(_line, self.fixed_lines)))
+        object.__setattr__(self, "fixed_lines", tuple(_line(line) for line in self.fixed_lines))
+        object.__setattr__(self, "boundary", tuple(_ring(ring) for ring in self.boundary))
         object.__setattr__(self, "line_names", _names(self.line_names, len(self.fixed_lines)))
 
     def __repr__(self) -> str:
@@ -417,18 +423,27 @@ def _positions(given: Any) -> tuple[tuple[float, ...], ...]:
     return found
 
 
-def _line(line: Any) -> tuple[tuple[float, ...], ...]:
-    """Return a fixed line as tuples of numbers."""
+def _line(line: Any, name: str = "fixed_lines", what: str = "a fixed line") -> tuple[tuple[float, ...], ...]:
+    """Return a polyline as tuples of numbers."""
     try:
         points = tuple(tuple(float(c) for c in position) for position in line)
     except (TypeError, ValueError):
-        raise InputError(f"fixed_lines must be polylines of positions of three numbers, got {line!r}") from None
+        raise InputError(f"{name} must be polylines of positions of three numbers, got {line!r}") from None
     for position in points:
         if len(position) != 3 or not all(map(math.isfinite, position)):
-            raise InputError(f"a fixed line needs points of three finite coordinates, got {position}")
+            raise InputError(f"{what} needs points of three finite coordinates, got {position}")
     points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
     if len(points) < 2:
-        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
+        raise InputError(f"{what} needs at least two different points, got {len(points)}")
+    return points
+
+
+def _ring(ring: Any) -> tuple[tuple[float, ...], ...]:
+    """Return a closed polyline as tuples of numbers, its first point not repeated."""
+    points = _line(ring, "boundary", "a boundary")
+    points = points[:-1] if points[0] == points[-1] else points
+    if len(set(points)) < 3:
+        raise InputError(f"a boundary needs at least three different points, got {len(set(points))}")
     return points
 
 

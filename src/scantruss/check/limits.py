@@ -72,6 +72,8 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     corners = grid.nodes[grid.triangles[shapeable]].reshape(-1, 3) + grid.origin
     folds = fold_angles(grid)
     measured = np.isfinite(found.nodes) & ~grid.fixed
+    if settings.boundary:  # its nodes lie where the user says
+        measured[grid.edges[grid.edge_uses == 1]] = False
     off = np.maximum(found.nodes - NOISE * found.noise, 0.0)[measured] / at_nodes[measured]
     return [
         Figure("angle", grid.angles[shapeable].ravel(), corners, settings.min_angle, WARN_ANGLE,

@@ -172,7 +172,7 @@ def describe(spec: Field[Any]) -> str:
 
 #: settings of every day, and those that only `--method paper` and fronts without rows heed; the others are for experts
 EVERY_DAY = (
-    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
+    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "boundary", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
 )  # fmt: skip
 PAPER_ONLY = (
     "advance_from", "shape_weight", "size_weight", "length_weight", "search_range", "nearness", "merge_angle", "case3",
@@ -209,7 +209,7 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
             options["help"] += "; repeatable"
         elif spec.name == "length":
             options |= {"type": length_or_field, "metavar": "NUMBER|FILE|curvature:MIN:MAX"}
-        elif spec.name == "fixed_lines":
+        elif spec.name in ("fixed_lines", "boundary"):
             options |= {"action": "append", "metavar": "FILE"}
             options["help"] += (
                 "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
@@ -271,6 +271,8 @@ def settings_of(values: argparse.Namespace) -> Settings:
         named_lines = [line for path in explicit["fixed_lines"] for line in read_lines(path)]
         explicit["fixed_lines"] = tuple(points for _, points in named_lines)
         explicit["line_names"] = tuple(name for name, _ in named_lines)
+    if "boundary" in explicit:
+        explicit["boundary"] = tuple(ring for path in explicit["boundary"] for _, ring in read_lines(path, "boundary"))
     merged = kept | explicit
     if "length" not in merged and not merged.get("length_field"):
         raise UsageError(

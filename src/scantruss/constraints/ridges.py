@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.polylines import divide
 from ..kernels.geometry.quadric import COLUMNS
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import FOUND, bends_of_samples, fit_fold, keep_folded
 from ..surface.samples import ALL
-from .fixed_lines import LINE_STEP, divide
+from .fixed_lines import LINE_STEP
 
 if TYPE_CHECKING:
     from ..settings import Settings

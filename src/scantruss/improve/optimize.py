@@ -133,7 +133,7 @@ def improve_last(
             smooth(mesh, settings)
         else:
             finish(mesh, settings.prefer)
-        project_onto_scan(mesh, samples)
+        project_onto_scan(mesh, samples, boundary=not settings.boundary)
 
     closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
     grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
@@ -141,7 +141,7 @@ def improve_last(
     return grid.replace(settings=settings, before=before)
 
 
-def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples) -> None:
-    """Let the nodes down on the scan by patches as narrow as it allows."""
-    mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)))
+def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples, *, boundary: bool) -> None:
+    """Let the nodes down on the scan by patches as narrow as it allows; those of a given boundary stay on it."""
+    mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)), boundary=boundary)
     mesh.name_distances(samples.measured)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..grid.certificate import Certificate, Spread, Worst
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
-    from .advice import Advice, Trial
 
 
 MOST_LINES = 6  # lines of a kind that are named one by one
@@ -227,56 +226,6 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
         )
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
-    return lines
-
-
-def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of a table: what comes of a member length, of the next below and the next above."""
-    radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
-    rows: list[tuple[str, ...]] = []
-    for each in dict.fromkeys((advice.next_below(length), length, advice.next_above(length))):
-        trial = advice.try_length(each)
-        members = advice.members(each) if trial is None or trial.grid is None else len(trial.grid.edges)
-        rows.append(
-            (
-                f"{each:g}",
-                f"{members:,}",
-                f"{each**2 / (8.0 * radius):.2g}",
-                f"{each / cloud.spacing:.3g}",
-                result_of(trial),
-            )
-        )
-    return (f"length{unit}", "members", f"sag L^2/8R{unit}", "L / spacing", "a quick run"), rows
-
-
-def result_of(trial: Trial | None) -> str:
-    """Return in a few words what came of a length."""
-    if trial is None:
-        return "not tried"
-    if trial.grid is None or trial.grid.certificate is None:
-        return "no grid passes"
-    found = trial.grid.certificate
-    holes = sum(part.kind == "hole" for part in found.left_out)
-    said = ["passes with warnings" if found.warnings else "passes"]
-    said += [f"{100 * found.judged_out:.2g} % of the scan left out"] * (found.judged_out > 0)
-    said += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
-    return ", ".join(said)
-
-
-def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
-    """Return how noisy and how bent the scan is, and which length to take."""
-    unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
-    bent = f"R = {radius:.3g}{unit}: 95 % of the scan is bent less" if np.isfinite(radius) else "the scan is flat"
-    lines = [bent]
-    if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
-        noise = trial.grid.certificate.noise
-        lines.append(f"noise {noise:.2g}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members")
-    if trial is not None and not trial.passed:
-        near = advice.nearby(length)
-        lines += [f"at {length:g}{unit}: {trial.fault}"]
-        lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
-    else:
-        lines.append(f"try --length {length:g}")
     return lines
 
 

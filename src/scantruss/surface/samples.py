@@ -47,7 +47,7 @@ BESIDE_SAMPLES = 1.5
 NOT_FINITE = "with NaN or infinite coordinates"
 SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
 UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, OUTSIDE = range(6)  # what a point of the scan was judged to be
 SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
 
 
@@ -189,13 +189,17 @@ def local_field(surface: Surface, place: np.ndarray) -> float:
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
-def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings) -> SurfaceSamples:
-    """Return the samples of the same points and of made-up ones (F, 3) [scan unit]."""
-    points = samples.surface.points
+def samples_with(
+    samples: SurfaceSamples, added: np.ndarray, settings: Settings, kept: np.ndarray | None = None
+) -> SurfaceSamples:
+    """Return the samples of the same points, or of those of `surface.points` that are kept (P,) bool, and of made-up ones (F, 3)."""
+    points = samples.surface.points if kept is None else samples.surface.points[kept]
     both = np.concatenate([points, added])
     asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
         outlier_distance=0.0, drop_duplicates=False
     )
+    if kept is not None:  # which parts are wanted is said by what is kept
+        asked = asked._replace(piece="all")
     if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))

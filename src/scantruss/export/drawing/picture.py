@@ -92,7 +92,7 @@ def encode_picture(
                     texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
         if caption:
             _legend(grid, shown, texts, (6 * em, tall - 3.7 * em), em)
-    return _paint((wide, tall), strokes, texts, rings, lines)
+    return paint((wide, tall), strokes, texts, rings, lines)
 
 
 def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size: tuple[int, int] | None) -> Image:
@@ -133,7 +133,7 @@ def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[fl
 
 def encode_cloud(cloud: PointCloud) -> bytes:
     """Return a picture of a scan, PNG: its points seen from obliquely above."""
-    return _paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
+    return paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
 
 
 def caption_of(grid: Grid) -> str:
@@ -180,10 +180,10 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
     ]
     titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
     texts = [Text(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
-    return write_files({path: _paint(PANELS, strokes, texts)})[0]
+    return write_files({path: paint(PANELS, strokes, texts)})[0]
 
 
-def _paint(
+def paint(
     size: tuple[int, int],
     strokes: Sequence[Strokes],
     texts: Iterable[Text],
