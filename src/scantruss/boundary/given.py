@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from .holes import fill_holes
 from .polylines import divide, feet_on_scan, find_corners
 
 if TYPE_CHECKING:
+    from ..kernels.surface.local_surface import Surface
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
@@ -51,6 +52,30 @@ class Rings(NamedTuple):
     boxes: SearchBoxes
 
 
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """The part of a scan that given curves enclose."""
+
+    surface: Surface
+    rings: Rings
+    sample: np.ndarray  #: (S,) bool, samples inside
+    turned: np.ndarray  #: (R,) bool, curves whose surface lies to their right
+    external: np.ndarray  #: (R,) bool
+    reach: float  #: distance from a curve within which each point counts by its own side [scan unit]
+
+    def holds(self, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
+        """Return which points (N, 3) of samples (N,) lie inside: near a curve by their own side, else by that of their sample."""
+        neighbors = self.surface.neighbors
+        beside = self.sample | (self.sample[neighbors] & (neighbors >= 0)).any(axis=1)
+        known = owner >= 0
+        found: np.ndarray = known & self.sample[owner]
+        close = np.flatnonzero(known & beside[owner])
+        foot, right = _sides(points[close], self.surface.normals[owner[close]], self.rings, self.reach)
+        near = foot >= 0
+        found[close[near]] = right[near] == self.turned[self.rings.ring[foot[near]]]
+        return found
+
+
 def cut_along(
     samples: SurfaceSamples, scanned: Sequence[tuple[np.ndarray, int]], settings: Settings
 ) -> tuple[SurfaceSamples, list[Ring]]:
@@ -71,34 +96,30 @@ def cut_along(
     """
     curves = [_curve(ring, number, samples, settings) for number, ring in enumerate(settings.boundary, 1)]
     rings = _joined([points for points, _ in curves], settings.length)
-    links = np.linalg.norm(samples.surface.mean[samples.surface.neighbors] - samples.surface.mean[:, None], axis=2)
-    reach = 1.05 * float(links[samples.surface.neighbors >= 0].max())
-    singly = [_joined([points], settings.length) for points, _ in curves]
-    sides = [_sides(samples.surface.mean, samples.surface.normals, ring, reach) for ring in singly]
-    label = _regions(samples, sides)
-    turned, kept, external = _enclosed(samples, scanned, rings, sides, label, settings.length)
-    inside = np.isin(label, kept)
-    holes = [points for points, _ in scanned if _is_hole(points, samples, rings, inside, settings.length)]
-
-    def is_inside(points: np.ndarray, owner: np.ndarray) -> np.ndarray:
-        return _points_inside(points, owner, samples, rings, reach, inside, turned)
-
-    owner = np.repeat(np.arange(len(inside)), np.diff(samples.surface.start))
-    added = fill_holes(samples, holes)
-    cut = samples_with(samples, added, settings, is_inside(samples.surface.points, owner))
-    judged, measured = samples.judged.copy(), np.flatnonzero(samples.judged == KEPT)
-    judged[measured[~is_inside(samples.scan[measured], owners_of(samples, samples.scan[measured]))]] = OUTSIDE
-    whole = samples.whole
-    if whole is not None:
-        whole = np.ascontiguousarray(whole[is_inside(whole, owners_of(samples, whole))])
-    cut = replace(cut, judged=judged, whole=whole)
+    inside = _inside_of(samples, scanned, [points for points, _ in curves], rings, settings.length)
+    holes = [points for points, _ in scanned if _is_hole(points, samples, inside, settings.length)]
+    cut = _samples_inside(samples, fill_holes(samples, holes), inside, settings)
     found = []
     for number, (points, corner_at) in enumerate(curves):
-        if turned[number]:
+        if inside.turned[number]:
             points, corner_at = points[::-1], np.sort(len(points) - 1 - corner_at)
         nearest = int(((cut.surface.mean - points[0]) ** 2).sum(axis=1).argmin())
-        found.append(Ring(np.ascontiguousarray(points), corner_at, bool(external[number]), int(cut.piece[nearest])))
+        external = bool(inside.external[number])
+        found.append(Ring(np.ascontiguousarray(points), corner_at, external, int(cut.piece[nearest])))
     return cut, found
+
+
+def _samples_inside(samples: SurfaceSamples, added: np.ndarray, inside: Inside, settings: Settings) -> SurfaceSamples:
+    """Return the samples of the points inside and of those made up over holes (F, 3); the other points are judged to be outside."""
+    owner = np.repeat(np.arange(len(samples.surface.mean)), np.diff(samples.surface.start))
+    cut = samples_with(samples, added, settings, inside.holds(samples.surface.points, owner))
+    judged, measured = samples.judged.copy(), np.flatnonzero(samples.judged == KEPT)
+    points = samples.scan[measured]
+    judged[measured[~inside.holds(points, owners_of(samples, points))]] = OUTSIDE
+    whole = samples.whole
+    if whole is not None:
+        whole = np.ascontiguousarray(whole[inside.holds(whole, owners_of(samples, whole))])
+    return replace(cut, judged=judged, whole=whole)
 
 
 def _curve(
@@ -170,6 +191,23 @@ def _sides(places: np.ndarray, normals: np.ndarray, rings: Rings, reach: float) 
     return foot, right
 
 
+def _inside_of(
+    samples: SurfaceSamples,
+    scanned: Sequence[tuple[np.ndarray, int]],
+    curves: Sequence[np.ndarray],
+    rings: Rings,
+    length: float,
+) -> Inside:
+    """Return which part of a scan given curves enclose."""
+    surface = samples.surface
+    links = np.linalg.norm(surface.mean[surface.neighbors] - surface.mean[:, None], axis=2)
+    reach = 1.05 * float(links[surface.neighbors >= 0].max())
+    sides = [_sides(surface.mean, surface.normals, _joined([curve], length), reach) for curve in curves]
+    label = _regions(samples, sides)
+    turned, kept, external = _enclosed(samples, scanned, rings, sides, label, length)
+    return Inside(surface, rings, np.isin(label, kept), turned, external, reach)
+
+
 def _regions(samples: SurfaceSamples, sides: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Return the number of the region of each sample (S,): what hangs together without crossing a curve."""
     one, k = np.nonzero(samples.surface.neighbors >= 0)
@@ -209,15 +247,14 @@ def _enclosed(
         turned[outer] = _inside_is_right(sides[outer], at_rim, areas, samples, rings, outer)
         region = int(sides[outer][int(turned[outer])].argmax())
         kept.append(region)
-        at_rim[int(sides[outer][int(not turned[outer])].argmax())] += len(
-            label
-        )  # what lies outside of one, does so of all
+        beyond = [sides[outer][int(not turned[outer])]]
         for hole in list(left):
             votes = [side[region] / max(float(side.sum()), 1.0) for side in sides[hole]]
             if max(votes) > 0.5:
                 turned[hole] = votes[1] > votes[0]
-                at_rim[int(sides[hole][int(not turned[hole])].argmax())] += len(label)
+                beyond.append(sides[hole][int(not turned[hole])])
                 left.remove(hole)
+        at_rim[[int(side.argmax()) for side in beyond if side.any()]] += len(label)  # outside of one is outside of all
     return turned, kept, external
 
 
@@ -267,30 +304,9 @@ def _rim_samples(
     return owner[owner >= 0]
 
 
-def _is_hole(points: np.ndarray, samples: SurfaceSamples, rings: Rings, inside: np.ndarray, length: float) -> bool:
+def _is_hole(points: np.ndarray, samples: SurfaceSamples, inside: Inside, length: float) -> bool:
     """Whether a boundary loop of the scan (M, 3) lies inside and is none of those given."""
     owner = owners_of(samples, points)
-    return bool((owner >= 0).any() and inside[owner[owner >= 0]].mean() > INSIDE) and bool(
-        (_nearest(points, rings, AWAY * length) < 0).any()
-    )
-
-
-def _points_inside(
-    points: np.ndarray,
-    owner: np.ndarray,
-    samples: SurfaceSamples,
-    rings: Rings,
-    reach: float,
-    inside: np.ndarray,
-    turned: np.ndarray,
-) -> np.ndarray:
-    """Return which points (N,) lie inside: near a curve those to its left, elsewhere those of samples (N,) inside."""
-    neighbors = samples.surface.neighbors
-    beside = inside | (inside[neighbors] & (neighbors >= 0)).any(axis=1)
-    known = owner >= 0
-    found = known & inside[owner]
-    close = np.flatnonzero(known & beside[owner])
-    foot, right = _sides(points[close], samples.surface.normals[owner[close]], rings, reach)
-    near = foot >= 0
-    found[close[near]] = right[near] == turned[rings.ring[foot[near]]]
-    return found
+    owner = owner[owner >= 0]
+    away = bool((_nearest(points, inside.rings, AWAY * length) < 0).any())
+    return away and len(owner) > 0 and bool(inside.sample[owner].mean() > INSIDE)

@@ -34,10 +34,8 @@ SURE_PER_SPACING = (
     8.0  # distances between points in a member from which on holes in the sampling are seldom taken for holes
 )
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
-RUNS_NEARBY, RUNS = (
-    20.0,
-    60.0,
-)  # quick runs that are made for a length nearby, and for a suggestion with the range around it
+RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
+RUNS = 40.0  # quick runs that are made for a suggestion and the lengths around it
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 
