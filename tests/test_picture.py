@@ -1,6 +1,8 @@
 """Pictures: what is seen, from where, and the same bytes each time."""
 
 import io
+import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -253,3 +255,17 @@ def test_places_of_faults_and_warnings_are_marked_with_their_words():
 def test_a_grid_plots_itself_as_an_image():
     image = dome().plot(view=("top", "front"), size=(600, 400))
     assert image.size == (600, 400) and hasattr(image, "_repr_png_")
+
+
+def test_more_places_of_a_fault_are_small_rings_of_its_colour():
+    grid, cloud = dome(), cloud_over(dome())
+    places = [tuple((grid.nodes[n] + grid.origin).tolist()) for n in (3, 30, 60)]
+    none = Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0)
+    counts = []
+    for also in ((), tuple(places[1:])):
+        fault = Fault("short", "has a member of 0.30 desired lengths", places[0], also)
+        marked = grid.replace(certificate=replace(none, faults=(fault,)))
+        counts.append(has_colour(pixels(encode_picture(marked, cloud)), FAULT))
+    assert counts[1] > counts[0] + 30
+    again = Certificate.from_dict(json.loads(json.dumps(marked.certificate.to_dict())))
+    assert again.faults == marked.certificate.faults

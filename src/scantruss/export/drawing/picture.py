@@ -19,7 +19,7 @@ from ...runtime.ours import MARK
 from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
-from .legend import Ring, Text, marks_of, scale_bar
+from .legend import FAULT, Ring, Text, marks_of, scale_bar
 from .strokes import (
     INK,
     MOST_POINTS,
@@ -116,12 +116,20 @@ def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Rin
     flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
     for number, (mark, (x, y)) in enumerate(zip(marks, flat.tolist(), strict=True), 1):
         texts.append(Text(x + 1.3 * em, y + 1.0 * em, str(number), em, colour=mark.colour))
-    return [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
+    rings = [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
+    for mark in marks:
+        if mark.also:
+            others, _ = camera.project(np.array(mark.also) - grid.origin)
+            rings += [Ring(x, y, 0.8 * em, mark.colour) for x, y in others.tolist()]
+    return rings
 
 
 def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[float, float], em: float) -> None:
     """Add what colours and numbers mean, from a corner downwards."""
     x, y = corner
+    if grid.certificate is not None and not grid.certificate.passed:
+        texts.append(Text(x, y, "This grid fails its certificate:", 1.2 * em, "left", FAULT))
+        y -= 2.0 * em
     rows = [(part.words, part.colour, "\u25cf") for part in (shown.missed if shown else ())]
     rows += [(words, INK, "") for words in (shown.unread if shown else ())]
     rows += [(mark.words, mark.colour, str(number)) for number, mark in enumerate(marks_of(grid), 1)]
