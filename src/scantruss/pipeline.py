@@ -111,7 +111,7 @@ def first_that_passes(
     settings : Settings
         Those that were asked for.
     tried : iterable of Attempt
-        The attempts in their order, at least one of them with these settings.
+        The attempts in their order.
 
     Raises
     ------
@@ -133,6 +133,8 @@ def first_that_passes(
             hope.note(attempt, error)
         if not hope.is_left():
             break
+    if not faults:
+        raise FrontError("none of the attempts made gives a grid that passes")
     raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
 
 

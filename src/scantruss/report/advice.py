@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import takewhile
+from itertools import chain, dropwhile, takewhile, tee
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,11 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-LADDER = (1.0, 1.4, 1 / 1.4, 2.0, 0.5, 2.8)  # lengths that are tried, in the usual one
+#: lengths that are tried, in the usual one, in turn: first by what usually gives a grid (True), later by all that may
+LADDER = (
+    (1.0, True), (1.4, True), (1.0, False), (2.0, True), (1.4, False), (1 / 1.4, True), (2.8, True), (2.0, False),
+    (1 / 1.4, False), (0.5, True), (2.8, False),
+)  # fmt: skip
 NEXT = 1.4  # a length is suggested if that many times it passes too
 NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths that are tried in place of one that failed
 SURE_PER_SPACING = (
@@ -35,7 +39,7 @@ SURE_PER_SPACING = (
 )
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
-RUNS = 40.0  # quick runs that are made for a suggestion and the lengths around it
+RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 
@@ -93,19 +97,19 @@ class Advice:
         if self._runs < cost:
             return known
         settings = self._settings.replace(length=length)
-        every = attempts(self._cloud, settings)
-        tried = self._counted(_usual_attempts(every, settings) if briefly else every, cost)
+        usual, others = _usual_and_others(attempts(self._cloud, settings), settings)
+        tried = self._counted(usual if briefly else others if known is not None else chain(usual, others), cost)
         try:
             grid = first_that_passes(self._cloud, settings, tried, progress=self._show(length))
             trial = Trial(length, grid)
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(keep_rods=made.keep_rods, judge_outliers=made.judge_outliers)
         except FrontError as error:
-            trial = Trial(length, None, error)
+            trial = Trial(length, None, error) if known is None else known
         except LengthError as error:
             trial = Trial(length, None, FrontError(str(error)))
         self._found[length] = trial
-        (self._briefly.add if briefly else self._briefly.discard)(length)
+        (self._briefly.add if briefly or self._runs < cost else self._briefly.discard)(length)
         return trial
 
     def _counted(self, tried: Iterable[Attempt], cost: float) -> Iterator[Attempt]:
@@ -130,26 +134,30 @@ class Advice:
     def suggest(self) -> float:
         """Return the length to take.
 
-        It is the first of a ladder that passes with what is next above it, both without much of the scan lost, as usual grids are made;
-        else one that passes with what is next above it; else one that passes, whatever it takes; else the usual length.
+        It is the first of a ladder that passes with what is next above it, both without much of the scan lost; else of those that
+        pass with what is next above them the one that loses least; else one that passes; else the usual length.
         """
         low, high = length_range(self._cloud)
-        lengths = list(dict.fromkeys(min(max(_two_digits(share * self._usual), low), high) for share in LADDER))
-        for briefly in (True, False):
-            both = []
-            for length in lengths:
-                trial = self.try_length(length, briefly=briefly)
-                if trial is None or not trial.passed:
-                    continue
-                above = self.try_length(self.next_above(length), briefly=briefly)
-                if above is None or not above.passed:
-                    continue
-                if max(trial.lost, above.lost) <= MOST_LOST:
+        both: dict[float, float] = {}  # length -> what is lost there or at the next above
+        for share, briefly in LADDER:
+            length = min(max(_two_digits(share * self._usual), low), high)
+            trial = self.try_length(length, briefly=briefly)
+            if trial is None or not trial.passed:
+                continue
+            above = self.try_length(self.next_above(length), briefly=briefly)
+            if above is not None and above.passed:
+                both[length] = max(trial.lost, above.lost)
+                if both[length] <= MOST_LOST:
                     return length
-                both.append(length)
-            if both:
-                return both[0]
-        return next((length for length in lengths if length in self._found and self._found[length].passed), self._usual)
+        if both:
+            return min(both, key=lambda length: both[length])
+        return min(
+            (trial.length for trial in self.tried if trial.passed), key=self._far_from_usual, default=self._usual
+        )
+
+    def _far_from_usual(self, length: float) -> float:
+        """Return how far a length is from the usual one."""
+        return abs(float(np.log(length / self._usual)))
 
     def nearby(self, length: float) -> float | None:
         """Return the nearest length that passes in place of one that does not; None where none of those tried does."""
@@ -202,11 +210,14 @@ class Advice:
         return show
 
 
-def _usual_attempts(every: Iterable[Attempt], settings: Settings) -> Iterator[Attempt]:
-    """Yield the attempts with the samples and the method that were asked for, which come first."""
-    return takewhile(
-        lambda one: (one.settings.box_size, one.settings.method) == (settings.box_size, settings.method), every
-    )
+def _usual_and_others(every: Iterator[Attempt], settings: Settings) -> tuple[Iterator[Attempt], Iterator[Attempt]]:
+    """Return the attempts with the samples and the method that were asked for, which come first, and those after them."""
+
+    def is_usual(one: Attempt) -> bool:
+        return (one.settings.box_size, one.settings.method) == (settings.box_size, settings.method)
+
+    one, other = tee(every)
+    return takewhile(is_usual, one), dropwhile(is_usual, other)
 
 
 def _two_digits(length: float) -> float:
