@@ -50,7 +50,7 @@ def contains(curve, places):
 
 def outside_points(grid):
     """Points that the grid leaves out because they lie outside."""
-    return sum(part.points for part in grid.certificate.left_out if part.kind == "outside")
+    return sum(part.points for part in grid.certificate.left_out if part.words.startswith("outside of the boundary"))
 
 
 def check_ends_on(grid, curves):
@@ -77,7 +77,9 @@ def test_the_grid_ends_exactly_on_the_boundary_and_its_corners_are_nodes(method,
         assert np.linalg.norm(nodes - [x, y, height(x, y)], axis=1).min() < 1e-9
     inside = contains(square, points)
     assert abs(outside_points(grid) - (~inside).sum()) <= 3  # of those that noise puts beyond the line
-    assert grid.certificate.passed and grid.certificate.judged_out == 0.0 and grid.certificate.missing == 0.0
+    found = grid.certificate
+    assert found.passed and found.judged_out == 0.0 and found.missing == 0.0 and found.scan_within_reach == 1.0
+    assert found.points + outside_points(grid) == len(points)
     assert contains(np.array(square) * [1.001, 1.001, 1], nodes).all()
 
 

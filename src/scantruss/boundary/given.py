@@ -14,7 +14,7 @@ from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.samples import put_all
 from ..surface.owners import owners_of
-from ..surface.samples import KEPT, OUTSIDE, narrow_surface, samples_with
+from ..surface.samples import KEPT, narrow_surface, samples_with
 from .corners import CURVE_STEP
 from .curves import length_around
 from .holes import fill_holes
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
+OUTSIDE = "outside of the boundary that was given"
 BRIDGED = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
 SHORTEST = 3.0  # shortest boundary [member lengths]
 FIT = 120.0  # points of the scan that a patch under the boundary is fitted to
@@ -110,16 +111,21 @@ def cut_along(
 
 
 def _samples_inside(samples: SurfaceSamples, added: np.ndarray, inside: Inside, settings: Settings) -> SurfaceSamples:
-    """Return the samples of the points inside and of those made up over holes (F, 3); the other points are judged to be outside."""
+    """Return the samples of the points inside and of those made up over holes (F, 3); the other points count as not read."""
     owner = np.repeat(np.arange(len(samples.surface.mean)), np.diff(samples.surface.start))
     cut = samples_with(samples, added, settings, inside.holds(samples.surface.points, owner))
-    judged, measured = samples.judged.copy(), np.flatnonzero(samples.judged == KEPT)
-    points = samples.scan[measured]
-    judged[measured[~inside.holds(points, owners_of(samples, points))]] = OUTSIDE
+    kept = inside.holds(samples.scan, owners_of(samples, samples.scan)) | (samples.judged != KEPT)
     whole = samples.whole
     if whole is not None:
         whole = np.ascontiguousarray(whole[inside.holds(whole, owners_of(samples, whole))])
-    return replace(cut, judged=judged, whole=whole)
+    beyond = ((OUTSIDE, int((~kept).sum())),) if not kept.all() else ()
+    return replace(
+        cut,
+        scan=np.ascontiguousarray(samples.scan[kept]),
+        judged=samples.judged[kept],
+        unread=(*samples.unread, *beyond),
+        whole=whole,
+    )
 
 
 def _curve(

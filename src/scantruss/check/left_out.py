@@ -10,7 +10,7 @@ import numpy as np
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.owners import owners_of
-from ..surface.samples import DUPLICATE, KEPT, OUTLIER, OUTSIDE, ROD, SPARSE_POINT
+from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
 
 if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
@@ -65,8 +65,6 @@ def points_left_out(
     parts += _places("far", away[far], _groups(samples, owner[far]), samples, distance)
     parts.sort(key=lambda part: -part[0].points)
     chosen_out = _places("not chosen", away[other], samples.piece[owner[other]], samples, distance)
-    if len(which := np.flatnonzero(samples.judged == OUTSIDE)):
-        chosen_out.append(_part("outside", which, samples, distance, placed=False))
     return [*parts, *((replace(part, asked=True), which) for part, which in chosen_out)]
 
 

@@ -67,7 +67,6 @@ KINDS_LEFT_OUT = {
     "floor": "in a floor under the others",
     "sparse": "too far apart for this length",
     "not chosen": "in pieces that were not asked for",
-    "outside": "outside of the boundary that was given",
     "pieces": "in pieces too small for this length",
     "far": "farther than a member from the grid",
     "hole": "hole closed",

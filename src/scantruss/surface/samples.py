@@ -47,7 +47,7 @@ BESIDE_SAMPLES = 1.5
 NOT_FINITE = "with NaN or infinite coordinates"
 SPARSE = 0.08  # point spacing above which no larger samples are tried [member lengths]
 UNEVEN_BEND = 20.0  # largest difference of mirrored normals on a smooth scan; a ridge bends by twice as much [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, OUTSIDE = range(6)  # what a point of the scan was judged to be
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
 SOME, ALL = 8.0, 24.0  # most points of a usual sample that a patch is fitted to, on the way and in the end
 
 

@@ -26,7 +26,6 @@ COLOURS = {
     "not chosen": VIOLET,
     "rods": VIOLET,
     "floor": VIOLET,
-    "outside": VIOLET,
     "outliers": AMBER,
     "sparse": AMBER,
 }
@@ -64,6 +63,7 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
     length, samples = grid.settings.length, sample_surface(cloud, grid.settings)
     if grid.settings.boundary:
         samples, _ = find_boundary(samples, grid.settings)
+        points = samples.scan + samples.origin - grid.origin
     distance, nearest = distances_to_grid(points, grid, length)
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = desired[grid.triangles].mean(axis=1)[nearest]
