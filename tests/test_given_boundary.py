@@ -139,6 +139,24 @@ def test_two_outer_boundaries_bound_two_pieces_and_a_ring_within_a_hole_an_islan
     assert grid.topology.components == 2
 
 
+def test_of_corners_nearer_than_half_a_member_the_sharper_one_is_a_node():
+    tooth = (
+        (-4, -3),
+        (4, -3),
+        (4, 3.5),
+        (0.3, 3.5),
+        (0.0, 3.0),
+        (-0.3, 3.5),
+        (-4, 3.5),
+    )  # 0.58 along both sides, tip sharpest
+    for length, is_node in ((0.8, True), (1.4, False)):
+        grid = grid_from_points(plate(), Settings(length=length, boundary=(ring(*tooth),)))
+        check_ends_on(grid, [ring(*tooth)])
+        off = [np.linalg.norm(grid.nodes + grid.origin - [x, y, height(x, y)], axis=1).min() for x, y in tooth]
+        assert all(distance < 1e-9 for k, distance in enumerate(off) if k not in (3, 5))
+        assert (max(off[3], off[5]) < 1e-9) == is_node
+
+
 def test_a_far_frame_and_a_second_run_change_nothing():
     far = np.array([500_000.0, 4_500_000.0, 100.0])
     square = np.array(ring(*CORNERS))

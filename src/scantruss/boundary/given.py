@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 OUTSIDE = "outside of the boundary that was given"
 BRIDGED = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
 SHORTEST = 3.0  # shortest boundary [member lengths]
+CORNERS_APART = 0.5  # of two corners nearer along the boundary the sharper one is a node [member lengths]
 FIT = 120.0  # points of the scan that a patch under the boundary is fitted to
 AWAY = 1.0  # a boundary of the scan that comes no farther than this from that given is the same [member lengths]
 HARDLY = 0.05  # share of the samples beside a boundary below which there is no scan on that side
@@ -152,7 +153,19 @@ def _curve(
             f"boundary {number} leaves the scan by up to {worst:.4g}{unit}, near ({place});"
             f" it must stay within half a member, {BRIDGED * length:.4g}{unit}, which the grid bridges"
         )
-    return points, np.sort(np.array(find_corners(points, vertices, True, settings), np.int64))
+    return points, _apart(points, find_corners(points, vertices, True, settings), CORNERS_APART * length)
+
+
+def _apart(points: np.ndarray, corners: Sequence[int], distance: float) -> np.ndarray:
+    """Return the corners of a closed curve (M, 3), the sharpest first, that keep a distance along it from sharper ones, in order."""
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    around = length_around(points)
+    kept: list[int] = []
+    for corner in corners:
+        gaps = np.abs(arc[kept] - arc[corner]) if kept else np.full(1, np.inf)
+        if np.minimum(gaps, around - gaps if kept else np.inf).min() >= distance:
+            kept.append(corner)
+    return np.sort(np.array(kept, np.int64))
 
 
 def _joined(curves: Sequence[np.ndarray], length: float) -> Rings:
