@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ from shapes import make
 from typed import known
 
 import scantruss as st
+from scantruss import pipeline
+from scantruss.candidates import Attempt
 from scantruss.cli.main import main
-from scantruss.report.advice import Advice
-from scantruss.scan.member_length import length_range
+from scantruss.report.advice import SURE_PER_SPACING, Advice
+from scantruss.scan.member_length import length_range, round_length
 from scantruss.surface.samples import SurfaceSamples
 
 
@@ -111,12 +115,86 @@ def test_a_refused_length_comes_with_one_that_passes(
     assert main([*words, named]) == 0
 
 
-def test_in_place_of_a_length_that_holes_in_the_sampling_spoil_one_is_tried_first_that_they_do_not(monkeypatch):
+def test_in_place_of_a_length_that_holes_in_the_sampling_spoil_one_is_tried_that_they_do_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     cloud = cloud_of("limpet")
-    advice, tried = Advice(cloud, st.Settings(length=1.0)), []
-    monkeypatch.setattr(Advice, "try_length", lambda _, length: tried.append(length))
-    assert advice.nearby(4.0 * cloud.spacing) is None
-    assert tried[0] == pytest.approx(8.0 * cloud.spacing, rel=0.1) and len(tried) == 11
+    advice = Advice(cloud, st.Settings(length=1.0))
+    tried: list[float] = []
+    monkeypatch.setattr(Advice, "try_length", lambda _, length, **__: tried.append(length))
+    sure = round_length(SURE_PER_SPACING * cloud.spacing, "up")
+    assert advice.nearby(4.35 * cloud.spacing) is None
+    assert sure in tried
     tried.clear()
     assert advice.nearby(20.0 * cloud.spacing) is None
-    assert tried[0] == pytest.approx(22.4 * cloud.spacing, rel=0.1) and len(tried) == 10
+    assert sure not in tried and min(tried) > sure
+
+
+def counted_runs(monkeypatch: pytest.MonkeyPatch, passes: Callable[[float], bool]) -> list[float]:
+    """Let grids come out only of lengths that pass; returns the lengths of all attempts."""
+    made: list[float] = []
+    make_grid = pipeline.make_grid
+
+    def tried(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        made.append(attempt.settings.length)
+        if not passes(attempt.settings.length):
+            raise st.FrontError("the front cannot close")
+        return make_grid(cloud, attempt, **others)
+
+    monkeypatch.setattr(pipeline, "make_grid", tried)
+    return made
+
+
+def test_the_length_nearby_is_the_nearest_that_passes_and_costs_no_more_than_twenty_quick_runs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud = cloud_of("limpet")
+    failing = Advice(cloud, st.Settings(length=1.0)).suggest()
+    made = counted_runs(monkeypatch, lambda length: length > 1.15 * failing)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) == pytest.approx(1.25 * failing, rel=0.03)
+    cost = sum(max(1.0, (failing / length) ** 2) for length in made)
+    assert cost <= 20.0
+    made = counted_runs(monkeypatch, lambda length: False)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) is None
+    assert sum(max(1.0, (failing / length) ** 2) for length in made) <= 20.0 and len(set(made)) >= 4
+
+
+def test_the_suggested_length_passes_also_where_the_usual_one_and_its_neighbours_do_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    counted_runs(monkeypatch, lambda length: length > 1.5 * usual)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    length = advice.suggest()
+    assert (
+        length > 1.5 * usual
+        and known(advice.try_length(length)).passed
+        and known(advice.try_length(advice.next_above(length))).passed
+    )
+
+
+def test_info_says_which_lengths_pass_and_why_others_do_not(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = Advice(st.read_points("limpet.xyz"), st.Settings(length=1.0)).suggest()
+    counted_runs(monkeypatch, lambda length: length < 1.2 * usual)
+    assert main(["info", "limpet.xyz"]) == 0
+    said = capsys.readouterr().out
+    span = next(line for line in said.splitlines() if line.startswith("passes, of the"))
+    low, high = (float(word) for word in span.split(": ")[1].split(" to "))
+    assert low < usual <= high < 1.2 * usual
+    longer = [line for line in said.splitlines() if "no grid passes: the front cannot close" in line]
+    assert longer and all(float(line.split()[0]) > high for line in longer)
+
+
+def test_a_length_out_of_range_is_refused_with_the_nearest_that_passes(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    low, high = length_range(st.read_points("limpet.xyz"))
+    for asked, side in ((0.3 * low, low), (2.0 * high, high)):
+        assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", f"{asked:.3g}"]) == 2
+        said = capsys.readouterr().err
+        named = float(said.split("a grid passes with --length ")[1].split()[0])
+        assert low <= named <= high and abs(np.log(named / side)) < np.log(1.5)
+        assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", str(named)]) == 0

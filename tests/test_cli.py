@@ -9,11 +9,12 @@ import time
 from dataclasses import fields, replace
 from pathlib import Path
 from textwrap import indent
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import pytest
-from typed import known
+from PIL import Image
+from typed import known, xyz
 
 import scantruss as st
 from scantruss.cli import demo, grid
@@ -21,6 +22,7 @@ from scantruss.cli import main as cli
 from scantruss.cli.main import main
 from scantruss.cli.options import option_of
 from scantruss.errors import CertificateError, FrontError, words_of_place
+from scantruss.export.drawing.legend import FAULT
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
 from scantruss.scan import member_length
@@ -234,7 +236,7 @@ def test_a_length_larger_than_the_scan_is_refused(
 ) -> None:
     line = refused(capsys, *command.split(), "--length", "41")
     assert "length 41 is too large for a scan whose longest side is 40; use at most " in line
-    largest = float(line.split("at most")[1])
+    largest = float(line.split("at most")[1].split(";")[0])
     cloud = PointCloud.from_array(plate())
     assert largest == member_length.length_range(cloud)[1]
     member_length.check_length(cloud, st.Settings(length=largest))
@@ -244,7 +246,7 @@ def test_a_length_too_small_for_the_spacing_is_refused_with_one_that_does(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = refused(capsys, "grid", "scan.xyz", "a.obj", "--length", "0.01")
-    smallest = float(line.split("at least")[1].split()[0])
+    smallest = float(line.split("at least")[1].split(";")[0])
     cloud = PointCloud.from_array(plate())
     assert smallest == member_length.length_range(cloud)[0]
     member_length.check_length(cloud, st.Settings(length=smallest))
@@ -384,6 +386,50 @@ def test_a_grid_that_fails_its_certificate_is_not_written(failing: Path, capsys:
     assert "members whose lengths are" in line and "(near " in line
 
 
+@pytest.mark.parametrize("keep", [(), ("--keep-failed",)])
+def test_the_picture_of_a_grid_that_fails_is_written_and_shows_its_places_in_red(
+    failing: Path, capsys: pytest.CaptureFixture[str], keep: tuple[str, ...]
+) -> None:
+    words = ["grid", "scan.xyz", "a.png", "a.json", "--length", LENGTH, "--report", "r.json", *keep]
+    assert main(words) == 3
+    assert "wrote a.png, which shows the places in red; nothing else is written" in capsys.readouterr().err or keep
+    written = {file.name for file in failing.iterdir()} - {"scan.xyz"}
+    assert written == ({"a.png", "a.json", "a.settings.json", "r.json"} if keep else {"a.png"})
+    picture = np.asarray(Image.open("a.png").convert("RGB")).astype(float)
+    assert (np.abs(picture - 255 * FAULT).max(axis=2) < 2).sum() > 60
+
+
+def test_where_no_grid_came_out_the_picture_shows_the_place_on_the_scan(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    where = xyz(np.loadtxt("scan.xyz")[70])
+
+    def fails(*_: Any, **__: Any) -> Never:
+        raise st.FrontError("the front runs over itself", where=where)
+
+    monkeypatch.setattr("scantruss.pipeline.make_grid", fails)
+    for name, size in (("a.png", "800x600"), ("b.png", "400x700")):
+        assert main(["grid", "scan.xyz", name, "--length", LENGTH, "--size", size, "--no-clean"]) == 2
+        assert f"wrote {name}" in capsys.readouterr().err
+        picture = np.asarray(Image.open(name).convert("RGB")).astype(float)
+        red = np.argwhere(np.abs(picture - 255 * FAULT).max(axis=2) < 60)
+        low = red[red[:, 0] > 120]  # below the words
+        at = (low.min(axis=0) + low.max(axis=0)) / 2
+        assert np.linalg.norm(at[::-1] - _seen(np.loadtxt("scan.xyz"), where, picture.shape)) < 3
+
+
+def _seen(points: np.ndarray, where: tuple[float, float, float], shape: tuple[int, ...]) -> np.ndarray:
+    """Where a place is in a picture from obliquely above that the points fill to nine tenths [pixel], from the top left."""
+    turn, tilt = np.radians(-35.0), np.radians(35.0)
+    right = np.array([np.cos(turn), -np.sin(turn), 0.0])
+    up = np.array([np.sin(tilt) * np.sin(turn), np.sin(tilt) * np.cos(turn), np.cos(tilt)])
+    flat, place = points @ np.array([right, up]).T, np.array([right, up]) @ where
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    tall, wide = shape[:2]
+    at = (place - (low + high) / 2) * 0.9 * min(wide / (high - low)[0], tall / (high - low)[1])
+    return np.array([wide / 2 + at[0], tall / 2 - at[1]])
+
+
 def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(
     failing: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -406,7 +452,10 @@ def test_the_report_holds_every_figure(place: Path) -> None:
         "shape_mean shape_std shape_min length_mean length_std length_cv angle_min angle_max valence6"
         " node_deviation_mean node_deviation_max"
     )
-    names = "points nodes members triangles line_members quality before topology certificate seconds settings version made_by"
+    names = (
+        "points nodes members triangles line_members fixed_lines ridges quality before topology certificate seconds settings"
+        " version made_by"
+    )
     assert set(report) == set(names.split())
     assert set(report["quality"]) == set(report["before"]) == set(figures.split())
     assert set(report["topology"]) == set("components boundary_loops euler manifold orientable".split())

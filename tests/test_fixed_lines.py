@@ -1,8 +1,10 @@
 """Fixed lines: chains of members on the scan, through corners and meetings, that no move takes apart."""
 
+import csv
 import json
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,13 @@ from numpy.typing import ArrayLike
 from rough import rough_disc
 from typed import known
 
-from scantruss import Grid, InputError, Settings, grid_from_points
-from scantruss.cli.options import read_lines
-from scantruss.constraints.fixed_lines import divide, find_corners, simplify
+from scantruss import Grid, InputError, Settings, grid_from_points, write
+from scantruss.boundary.polylines import divide, find_corners, simplify
+from scantruss.cli.positions import read_lines
 from scantruss.constraints.network import Network, curves_of
 from scantruss.errors import FormatError
 from scantruss.export.json import encode_json, read_grid
+from scantruss.export.style import FileStyle
 from scantruss.improve.working_mesh import close_net, open_net
 from scantruss.kernels.boundary.curves import at_arc, is_open, slide
 from scantruss.kernels.mesh import grid as moves
@@ -136,6 +139,76 @@ def test_a_line_along_the_rim_is_the_rim() -> None:
     assert (grid.edge_uses[grid.edge_on_line] == 1).all()
 
 
+RIM_LINES: dict[str, tuple[tuple[float, float], ...]] = {
+    "part of one side": ((-5, -3.37), (-5, 2.71)),
+    "around a corner of the plate": ((-5, -3.37), (-5, 5), (1.4, 5)),
+    "from inside, along the rim and inside again": ((-2, 1), (-5, 1), (-5, -2.6), (-1, -2.6)),
+    "shorter than a member": ((-5, 0.2), (-5, 1.1)),
+    "the whole rim": ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5)),
+}
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+@pytest.mark.parametrize("corners", RIM_LINES.values(), ids=RIM_LINES)
+def test_a_line_along_the_rim_has_nodes_at_its_ends_and_corners_and_its_own_set(
+    method: str, corners: tuple[tuple[float, float], ...]
+) -> None:
+    grid = grid_from_points(plate(), Settings(length=1.0, method=method, fixed_lines=(over(*corners),)))
+    (line,) = grid.line_sets
+    assert (line.name, line.kind) == ("line 1", "fixed line")
+    nodes = grid.nodes + grid.origin
+    for x, y in corners:
+        assert np.linalg.norm(nodes[line.nodes] - [x, y, height(x, y)], axis=1).min() < 0.03
+    assert far_from(nodes[line.nodes], [over(*corners)]) < 0.03
+    edges = set(map(tuple, grid.edges.tolist()))
+    assert all(tuple(sorted(pair)) in edges for pair in pairwise(line.nodes.tolist()))
+    sides = np.linalg.norm(np.diff(np.array(over(*corners, step=0.01)), axis=0), axis=1)
+    assert line.length(grid) == pytest.approx(sides.sum(), rel=0.03)
+    if corners[0] != corners[-1]:  # in the order of the line
+        ends = [np.linalg.norm(np.array(over(*corners)[k]) - nodes[line.nodes[k]]) for k in (0, -1)]
+        assert max(ends) < 0.03
+
+
+def test_the_nodes_on_every_line_are_a_named_set_in_the_grid_and_its_files(tmp_path: Path) -> None:
+    lines = (over((-5, 2), (5, 2)), over((-1, -4.2), (-1, 5)), over((-5, -3.4), (-5, 4)))
+    settings = Settings(length=1.0, fixed_lines=lines, line_names=("tie", "spine; main", "eaves"))
+    grid = grid_from_points(plate(), settings)
+    sets = {line.name: set(line.nodes.tolist()) for line in grid.line_sets}
+    assert list(sets) == ["tie", "spine; main", "eaves"]
+    nodes = grid.nodes + grid.origin
+    for name, line in zip(sets, lines, strict=True):
+        assert far_from(nodes[list(sets[name])], [line]) < 0.05
+    for pair, place in ((("tie", "spine; main"), (-1, 2)), (("tie", "eaves"), (-5, 2))):
+        (shared,) = sets[pair[0]] & sets[pair[1]]
+        assert np.linalg.norm(nodes[shared] - [*place, height(*place)]) < 0.06
+    assert set(np.unique(grid.lines)) == set.union(*sets.values())
+    (tmp_path / "grid.json").write_bytes(encode_json(grid))
+    values = json.loads((tmp_path / "grid.json").read_text())
+    assert {line["name"]: set(line["nodes"]) for line in values["fixed_lines"]} == sets and values["ridges"] == []
+    again = read_grid(tmp_path / "grid.json")
+    assert (
+        encode_json(again) == encode_json(grid)
+        and again.line_sets[1].nodes.tolist() == grid.line_sets[1].nodes.tolist()
+    )
+    for comma in (False, True):
+        write(grid, tmp_path / "grid.csv", style=FileStyle(decimal_comma=comma))
+        with (tmp_path / "grid_nodes.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file, delimiter=";" if comma else ","))
+        found = {name: {int(row["id"]) for row in rows if name in row["lines"].split("|")} for name in sets}
+        assert found == sets
+
+
+def test_two_lines_of_one_name_have_one_set_and_names_must_fit() -> None:
+    lines = (over((-3, -3), (3, -3)), over((-3, 2), (3, 2)))
+    grid = grid_from_points(plate(), Settings(length=1.0, fixed_lines=lines, line_names=("tie", "tie")))
+    (line,) = grid.line_sets
+    assert set(np.round(grid.nodes[line.nodes, 1] + grid.origin[1], 1)) == {-3.0, 2.0}
+    wrong: tuple[Any, ...] = (("tie",), "tie", ("tie", ""), ("tie", 5))
+    for names in wrong:
+        with pytest.raises(InputError, match="line_names"):
+            Settings(length=1.0, fixed_lines=lines, line_names=names)
+
+
 def test_lines_stay_through_all_efforts_and_the_same_input_gives_the_same_bytes() -> None:
     lines = (over((-5, 0), (5, 0)), over((0, -5), (0.5, 5)))
     for effort in ("quick", "best"):
@@ -181,7 +254,14 @@ def test_lines_that_cannot_be_are_refused(line: list[tuple[float, float, float]]
 def test_a_file_may_hold_several_polylines(tmp_path: Path) -> None:
     file = tmp_path / "lines.csv"
     file.write_text("x,y,z\n0,0,0\n1,0,0\n# a note\n2,0,0\n\n\n0;1;0\n1;1;0\n")
-    assert read_lines(file) == [[(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 0), (1, 1, 0)]]
+    assert read_lines(file) == [
+        ("lines-1", [(0, 0, 0), (1, 0, 0), (2, 0, 0)]),
+        ("lines-2", [(0, 1, 0), (1, 1, 0)]),
+    ]
+    file.write_text("name,x,y,z\nring beam,0,0,0\nring beam,1,0,0\ntie,0,1,0\ntie,1,1,0\n")
+    assert read_lines(file) == [("ring beam", [(0, 0, 0), (1, 0, 0)]), ("tie", [(0, 1, 0), (1, 1, 0)])]
+    file.write_text("0 0 0\n1 0 0\n")
+    assert read_lines(file) == [("lines", [(0, 0, 0), (1, 0, 0)])]
     for text, words in (("0 0 0\n\n1 0 0\n", "polyline 1 of .* has 1 point"), ("a b c\n", "holds no fixed lines")):
         file.write_text(text)
         with pytest.raises(FormatError, match=words):

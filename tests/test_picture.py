@@ -1,7 +1,9 @@
 """Pictures: what is seen, from where, and the same bytes each time."""
 
 import io
+import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,7 @@ import pytest
 from numpy.typing import ArrayLike
 from PIL import Image
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
-from typed import known
+from typed import known, xyz
 
 import scantruss as st
 from scantruss.export.drawing.camera import choose_camera, facing_of, likely_upward, map_depth
@@ -266,3 +268,17 @@ def test_places_of_faults_and_warnings_are_marked_with_their_words() -> None:
 def test_a_grid_plots_itself_as_an_image() -> None:
     image = dome().plot(view=("top", "front"), size=(600, 400))
     assert image.size == (600, 400) and hasattr(image, "_repr_png_")
+
+
+def test_more_places_of_a_fault_are_small_rings_of_its_colour() -> None:
+    grid, cloud = dome(), cloud_over(dome())
+    places = [xyz(grid.nodes[n] + grid.origin) for n in (3, 30, 60)]
+    none = Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0)
+    counts = []
+    for also in ((), tuple(places[1:])):
+        fault = Fault("short", "has a member of 0.30 desired lengths", places[0], also)
+        marked = grid.replace(certificate=replace(none, faults=(fault,)))
+        counts.append(has_colour(pixels(encode_picture(marked, cloud)), FAULT))
+    assert counts[1] > counts[0] + 30
+    again = Certificate.from_dict(json.loads(json.dumps(known(marked.certificate).to_dict())))
+    assert again.faults == known(marked.certificate).faults

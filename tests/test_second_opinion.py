@@ -146,7 +146,8 @@ def compare(
 
 def compare_topology(grid: st.Grid, found: Certificate, steps: Steps) -> None:
     """Compare pieces, loops, Euler number, sides and irregular nodes with what plain graphs of nodes and triangles say."""
-    at: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)  # triangles at a member, and whether they run along it
+    # triangles at each member, with the direction in which they run along it
+    at: dict[tuple[int, int], list[tuple[int, bool]]] = defaultdict(list)
     for number, triangle in enumerate(grid.triangles.tolist()):
         for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True):
             at[min(a, b), max(a, b)].append((number, a < b))

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scantruss.cli.options import Parser as OptionParser
-from scantruss.cli.options import add_settings, option_of, read_positions, settings_of
+from scantruss.cli.options import add_settings, option_of, settings_of
+from scantruss.cli.positions import read_positions
 from scantruss.errors import FormatError, InputError
 from scantruss.settings import Settings
 

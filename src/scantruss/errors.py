@@ -2,6 +2,7 @@
 
 ScanTrussError
     InputError     data or a setting cannot be used (also a ValueError)
+      LengthError      the member length cannot be used with this scan
     FrontError     the front stopped early; has .grid, what was reached, and .where
       CertificateError   a whole grid that does not pass; .grid has its certificate
     FormatError    a file cannot be read or written
@@ -21,6 +22,10 @@ class ScanTrussError(Exception):
 
 class InputError(ScanTrussError, ValueError):
     """Data or a setting cannot be used."""
+
+
+class LengthError(InputError):
+    """A member length cannot be used with this scan."""
 
 
 class FrontError(ScanTrussError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
 
@@ -89,13 +90,41 @@ def grid_from_cloud(
     """
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
+    try:
+        return first_that_passes(cloud, settings, attempts(cloud, settings), progress=watch).replace(
+            seconds=watch.seconds()
+        )
+    except CertificateError as error:
+        if not keep_failed or not len(error.grid.triangles):
+            raise
+        return error.grid.replace(settings=settings, seconds=watch.seconds())
+
+
+def first_that_passes(
+    cloud: PointCloud, settings: Settings, tried: Iterable[Attempt], *, progress: Progress | None = None
+) -> Grid:
+    """Return the grid of the first attempt that passes the checks.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+        Those that were asked for.
+    tried : iterable of Attempt
+        The attempts in their order.
+
+    Raises
+    ------
+    FrontError
+        None passes; the fault of the first with the settings asked for that gave a grid, else of the first.
+    """
     faults: list[FrontError] = []
     hope = Hope()
-    for attempt in attempts(cloud, settings):
+    for attempt in tried:
         if not hope.allows(attempt):
             continue
         try:
-            return make_grid(cloud, attempt, progress=watch).replace(seconds=watch.seconds())
+            return make_grid(cloud, attempt, progress=progress)
         except ScanTrussError as error:
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
                 if not isinstance(error, FrontError):
@@ -104,10 +133,9 @@ def grid_from_cloud(
             hope.note(attempt, error)
         if not hope.is_left():
             break
-    first = next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
-    if keep_failed and isinstance(first, CertificateError) and len(first.grid.triangles):
-        return first.grid.replace(settings=settings, seconds=watch.seconds())
-    raise first
+    if not faults:
+        raise FrontError("none of the attempts made gives a grid that passes")
+    raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
 
 
 def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:

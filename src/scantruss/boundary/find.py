@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import LengthError
 from ..kernels.boundary import loops as kernels
 from ..kernels.boundary.curves import Curves
 from ..kernels.mesh.point_location import nearest_sample
@@ -22,6 +22,7 @@ from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_
 from ..surface.scratch import with_own_scratch
 from .corners import CURVE_STEP
 from .curves import cut_spikes, length_around, resample, smooth_turns
+from .given import cut_along
 from .holes import fill_holes
 from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
@@ -116,7 +117,7 @@ def find_boundary(
     samples : SurfaceSamples
         The surface samples of the scan.
     settings : Settings
-        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`.
+        `boundary_radius` (disc rolled along the boundary), `corner_angle`, `fill_holes`, `length`; `boundary`, given in its place.
     progress : callable, optional
         Called with ("boundary", share); may raise to stop.
 
@@ -129,17 +130,17 @@ def find_boundary(
 
     Raises
     ------
-    InputError
+    LengthError
         The scan falls apart into pieces that are all smaller than a member.
     """
     if samples.area == 0.0:
-        raise InputError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
+        raise LengthError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
     kept = _KEPT.get(samples)
     if kept is None or kept[0] != settings:
         check_two_sided(samples.surface, samples.thickness)
         if progress:
             progress("boundary", 0.4)
-        filled, boundary = _close_holes(samples, settings)
+        filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
         kept = _KEPT[samples] = (
             settings,
             filled if filled is not samples else None,
@@ -162,6 +163,18 @@ def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSa
         loops = _external_first([loop for loop in found if not _over_filling(loop.points, samples)])
         bridged = [curve for curve in bridged if not _over_filling(curve, samples)]
     return samples, Boundary(loops, tuple(bridged))
+
+
+def _given(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSamples, Boundary]:
+    """Return the samples inside the boundary that the user gives, with the other holes of the scan closed, and that boundary."""
+    scanned = [(loop.points, loop.piece) for loop in _external_first(_find_loops(samples, settings)[0])]
+    inside, rings = cut_along(samples, scanned, settings)
+    surface = inside.surface
+    loops = [
+        Loop(ring.points, ring.corner_at, ring.external, length_around(ring.points), ring.piece, field_along(surface, ring.points))
+        for ring in rings
+    ]  # fmt: skip
+    return inside, Boundary(tuple(sorted(loops, key=lambda loop: (not loop.external, -loop.length))))
 
 
 def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop], list[np.ndarray]]:

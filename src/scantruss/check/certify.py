@@ -33,9 +33,6 @@ COVER_REACH = (
     0.5  # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
 )
 
-SURE_PER_SPACING = (
-    8.0  # distances between points in a member from which on holes in the sampling are seldom taken for holes
-)
 MOST_FAULTS = 3  # faults that a refusal names
 
 
@@ -95,10 +92,7 @@ def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     more = len(certificate.faults) - MOST_FAULTS
     words += f" and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
-    enough = SURE_PER_SPACING * samples.spacing
-    length = f"members of {enough:.2g} or more" if settings.length < enough else "another length"
-    advice = f"try {length}, or clean the scan; --keep-failed gives the grid all the same"
-    raise CertificateError(f"the grid {words}; {advice}", grid, where)
+    raise CertificateError(f"the grid {words}; --keep-failed gives it all the same", grid, where)
 
 
 def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:

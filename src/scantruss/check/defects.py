@@ -11,6 +11,7 @@ from ..grid.certificate import Certificate, Fault, Place, place_of
 from ..grid.topology import pinched_nodes
 from ..kernels.geometry.components import component_labels
 from .crossings import MOST_CROSSINGS
+from .limits import MOST_PLACES
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -81,8 +82,10 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
     if len(crossings):
         pairs = "a pair" if len(crossings) == 1 else f"{len(crossings)} pairs"
         more = " or more" if len(crossings) == MOST_CROSSINGS else ""
-        where = place_of(grid.nodes[grid.triangles[crossings[0]]].mean(axis=(0, 1)) + grid.origin)
-        faults.append(Fault("crossing", f"has {pairs}{more} of triangles that cut each other", where))
+        middles = grid.nodes[grid.triangles[crossings]].mean(axis=(1, 2)) + grid.origin
+        where, *others = (place_of(middle) for middle in middles[:MOST_PLACES])
+        words = f"has {pairs}{more} of triangles that cut each other"
+        faults.append(Fault("crossing", words, where, tuple(others)))
     quality = grid.quality
     uneven = quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
     if uneven > UNEVEN_LENGTHS and found.longest_member:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
-from ..kernels.scan.nearby import nearest_places
+from ..surface.owners import owners_of
 from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def points_left_out(
         if len(which := np.flatnonzero(samples.judged == judged)):
             parts.append(_part(kind, which, samples, distance))
     away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
-    owner = _owners(samples, away)
+    owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
     other = small & np.isin(samples.piece[owner], samples.not_chosen)
     floor = other & (samples.piece[owner] == (-1 if samples.floor is None else samples.floor))
@@ -91,14 +91,6 @@ def _places(
     parts = [_part(kind, which[number == each], samples, distance) for each in largest[:MOST_PLACES]]
     rest = np.isin(number, largest[MOST_PLACES:])
     return [*parts, *([_part(kind, which[rest], samples, distance, placed=False)] if rest.any() else [])]
-
-
-def _owners(samples: SurfaceSamples, which: np.ndarray) -> np.ndarray:
-    """Return the sample nearest to some points (K,), -1 where none is near."""
-    owner = np.empty(len(which), np.int64)
-    near = 2.0 * max(samples.surface.radius, samples.spacing)
-    nearest_places(samples.scan[which], samples.boxes, samples.surface.mean, near, owner, 0, len(which))
-    return owner
 
 
 def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ WARN_SHORT, WARN_LONG = 0.6, 1.6  # members below and above which they are poor 
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISE = 3.0  # rms distances of points from their plane that are noise
+MOST_PLACES = 30  # places of a fault that are kept, the worst first
 WARN_LEFT_OUT = 0.01  # share of the points that ScanTruss may leave out by itself without a word
 
 
@@ -42,9 +43,10 @@ class Figure:
         bad = np.flatnonzero(sign * self.values > sign * limit)
         if not len(bad):
             return None
-        at = bad[np.argmax(sign * self.values[bad])]
+        worst = bad[np.argsort(-sign * self.values[bad], kind="stable")]
         more = f" ({len(bad):,} such places)" if len(bad) > 1 else ""
-        return Fault(self.kind, self.words.format(self.values[at]) + more, place_of(self.places[at]))
+        at, *others = (place_of(place) for place in self.places[worst[:MOST_PLACES]])
+        return Fault(self.kind, self.words.format(self.values[worst[0]]) + more, at, tuple(others))
 
 
 def limits_of(grid: Grid, found: Distances, settings: Settings) -> tuple[list[Fault], list[Fault]]:
@@ -72,6 +74,8 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     corners = grid.nodes[grid.triangles[shapeable]].reshape(-1, 3) + grid.origin
     folds = fold_angles(grid)
     measured = np.isfinite(found.nodes) & ~grid.fixed
+    if settings.boundary:  # its nodes lie where the user says
+        measured[grid.edges[grid.edge_uses == 1]] = False
     off = np.maximum(found.nodes - NOISE * found.noise, 0.0)[measured] / at_nodes[measured]
     return [
         Figure("angle", grid.angles[shapeable].ravel(), corners, settings.min_angle, WARN_ANGLE,

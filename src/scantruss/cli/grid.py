@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ..errors import CertificateError, FormatError, FrontError
+from ..errors import CertificateError, FormatError, FrontError, LengthError
 from ..export.drawing.style import VIEWS
 from ..export.style import OBJ_ELEMENTS, FileStyle
 from .outputs import claim, inputs_of, outs_of
@@ -100,7 +100,11 @@ def grid(values: Namespace) -> None:
         spent = perf_counter() - started
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)
-        result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+        try:
+            result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+        except FrontError as error:
+            draw_refusal(error, cloud, outs, style, bars, force=values.force)
+            raise
     from ..export.formats import write
 
     written: list[Path] = []
@@ -146,17 +150,17 @@ def make_grid(
 ) -> Grid:
     """Run the chain, with a note if kernels must be compiled."""
     from ..pipeline import grid_from_cloud
-    from ..scan.member_length import check_length
 
-    check_length(cloud, settings)
     with note_compiling(bars):
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
+        except LengthError as error:
+            raise LengthError(f"{error}{nearby_words(bars, cloud, settings)}") from None
         except FrontError as error:
             note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)
-            note_nearby(bars, cloud, settings)
-            raise error
+            words = f"{error}{nearby_words(bars, cloud, settings)}"
+            raise type(error)(words, error.grid, error.where) from None
     if grid.settings is not None and grid.settings.judge_outliers != settings.judge_outliers:
         bars.note(
             "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always"
@@ -189,17 +193,32 @@ def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings
     return settings.replace(length=length)
 
 
-def note_nearby(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
     """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
 
     if settings.length_field:
-        return
+        return ""
     unit = f" {cloud.unit}" if cloud.unit else ""
     if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
-        bars.note(f"a grid passes with --length {length:g}{unit} (tried with --effort quick)")
-    else:
-        bars.note(f"no grid passes with the lengths tried near {settings.length:g}{unit} either")
+        return f"; a grid passes with --length {length:g}{unit} (tried with --effort quick)"
+    return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either"
+
+
+def draw_refusal(
+    error: FrontError, cloud: PointCloud, outs: Sequence[Path], style: FileStyle, bars: Bars, *, force: bool
+) -> None:
+    """Write the pictures among the results, with the places of the faults in red; nothing else is written."""
+    from ..export.drawing.refusal import encode_refusal
+    from ..runtime.files import SaveTogether
+
+    pictures = [out for out in outs if out.suffix.lower() == ".png"]
+    if not pictures:
+        return
+    with SaveTogether("" if force else "result") as save:
+        for out in pictures:
+            save.beside(out).write_bytes(encode_refusal(error, cloud, style=style))
+    bars.note(f"wrote {' '.join(map(str, pictures))}, which shows the places in red; nothing else is written")
 
 
 def show_grid(result: Grid, points: int, written: Sequence[Path]) -> None:

@@ -27,7 +27,7 @@ def info_parser() -> Parser:
     parser = Parser(
         "info",
         "SCAN [options]",
-        "Points, extent, spacing, noise and boundaries of a scan, and the results of three member lengths.",
+        "Points, extent, spacing, noise and boundaries of a scan, and the results of some member lengths.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN)
     add_memory(parser)
@@ -39,7 +39,8 @@ def info(values: Namespace) -> None:
     """Print what a scan holds."""
     from ..boundary.find import find_boundary
     from ..report.advice import Advice
-    from ..report.figures import advice_lines, advice_rows, cloud_lines, loop_rows
+    from ..report.figures import cloud_lines, loop_rows
+    from ..report.lengths import advice_lines, advice_rows
     from ..report.terminal import Bars, print_lines, print_table
     from ..scan.member_length import check_length, length_range
     from ..surface.samples import sample_surface

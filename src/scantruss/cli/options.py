@@ -13,11 +13,10 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ..errors import FormatError, InputError
+from ..errors import InputError
 from ..selection import Selection, read_crop
 from ..settings import CURVATURE, RECORDS, Settings
-
-Position = tuple[float, float, float]
+from .positions import position, read_lines, read_positions
 
 
 class UsageError(InputError):
@@ -145,88 +144,6 @@ def picture_size(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def position(text: str) -> Position:
-    """Return the three coordinates of "X,Y,Z" (comma, semicolon or space between them)."""
-    try:
-        x, y, z = (float(word) for word in re.split(r"[,;\s]+", text.strip()))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"needs three numbers X,Y,Z, got {text!r}") from None
-    return x, y, z
-
-
-def read_positions(path: str | Path) -> list[Position]:
-    """Return the positions in a text file: three numbers a line, any separator, header or not.
-
-    Columns named x, y and z are taken where a header names them, else the first three.
-
-    Raises
-    ------
-    FormatError
-        The file cannot be read, or a line holds no position.
-    """
-    return [place for part in _read_parts(path, "fixed nodes") for place in part]
-
-
-def read_lines(path: str | Path) -> list[list[Position]]:
-    """Return the polylines in a text file: their points as `read_positions` takes them, an empty line between two of them.
-
-    Raises
-    ------
-    FormatError
-        The file cannot be read, a line holds no position, or a polyline has fewer than two points.
-    """
-    found = _read_parts(path, "fixed lines")
-    for number, part in enumerate(found, 1):
-        if len(set(part)) < 2:
-            which = f"polyline {number} of {path}" if len(found) > 1 else path
-            raise FormatError(f"{which} has {len(set(part))} point; a fixed line needs at least two different ones")
-    return found
-
-
-def _read_parts(path: str | Path, what: str) -> list[list[Position]]:
-    """Return the positions in a text file, in parts that empty lines divide."""
-    try:
-        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise FormatError(f"cannot read {what} {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FormatError(f"{path} is not a text file; {what} need a CSV file with three numbers a line") from None
-    found: list[list[Position]] = []
-    columns = [0, 1, 2]
-    header = False
-    begins = True
-    for count, line in enumerate(lines, 1):
-        words = _words(line)
-        if not words:
-            begins = begins or not line.strip()
-            continue
-        try:
-            x, y, z = (float(words[column]) for column in columns)
-        except (ValueError, IndexError):
-            names = [word.lower() for word in words]
-            if found or header:
-                raise FormatError(f"{path}, line {count}: needs three numbers X,Y,Z, got {line.strip()!r}") from None
-            header = True
-            columns = [names.index(axis) for axis in "xyz"] if {"x", "y", "z"} <= set(names) else columns
-            continue
-        if begins:
-            found.append([])
-        begins = False
-        found[-1].append((x, y, z))
-    if not found:
-        raise FormatError(f"{path} holds no {what}; it needs three numbers X,Y,Z a line")
-    return found
-
-
-def _words(line: str) -> list[str]:
-    """Split a line of a text file; with semicolons or tabs between the numbers a comma is a decimal comma."""
-    line = re.split(r"#|//", line)[0].replace('"', "").strip()
-    if re.search(r"[;\t]", line):
-        words = [word.strip() for word in re.split(r"[;\t]", line)]
-        return [re.sub(r"^(-?\d*),(\d+)$", r"\1.\2", word) for word in words if word]
-    return [word for word in re.split(r"[,\s]+", line) if word]
-
-
 _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
     "float": (number, "NUMBER"),
     "float | None": (number_or_none, "NUMBER"),
@@ -236,10 +153,9 @@ _KINDS: dict[str, tuple[Callable[[str], Any], str]] = {
 
 
 def option_of(name: str) -> str:
-    """Return the option of a field; a length field is a value of ``--length``."""
-    return "--" + {"fixed_lines": "fixed_line", "classes": "class"}.get(name, name).removesuffix("_field").replace(
-        "_", "-"
-    )
+    """Return the option of a field; a length field is a value of ``--length``, names of lines come with ``--fixed-line``."""
+    renamed = {"fixed_lines": "fixed_line", "line_names": "fixed_line", "classes": "class"}
+    return "--" + renamed.get(name, name).removesuffix("_field").replace("_", "-")
 
 
 def describe(spec: Field[Any]) -> str:
@@ -255,7 +171,7 @@ def describe(spec: Field[Any]) -> str:
 
 #: everyday settings, and those that matter only to `--method paper` and fronts without a lattice; the rest is for experts
 EVERY_DAY = (
-    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
+    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "boundary", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
 )  # fmt: skip
 PAPER_ONLY = (
     "advance_from", "shape_weight", "size_weight", "length_weight", "search_range", "nearness", "merge_angle", "case3",
@@ -263,9 +179,12 @@ PAPER_ONLY = (
 )  # fmt: skip
 
 
+WITH_OTHERS = ("length_field", "line_names")  #: settings that the options of others set too
+
+
 def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
     """Add one option for every field of `Settings` in three parts, or for the named ones; only options that are given are set."""
-    specs = [spec for record in RECORDS for spec in fields(record) if spec.name != "length_field"]
+    specs = [spec for record in RECORDS for spec in fields(record) if spec.name not in WITH_OTHERS]
     if names:
         _add_options(parser.add_argument_group("the scan"), (spec for spec in specs if spec.name in names))
         return
@@ -289,9 +208,11 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
             options["help"] += "; repeatable"
         elif spec.name == "length":
             options |= {"type": length_or_field, "metavar": "NUMBER|FILE|curvature:MIN:MAX"}
-        elif spec.name == "fixed_lines":
+        elif spec.name in ("fixed_lines", "boundary"):
             options |= {"action": "append", "metavar": "FILE"}
-            options["help"] += "; a text file of points X,Y,Z with an empty line between polylines; repeatable"
+            options["help"] += (
+                "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
+            )
         elif spec.name == "classes":
             options |= {"action": "append", "metavar": "NUMBER,..."}
             options["help"] += "; repeatable"
@@ -346,7 +267,11 @@ def settings_of(values: argparse.Namespace) -> Settings:
         explicit["length_field"] = named if named.startswith(CURVATURE) else read_lengths(named)
         kept.pop("length", None)
     if "fixed_lines" in explicit:
-        explicit["fixed_lines"] = tuple(line for path in explicit["fixed_lines"] for line in read_lines(path))
+        named_lines = [line for path in explicit["fixed_lines"] for line in read_lines(path)]
+        explicit["fixed_lines"] = tuple(points for _, points in named_lines)
+        explicit["line_names"] = tuple(name for name, _ in named_lines)
+    if "boundary" in explicit:
+        explicit["boundary"] = tuple(ring for path in explicit["boundary"] for _, ring in read_lines(path, "boundary"))
     merged = kept | explicit
     if "length" not in merged and not merged.get("length_field"):
         raise UsageError(

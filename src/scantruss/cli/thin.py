@@ -32,7 +32,9 @@ def thin_parser() -> Parser:
     parser.add_argument(
         "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
     )
-    parser.add_argument("--boundary", action="store_true", help="also keep the outermost points at the boundary")
+    parser.add_argument(
+        "--boundary", dest="outermost", action="store_true", help="also keep the outermost points at the boundary"
+    )
     add_workers(parser)
     add_reading(parser)
     return parser
@@ -71,7 +73,7 @@ def thin(values: Namespace) -> None:
                 bars.note(f"{source.path} cannot be read in parts, so it is read whole")
         with note_compiling(bars):
             result = thin_open_scan(
-                scan, values.spacing, keep=values.keep, boundary=values.boundary, workers=workers, progress=bars
+                scan, values.spacing, keep=values.keep, boundary=values.outermost, workers=workers, progress=bars
             )
         check_enough(result, values.spacing, "--spacing")
         report_cloud(bars, result)
@@ -79,7 +81,7 @@ def thin(values: Namespace) -> None:
         with SaveTogether("" if values.force else "cloud") as save:
             for out in outs:
                 write_points(save.beside(out), result.points, unit=result.unit)
-    boundary = f", {result.boundary:,} of them along the boundary" if values.boundary else ""
+    boundary = f", {result.boundary:,} of them along the boundary" if values.outermost else ""
     line = f"{result.read:,} points thinned to {len(result.points):,}{boundary}; wrote {' '.join(map(str, outs))}"
     print_lines([line, *(note for out in outs for note in cloud_file_notes(out))])
 

@@ -92,10 +92,15 @@ def link_around(front: lists.Front, node: int) -> None:
         lists.link(front, s, t)
 
 
-def check_links(front: lists.Front) -> None:
+def check_links(front: lists.Front, origin: np.ndarray) -> None:
     """Refuse an initial front whose segments are not closed loops, each followed by one of its own: lines have met where they cannot.
 
     All that takes segments off the front leaves closed loops closed, so every loop over them ends.
+
+    Parameters
+    ----------
+    front : Front
+    origin : (3,) of the cloud [scan unit]
 
     Raises
     ------
@@ -107,7 +112,7 @@ def check_links(front: lists.Front) -> None:
     following = front.next[live]
     broken = (following < 0) | (front.previous[following] != live) | (front.tail[following] != front.head[live])
     if broken.any():
-        x, y, z = front.nodes[front.head[live[broken][0]]].tolist()
+        x, y, z = (front.nodes[front.head[live[broken][0]]] + origin).tolist()
         raise FrontError(
             "two lines meet where no member has room between them; use a smaller length, or --ridge-angle 0",
             where=(x, y, z),
@@ -124,7 +129,7 @@ def line_members(front: lists.Front) -> np.ndarray:
 
 
 def check_kept(members: np.ndarray, triangles: np.ndarray, nodes: np.ndarray) -> None:
-    """Refuse a front that has left out a member (K, 2) of a line.
+    """Refuse a front that has left out a member (K, 2) of a line; nodes (N, 3) in the scan's own frame.
 
     Raises
     ------

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.polylines import divide, feet_on_scan, find_corners, simplify
 from ..errors import InputError
-from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, walk
+from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
 
 if TYPE_CHECKING:
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 
 LINE_STEP = 0.05  # distance between the points of a line [member lengths]
 ZIGZAG = 0.005  # zigzags of a polyline below this are straightened first [member lengths]
-COARSE = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
 FIT = 120.0  # points of the scan that a patch under a line is fitted to
 RETURN = 1.5  # a line that comes back to itself after this length meets itself [member lengths]
 SHORTEST = 0.5  # shortest open line [member lengths]
@@ -36,6 +34,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
     """
     patches = narrow_surface(samples, FIT)
     for number, line in enumerate(settings.fixed_lines, 1):
+        name = settings.line_names[number - 1] if settings.line_names else f"line {number}"
         given = np.array(line, float) - samples.origin
         _check_on_scan(given, line, number, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
@@ -46,7 +45,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
         corners = find_corners(points, vertices, closed, settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
-            network.add(part, ring, own)
+            network.add(part, ring, own, name=name)
 
 
 def _unit(unit: str) -> str:
@@ -82,85 +81,17 @@ def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, lengt
         )
 
 
-def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
-    """Return the points (K, 3) of a polyline that are needed to keep it within a tolerance (Douglas and Peucker).
-
-    Of a closed one, whose last point is its first, the point farthest from the first is kept too.
-    """
-    kept = np.zeros(len(points), bool)
-    kept[[0, -1]] = True
-    stack = [(0, len(points) - 1)]
-    if closed:
-        middle = int(((points - points[0]) ** 2).sum(axis=1).argmax())
-        kept[middle] = True
-        stack = [(0, middle), (middle, len(points) - 1)]
-    while stack:
-        first, last = stack.pop()
-        if last - first < 2:
-            continue
-        inner = points[first + 1 : last]
-        chord = points[last] - points[first]
-        share = np.clip((inner - points[first]) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0)
-        away = np.linalg.norm(inner - points[first] - share[:, None] * chord, axis=1)
-        if away.max() > tolerance:
-            at = first + 1 + int(away.argmax())
-            kept[at] = True
-            stack += [(first, at), (at, last)]
-    found: np.ndarray = points[kept]
-    return found
-
-
-def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (M, 3) at most a step apart along a polyline, its vertices among them, and which those are.
-
-    The first point of a closed line, given again as its last, is not repeated.
-    """
-    parts, at = [], [0]
-    for a, b in pairwise(vertices):
-        count = max(int(np.ceil(np.linalg.norm(b - a) / step)), 1)
-        parts.append(a + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (b - a))
-        at.append(at[-1] + count)
-    if closed:
-        return np.concatenate(parts), np.array(at[:-1])
-    return np.concatenate([*parts, vertices[-1:]]), np.array(at)
-
-
-def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
-    """Return which of the points (M, 3) of a line are corners, the sharpest first: where it turns by more than `corner_angle`."""
-    places = points[vertices]
-    whole = np.concatenate([places, places[:1]]) if closed else places
-    coarse = simplify(whole, COARSE * settings.length, closed)
-    before, after = np.diff(coarse, axis=0), np.diff(coarse, axis=0)[1:]
-    if closed:
-        after = np.concatenate([after, before[:1]])
-    else:
-        before = before[:-1]
-    cosine = (before * after).sum(axis=1)
-    cosine /= np.maximum(np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1), 1e-300)
-    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    sharp = np.flatnonzero(turn > settings.corner_angle)
-    sharp = sharp[np.argsort(-turn[sharp], kind="stable")]
-    return [int(vertices[((places - coarse[k + 1]) ** 2).sum(axis=1).argmin()]) for k in sharp]
-
-
 def _onto_scan(points: np.ndarray, number: int, samples: SurfaceSamples, surface: Surface, length: float) -> np.ndarray:
     """Bring the points (M, 3) of a line down onto the scan; refuse a line that leaves it between its own points."""
-    patch, feet, sample = np.zeros(PATCH), np.empty_like(points), -1
-    for k, place in enumerate(points.tolist()):
-        at = (place[0], place[1], place[2])
-        sample = walk(surface, sample, at) if sample >= 0 else nearest_sample(surface, *at)
-        if np.linalg.norm(surface.mean[sample] - points[k]) > 0.5 * length:
-            sample = nearest_sample(surface, *at)
-        fit_patch(surface, patch, sample, at)
-        feet[k] = onto_patch(patch, at)
-        gap = float(np.linalg.norm(feet[k] - points[k]))
-        beside = float(np.linalg.norm(surface.mean[sample] - points[k])) - 2.0 * surface.radius
-        if (gap := max(gap, beside)) > 0.5 * length:
-            unit = _unit(samples.unit)
-            raise InputError(
-                f"fixed line {number} leaves the scan by {gap:.4g}{unit} near {_text(points[k] + samples.origin)};"
-                f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
-            )
+    feet, gaps = feet_on_scan(points, surface)
+    away = np.flatnonzero(gaps > 0.5 * length)
+    if len(away):
+        unit = _unit(samples.unit)
+        raise InputError(
+            f"fixed line {number} leaves the scan by {gaps[away[0]]:.4g}{unit} near"
+            f" {_text(points[away[0]] + samples.origin)};"
+            f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
+        )
     return feet
 
 

@@ -21,6 +21,16 @@ FADE = 0.6  # length over which a line is bent towards a meeting [member lengths
 
 
 @dataclass(frozen=True, eq=False)
+class WholeLine:
+    """A fixed line or ridge as a whole, parts included that run along the boundary or another line."""
+
+    name: str
+    ridge: bool
+    points: np.ndarray  #: (K, 3) on the scan
+    closed: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Lines:
     """Curves of which each becomes a chain of members from stop to stop."""
 
@@ -30,6 +40,7 @@ class Lines:
     ends: np.ndarray  #: (S, 2) int64 stops at the ends of each curve, -1 for a ring without stops
     sharp: np.ndarray  #: (S,) bool, a ridge: the local surface would round it off
     along: tuple[np.ndarray, ...] = ()  #: (K, 3) each, parts of lines that run along the boundary or another line
+    whole: tuple[WholeLine, ...] = ()  #: all lines, fixed ones first
 
     @cached_property
     def arrays(self) -> Curves:
@@ -92,19 +103,25 @@ class Network:
         self.places: list[np.ndarray] = []
         self.tracks: list[Track] = []
         self.along: list[np.ndarray] = []
+        self.whole: list[WholeLine] = []
+        # stops at ends and corners of parts of fixed lines that run along the boundary
+        self.ends_along: set[int] = set()
         for number, (points, corners) in enumerate(loops):
             track = Track(points, True, number)
             for i in corners.tolist():
                 track.stops.append((float(track.arrays.arc[i]), self._new_stop(points[i])))
             self.tracks.append(track)
 
-    def add(self, points: np.ndarray, closed: bool, corners: Sequence[int], *, sharp: bool = False) -> None:
+    def add(
+        self, points: np.ndarray, closed: bool, corners: Sequence[int], *, name: str = "", sharp: bool = False
+    ) -> None:
         """Add a line.
 
         Parameters
         ----------
         points : (M, 3), on the scan, in small steps; the first of a closed line is not repeated
         corners : points of it that become nodes, the sharpest first
+        name : of the set of its nodes
         sharp : whether it is a ridge
         """
         marks = {int(i) for i in corners}
@@ -118,7 +135,8 @@ class Network:
             points = np.roll(points, -far, axis=0)
             near = [(np.roll(distance, -far), np.roll(arc, -far)) for distance, arc in near]
             order = [(i - far) % len(points) for i in order]
-        joints, dropped = self._joints(points, near)
+        self.whole.append(WholeLine(name, sharp, points, closed))
+        joints, dropped = self._joints(self.whole[-1], near, order)
         if closed and not joints:
             if not near or min(float(distance.max()) for distance, _ in near) > MEETING_DISTANCE * self.length:
                 self._add_track(points, True, order, [], sharp)
@@ -140,7 +158,7 @@ class Network:
         for track in self.tracks:
             if track.loop >= 0:
                 on_loop[[stop for _, stop in track.stops]] = track.loop
-        used = np.array(sorted({stop for pair in ends for stop in pair if stop >= 0}), np.int64)
+        used = np.array(sorted({stop for pair in ends for stop in pair if stop >= 0} | self.ends_along), np.int64)
         number = np.full(len(self.places) + 1, -1, np.int64)
         number[used] = np.arange(len(used))
         return Lines(
@@ -150,6 +168,7 @@ class Network:
             number[np.array(ends, np.int64).reshape(-1, 2)],
             np.array(sharp, np.bool_),
             tuple(self.along),
+            tuple(self.whole),
         )
 
     def _new_stop(self, place: np.ndarray) -> int:
@@ -180,22 +199,32 @@ class Network:
         return points, shift
 
     def _joints(
-        self, points: np.ndarray, near: list[tuple[np.ndarray, np.ndarray]]
+        self, line: WholeLine, near: list[tuple[np.ndarray, np.ndarray]], corners: Sequence[int]
     ) -> tuple[list[tuple[int, int]], set[tuple[int, int]]]:
-        """Where a line meets tracks: (point, stop) in order; and between which such points it runs along one."""
-        arc = _arc(points)
+        """Where a line meets tracks: (point, stop) in order; and between which such points it runs along one.
+
+        corners : points of the line that become nodes; those of a fixed line, and its ends, also where it runs along the boundary
+        """
+        points, arc = line.points, _arc(line.points)
         found: list[tuple[float, int, int]] = []
         dropped = set()
         for track, (distance, foot) in zip(self.tracks, near, strict=True):
             for begin, end in _runs(distance < MEETING_DISTANCE * self.length):
-                if arc[end - 1] - arc[begin] <= ALONGSIDE * self.length:
+                whole = end - begin == len(points)
+                if arc[end - 1] - arc[begin] <= ALONGSIDE * self.length and not whole:
                     at = begin + int(distance[begin:end].argmin())
                     found.append((float(distance[at]), at, self._stop_on(track, foot[at])))
-                else:
-                    for at in (begin, end - 1):
-                        found.append((-1.0, at, self._stop_on(track, foot[at])))
+                    continue
+                ring = line.closed and whole
+                ends = [] if ring else [begin, end - 1]
+                turns = [] if line.ridge else [i for i in corners if begin <= i < end]
+                stops = {at: self._stop_on(track, foot[at]) for at in (*ends, *turns)}
+                if track.loop >= 0 and not line.ridge:
+                    self.ends_along.update(stops.values())
+                self.along.append(np.concatenate([points, points[:1]]) if ring else points[begin:end])
+                if not ring:
+                    found += [(-1.0, at, stops[at]) for at in ends]
                     dropped.add((begin, end - 1))
-                    self.along.append(points[begin:end])
         kept: list[tuple[int, int]] = []
         for _, at, stop in sorted(found):
             if all(

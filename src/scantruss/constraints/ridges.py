@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.polylines import divide
 from ..kernels.surface.ridges import BEND
-from .fixed_lines import LINE_STEP, divide
+from .fixed_lines import LINE_STEP
 from .fold_tracing import FULL, STRIDE, Tracer
 from .ridge_ends import Ridge, join_ends
 
@@ -39,10 +40,10 @@ def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
 
 def add_ridges(network: Network, ridges: list[Ridge]) -> None:
     """Add ridges to a network of lines."""
-    for ridge in ridges:
+    for number, ridge in enumerate(ridges, 1):
         places = np.concatenate([ridge.places, ridge.places[:1]]) if ridge.ring else ridge.places
         points, _ = divide(places, ridge.ring, LINE_STEP * network.length)
-        network.add(points, ridge.ring, [], sharp=True)
+        network.add(points, ridge.ring, [], name=f"ridge {number}", sharp=True)
 
 
 def kept_ridges(ridges: list[Ridge], length: float) -> list[Ridge]:

@@ -31,11 +31,16 @@ def encode_csv(grid: Grid, path: Path, *, decimal_comma: bool = False) -> dict[P
 def _encoded(header: Iterable[str], rows: Iterable[Iterable[Any]], *, decimal_comma: bool) -> bytes:
     """Return the text of a table; numbers with every digit of a float64, nothing for None."""
     between = ";" if decimal_comma else ","
-    words = (["" if value is None else repr(value) for value in row] for row in rows)
-    if decimal_comma:
-        words = ([word.replace(".", ",") for word in row] for row in words)
+    words = ([_cell(value, between, "," if decimal_comma else ".") for value in row] for row in rows)
     lines = [between.join(header), *(between.join(row) for row in words)]
     return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _cell(value: Any, between: str, point: str) -> str:
+    """Return a value as a table holds it; words in quotes where they need them."""
+    if isinstance(value, str):
+        return '"' + value.replace('"', '""') + '"' if {between, '"', "\n"} & set(value) else value
+    return "" if value is None else repr(value).replace(".", point)
 
 
 def _with_unit(names: str, unit: str) -> list[str]:
@@ -55,7 +60,7 @@ def _members(grid: Grid) -> Table:
 
 
 def _nodes(grid: Grid) -> Table:
-    """Return the table of nodes: place, members meeting there, whether on a boundary, fixed, distance from the scan."""
+    """Return the table of nodes: place, members there, whether on a boundary, fixed, distance from the scan, fixed lines and ridges."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
     boundary[grid.edges[grid.edge_triangles[:, 1] < 0].ravel()] = 1
@@ -67,4 +72,16 @@ def _nodes(grid: Grid) -> Table:
     if grid.desired is not None:
         header += _with_unit("desired_length", grid.unit)
         columns.append(np.asarray(grid.desired, float).tolist())
+    if grid.line_sets:
+        header.append("lines")
+        columns.append(_names_of_lines(grid))
     return (header, zip(range(len(grid.nodes)), *columns, strict=True))
+
+
+def _names_of_lines(grid: Grid) -> list[str]:
+    """Return for each node the names of the fixed lines and ridges on which it lies, with bars between them."""
+    names: list[list[str]] = [[] for _ in grid.nodes]
+    for line in grid.line_sets:
+        for node in line.nodes.tolist():
+            names[node].append(line.name)
+    return ["|".join(each) for each in names]

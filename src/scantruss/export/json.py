@@ -1,6 +1,6 @@
 """Our own format: JSON that holds a grid without loss.
 
-What a grid is (nodes, triangles, fixed nodes, members along lines, origin, unit, deviation, settings, quality before) and its
+What a grid is (nodes, triangles, fixed nodes, members and nodes along lines, origin, unit, deviation, settings, quality before) and its
 certificate, which needs the scan, are read back to the last bit. What follows from it (members, boundary loops, quality,
 topology) is written for other programs and not read back. No dates and no names are written: the same grid gives the same
 bytes.
@@ -19,6 +19,7 @@ from .. import __version__
 from ..errors import FormatError, InputError
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
+from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet, sets_of
 from ..grid.quality import GridQuality
 from ..settings import UNITS, Settings
 
@@ -42,6 +43,8 @@ def encode_json(grid: Grid) -> bytes:
         "certificate": None if grid.certificate is None else grid.certificate.to_dict(),
         "fixed": np.flatnonzero(grid.fixed).tolist(),
         "lines": grid.lines.tolist(),
+        "fixed_lines": sets_of(grid, FIXED_LINE),
+        "ridges": sets_of(grid, RIDGE),
         "boundary_loops": [loop.tolist() for loop in grid.boundary_loops],
         "nodes": np.asarray(grid.nodes, np.float64).tolist(),
         "members": grid.edges.tolist(),
@@ -54,7 +57,7 @@ def encode_json(grid: Grid) -> bytes:
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
 
-ROWS = ("nodes", "members", "triangles", "boundary_loops", "lines")
+ROWS = ("nodes", "members", "triangles", "boundary_loops", "lines", "fixed_lines", "ridges")
 
 
 def _number(value: Any) -> Any:
@@ -138,6 +141,10 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         triangles=triangles,
         fixed=fixed,
         lines=_ids(values.get("lines", []), "lines", len(nodes), 2),
+        line_sets=(
+            *_line_sets(values.get("fixed_lines", []), FIXED_LINE, len(nodes)),
+            *_line_sets(values.get("ridges", []), RIDGE, len(nodes)),
+        ),
         origin=_floats([values["origin"]], "origin", 3)[0],
         unit=unit,
         deviation=deviation,
@@ -146,6 +153,13 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         before=None if before is None else GridQuality(**before, unit=unit),
         certificate=None if certificate is None else Certificate.from_dict(certificate),
     )
+
+
+def _line_sets(given: Any, kind: str, limit: int) -> list[LineSet]:
+    """Return the sets of nodes of one kind."""
+    return [
+        LineSet(str(each["name"]), kind, _ids(each["nodes"], "nodes of a line", limit, 1).ravel()) for each in given
+    ]
 
 
 def _floats(rows: Any, name: str, columns: int) -> np.ndarray:

@@ -106,7 +106,7 @@ def advance_front(
         )
     close_gaps(front, samples, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
-    check_kept(members, triangles, front.nodes)
+    check_kept(members, triangles, front.nodes + samples.origin)
     used, numbered = np.unique(triangles, return_inverse=True)
     desired = settings.length * samples.surface.field[front.sample[used]] if samples.graded else None
     return Grid(
@@ -192,6 +192,7 @@ def start_front(
         curves = np.array(add_nodes(front, surface, nodes), np.int64)
         lists.add_chain(front, curves, lists.ACTIVE if active else lists.INACTIVE)
     add_lines(front, surface, constraints.lines, settings)
+    check_links(front, samples.origin)
     for place in constraints.positions if settings.method != "paper" else ():
         length = settings.length * local_field(surface, place)
         front = add_candidates(front, surface, nodes_at(place[None], surface, length), NEARER * length)
@@ -243,7 +244,6 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
             face_both_sides(front, surface, chain, settings.length)
     for node in sorted({node for chain in chains for node in chain}):
         link_around(front, node)
-    check_links(front)
 
 
 def face_both_sides(front: lists.Front, surface: Surface, nodes: list[int], length: float) -> None:
@@ -317,7 +317,7 @@ def run(
         if status == lists.DONE:
             return front
         if front.count[lists.TRIANGLES] > 4 * expected + 1000:
-            x, y, z = front.nodes[front.count[lists.NODES] - 1].tolist()
+            x, y, z = (front.nodes[front.count[lists.NODES] - 1] + samples.origin).tolist()
             raise FrontError(
                 "the front runs over itself: the scan is too rough or too sparse for this length", where=(x, y, z)
             )

@@ -27,7 +27,8 @@ class Fault:
 
     kind: str  #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed
     words: str
-    where: Place | None = None  #: a place in the scan's own frame [scan unit]
+    where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
+    also: tuple[Place, ...] = ()  #: more such places
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,12 @@ class Certificate:
                 plain[name] = _spread_of(value) if "p50" in value else _worst_of(value)
         for name in ("faults", "warnings"):
             plain[name] = tuple(
-                Fault(fault["kind"], fault["words"], None if fault["where"] is None else place_of(fault["where"]))
+                Fault(
+                    fault["kind"],
+                    fault["words"],
+                    None if fault["where"] is None else place_of(fault["where"]),
+                    tuple(map(place_of, fault.get("also", ()))),
+                )
                 for fault in plain.get(name, ())
             )
         plain["widened"] = tuple(plain.get("widened", ()))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .line_sets import LineSet
 from .quality import GridQuality, measure_quality
 from .tables import GridTables
 from .topology import Topology, measure_topology
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from .certificate import Certificate
 
 
-PROVENANCE = {"settings", "before", "certificate", "seconds"}  # fields that no figure of a grid depends on
+PROVENANCE = {"settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
 }  # fmt: skip
@@ -41,6 +42,7 @@ class Grid(GridTables):
     lines: np.ndarray = field(
         default_factory=lambda: np.zeros((0, 2), np.int64)
     )  #: (K, 2) members along fixed lines, ridges
+    line_sets: tuple[LineSet, ...] = ()  #: the nodes on each fixed line and each ridge
     deviation: np.ndarray | None = None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     desired: np.ndarray | None = (
         None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]

@@ -16,7 +16,7 @@ from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_by_angle
 from .perturbation import search_widely
-from .sliding_nodes import with_boundary_members
+from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
 from .working_mesh import WorkingMesh
 
@@ -137,14 +137,15 @@ def improve_last(
             smooth(mesh, settings)
         else:
             finish(mesh, settings.prefer)
-        project_onto_scan(mesh, samples)
+        project_onto_scan(mesh, samples, boundary=not settings.boundary)
 
     closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
     grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
+    grid = with_line_sets(grid, constraints.lines, settings.length)
     return grid.replace(settings=settings, before=before)
 
 
-def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples) -> None:
-    """Project the nodes onto the scan by patches as narrow as it allows."""
-    mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)))
+def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples, *, boundary: bool) -> None:
+    """Project the nodes onto the scan by patches as narrow as it allows; those of a given boundary stay on it."""
+    mesh.project_onto_scan(*(narrow_surface(samples, points) for points in (40.0, 120.0, np.inf)), boundary=boundary)
     mesh.name_distances(samples.measured)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..constraints.network import Lines, curves_of
+from ..constraints.network import Lines, WholeLine, curves_of
 from ..grid.grid import Grid
+from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet
 from ..kernels.boundary.curves import Curves, nearest_on_curves
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, Net
 
 SNAP = 0.4  # distance within which the nearest node of a line is the end of the line [member lengths]
+ON_LINE = 0.35  # a node within this distance of a line is its own: lines are bent by up to 0.3 where they meet others [member lengths]
 
 
 def joined(first: Curves, second: Curves) -> Curves:
@@ -40,6 +42,31 @@ def with_boundary_members(grid: Grid, lines: Lines, length: float) -> Grid:
 
     near = [is_near(a) and is_near(b) and is_near(0.5 * (a + b)) for a, b in grid.nodes[ends]]
     return grid.replace(lines=np.unique(np.concatenate([grid.lines, ends[np.array(near, np.bool_)]]), axis=0))
+
+
+def with_line_sets(grid: Grid, lines: Lines, length: float) -> Grid:
+    """Return the grid with the nodes on each fixed line and each ridge; lines of one name have one set."""
+    parts: dict[tuple[str, bool], list[WholeLine]] = {}
+    for line in lines.whole:
+        parts.setdefault((line.name, line.ridge), []).append(line)
+    sets = []
+    for (name, ridge), own in parts.items():
+        nodes = _nodes_along(grid, curves_of([line.points for line in own], [line.closed for line in own]), length)
+        if len(nodes):
+            sets.append(LineSet(name, RIDGE if ridge else FIXED_LINE, nodes))
+    return grid.replace(line_sets=tuple(sets))
+
+
+def _nodes_along(grid: Grid, track: Curves, length: float) -> np.ndarray:
+    """Return the nodes (K,) of members of lines that lie along some curves, in their order there."""
+    on_lines = np.unique(grid.lines)
+    found = [nearest_on_curves(track, *place) for place in grid.nodes[on_lines].tolist()]
+    is_near = np.zeros(len(grid.nodes), np.bool_)
+    is_near[on_lines] = [distance < ON_LINE * length for _, _, distance in found]
+    own = np.isin(on_lines, grid.lines[is_near[grid.lines].all(axis=1)])
+    order = np.lexsort((np.array([f[1] for f in found]), np.array([f[0] for f in found])))
+    nodes: np.ndarray = on_lines[order][own[order]]
+    return nodes
 
 
 def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length: float) -> None:

@@ -59,7 +59,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
         desired=np.ones(capacity),
     )
     if len(grid.lines) and net.ring.shape[1] > LARGEST_DEGREE_WITH_LINES:
-        raise FrontError(f"a node came out with {valence} members; use another length", grid)
+        raise FrontError(f"a node came out with {valence} members", grid)
     source = np.full(capacity, -1, np.int64)
     fan, first = np.full(len(corner_node), -1, np.int64), np.empty(capacity, np.int64)
     used = kernels.fill_rings(corner_node, partner, fan, first, net.ring, net.degree, net.is_open, source, count)
@@ -170,10 +170,15 @@ class WorkingMesh:
         mesh.renew(0.0)
         return mesh
 
-    def project_onto_scan(self, fine: Surface, middle: Surface, broad: Surface) -> None:
-        """Project each node onto the scanned surface by patches as narrow as possible, except fixed nodes and those of ridges."""
+    def project_onto_scan(self, fine: Surface, middle: Surface, broad: Surface, *, boundary: bool) -> None:
+        """Project each node onto the scanned surface by patches as narrow as possible, except fixed nodes and those of ridges.
+
+        boundary : project the nodes of the boundary too
+        """
         self.projection_distance[:] = 0.0
         stay = self.fixed | self._on_ridge()
+        if not boundary:
+            stay |= self.net.is_open == 1
 
         def project_part(part: int, begin: int, end: int) -> None:
             own = self._scratch(part)

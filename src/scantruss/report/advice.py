@@ -1,34 +1,47 @@
-"""Which member length to take: quick runs try lengths; the first that passes, as the next longer one does, is suggested."""
+"""Which member length to take: quick runs try lengths; one that passes, as the next longer one does, is suggested.
+
+How much is tried is counted in quick runs at the length that was asked for, not in seconds: the same scan gets the same advice.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from time import perf_counter
+from functools import cached_property
+from itertools import chain, dropwhile, takewhile, tee
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..check.certify import SURE_PER_SPACING
-from ..errors import FrontError
-from ..pipeline import grid_from_cloud
+from ..candidates import attempts
+from ..errors import FrontError, LengthError
+from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
 from ..surface.size_field import measured_bends
 
 if TYPE_CHECKING:
+    from ..candidates import Attempt
     from ..grid.grid import Grid
     from ..runtime.progress import Progress
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-LADDER = (1.0, 1.4, 1 / 1.4, 2.0, 0.5)  # lengths to try until one is found, as multiples of the usual one
+#: lengths to try in turn, as multiples of the usual one: first by what usually gives a grid (True), later by all that may
+LADDER = (
+    (1.0, True), (1.4, True), (1.0, False), (2.0, True), (1.4, False), (1 / 1.4, True), (2.8, True), (2.0, False),
+    (1 / 1.4, False), (0.5, True), (2.8, False),
+)  # fmt: skip
 NEXT = 1.4  # a length is suggested if that many times it passes too
-NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5)  # lengths to try in place of one that failed
+NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths that are tried in place of one that failed
+SURE_PER_SPACING = (
+    8.0  # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
+)
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
-ENOUGH_TIME = 20.0  # time after which no further length is tried [s]
-MOST_MEMBERS = 60_000  # most members of a grid made to try a length
-CLOSE_BEND = 0.95  # share of the scan with a larger radius of curvature than the one reported
+RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
+RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
+MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
+CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +66,7 @@ class Trial:
 
 
 class Advice:
-    """Member lengths of a scan that were tried, each once.
+    """Member lengths of a scan that were tried: each first by what usually gives a grid, then by all that may.
 
     Parameters
     ----------
@@ -68,59 +81,97 @@ class Advice:
         self._cloud, self._progress = cloud, progress
         self._settings = settings.replace(effort="quick", length_field="")
         self._found: dict[float, Trial] = {}
-        self._since = perf_counter()
+        self._briefly: set[float] = set()  # of these, by what usually gives a grid only
+        self._usual = suggest_length(cloud)
+        self._runs, self._run_length = RUNS, self._usual  # quick runs that are left, and the length they are counted at
 
-    def try_length(self, length: float) -> Trial | None:
-        """Try a length; None if it was not tried: it is out of range, needs too many members, or no time is left."""
-        if length in self._found:
-            return self._found[length]
+    def try_length(self, length: float, *, briefly: bool = False) -> Trial | None:
+        """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or runs are used up."""
+        known = self._found.get(length)
+        if known is not None and (known.passed or briefly or length not in self._briefly):
+            return known
         low, high = exact_range(self._cloud)
-        if not low * (1 - 1e-9) <= length <= high * (1 + 1e-9):
+        if not low * (1 - 1e-9) <= length <= high * (1 + 1e-9) or self.members(length) > MOST_MEMBERS:
             return None
-        if self._found and perf_counter() - self._since > ENOUGH_TIME:
-            return None
-        if self.members(length) > MOST_MEMBERS:
-            return None
+        cost = max(1.0, (self._run_length / length) ** 2)
+        if self._runs < cost:
+            return known
         settings = self._settings.replace(length=length)
+        usual, others = _usual_and_others(attempts(self._cloud, settings), settings)
+        tried = self._counted(usual if briefly else others if known is not None else chain(usual, others), cost)
         try:
-            grid = grid_from_cloud(self._cloud, settings, progress=self._show(length))
+            grid = first_that_passes(self._cloud, settings, tried, progress=self._show(length))
             trial = Trial(length, grid)
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(keep_rods=made.keep_rods, judge_outliers=made.judge_outliers)
         except FrontError as error:
-            trial = Trial(length, None, error)
-        return self._found.setdefault(length, trial)
+            trial = Trial(length, None, error) if known is None else known
+        except LengthError as error:
+            trial = Trial(length, None, FrontError(str(error)))
+        self._found[length] = trial
+        (self._briefly.add if briefly or self._runs < cost else self._briefly.discard)(length)
+        return trial
+
+    def _counted(self, tried: Iterable[Attempt], cost: float) -> Iterator[Attempt]:
+        """Yield attempts as long as quick runs are left, at least one."""
+        for number, attempt in enumerate(tried):
+            if number and self._runs < cost:
+                return
+            self._runs -= cost
+            yield attempt
 
     @property
     def settings(self) -> Settings:
         """The settings, with whatever the lengths tried so far needed to pass."""
         return self._settings
 
+    @property
+    def tried(self) -> list[Trial]:
+        """What came of the lengths that were tried by all that may give a grid, or that passed, the shortest first."""
+        known = (self._found[length] for length in sorted(self._found))
+        return [trial for trial in known if trial.passed or trial.length not in self._briefly]
+
     def suggest(self) -> float:
-        """Return the length to take: the first of a ladder that passes together with the next longer one, else the first that passes."""
-        usual = suggest_length(self._cloud)
+        """Return the length to take.
+
+        It is the first of a ladder that passes with what is next above it, both without much of the scan lost; else of those that
+        pass with what is next above them the one that loses least; else one that passes; else the usual length.
+        """
         low, high = length_range(self._cloud)
-        lengths = list(dict.fromkeys(min(max(_two_digits(share * usual), low), high) for share in LADDER))
-        some = usual
-        for length in lengths:
-            trial = self.try_length(length)
+        both: dict[float, float] = {}  # length -> what is lost there or at the next above
+        for share, briefly in LADDER:
+            length = min(max(_two_digits(share * self._usual), low), high)
+            trial = self.try_length(length, briefly=briefly)
             if trial is None or not trial.passed:
                 continue
-            some = length if some == usual else some
-            above = self.try_length(self.next_above(length))
-            if trial.lost <= MOST_LOST and (above is None or (above.passed and above.lost <= MOST_LOST)):
-                return length
-        first = self._found.get(usual)
-        return usual if first is None or first.passed else some
+            above = self.try_length(self.next_above(length), briefly=briefly)
+            if above is not None and above.passed:
+                both[length] = max(trial.lost, above.lost)
+                if both[length] <= MOST_LOST:
+                    return length
+        if both:
+            return min(both, key=lambda length: both[length])
+        return min(
+            (trial.length for trial in self.tried if trial.passed), key=self._far_from_usual, default=self._usual
+        )
+
+    def _far_from_usual(self, length: float) -> float:
+        """Return how far a length is from the usual one."""
+        return abs(float(np.log(length / self._usual)))
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not; None if none of those tried did."""
-        sure = round_length(SURE_PER_SPACING * self._cloud.spacing, "up")
-        first = (sure,) if length < sure else ()  # holes in the sampling spoil the others first
-        for each in (*first, *(_two_digits(share * length) for share in NEARBY)):
-            trial = self.try_length(each)
-            if trial is not None and trial.passed:
-                return trial.length
+        """Return the nearest length that passes in place of one that does not; None where none of those tried does."""
+        low, high = length_range(self._cloud)
+        at = min(max(length, low), high)
+        lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY)} - {length}
+        if (sure := round_length(SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
+            lengths.add(sure)
+        self._runs, self._run_length = RUNS_NEARBY, at
+        for briefly in (True, False):
+            for each in sorted(lengths, key=lambda other: (abs(np.log(other / length)), other)):
+                trial = self.try_length(each, briefly=briefly)
+                if trial is not None and trial.passed:
+                    return trial.length
         return None
 
     def next_above(self, length: float) -> float:
@@ -131,14 +182,23 @@ class Advice:
         """Return the next shorter length to look at."""
         return max(_two_digits(length / NEXT), min(length, length_range(self._cloud)[0]))
 
+    def around(self, length: float) -> list[float]:
+        """Return the lengths of a table: one, the two below and the two above."""
+        below, above = self.next_below(length), self.next_above(length)
+        return list(dict.fromkeys((self.next_below(below), below, length, above, self.next_above(above))))
+
     def members(self, length: float) -> int:
         """Return about how many members a grid of a length has."""
-        area = sample_surface(self._cloud, self._settings.replace(length=suggest_length(self._cloud))).area
-        return round(2.0 * np.sqrt(3.0) * area / length**2)
+        return round(2.0 * np.sqrt(3.0) * self._area / length**2)
+
+    @cached_property
+    def _area(self) -> float:
+        """Rough area of the scan [scan unit^2]."""
+        return sample_surface(self._cloud, self._settings.replace(length=self._usual)).area
 
     def radius(self) -> float:
-        """Return the radius of curvature that nearly all of the scan exceeds [scan unit]; inf if it is flat."""
-        samples = sample_surface(self._cloud, self._settings.replace(length=suggest_length(self._cloud)))
+        """Return the radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
+        samples = sample_surface(self._cloud, self._settings.replace(length=self._usual))
         bend = float(np.quantile(measured_bends(samples.surface, 1.0), CLOSE_BEND))
         return 1.0 / bend if bend > 0.0 else np.inf
 
@@ -148,6 +208,16 @@ class Advice:
                 self._progress(f"try {length:g}", share)
 
         return show
+
+
+def _usual_and_others(every: Iterator[Attempt], settings: Settings) -> tuple[Iterator[Attempt], Iterator[Attempt]]:
+    """Return the attempts with the samples and the method that were asked for, which come first, and those after them."""
+
+    def is_usual(one: Attempt) -> bool:
+        return (one.settings.box_size, one.settings.method) == (settings.box_size, settings.method)
+
+    one, other = tee(every)
+    return takewhile(is_usual, one), dropwhile(is_usual, other)
 
 
 def _two_digits(length: float) -> float:

@@ -10,6 +10,7 @@ from .. import __version__
 from ..check.limits import WARN_LEFT_OUT
 from ..errors import words_of_place
 from ..grid.certificate import near
+from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     from ..grid.certificate import Certificate, Spread, Worst
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
-    from .advice import Advice, Trial
+
+
+MOST_LINES = 6  # lines of a kind that are named one by one
 
 
 def report_of(grid: Grid, points: int) -> dict[str, Any]:
@@ -36,6 +39,8 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
         "members": len(grid.edges),
         "triangles": len(grid.triangles),
         "line_members": len(grid.lines),
+        "fixed_lines": sets_of(grid, FIXED_LINE),
+        "ridges": sets_of(grid, RIDGE),
         "quality": grid.quality.to_dict(),
         "before": grid.before.to_dict() if grid.before is not None else None,
         "topology": grid.topology.to_dict(),
@@ -94,8 +99,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
             else "closed"
         ),
     ]
-    if len(grid.lines):
-        lines.append(f"{len(grid.lines)} members along lines and ridges")
+    lines += line_lines(grid)
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
     if bridging:
         lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
@@ -106,6 +110,27 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
         lines += warning_lines(grid.certificate)
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
+    return lines
+
+
+def line_lines(grid: Grid) -> list[str]:
+    """Return how many fixed lines and ridges there are, with their nodes and lengths; that no ridge is there where one was looked for."""
+    unit, lines = f" {grid.unit}" if grid.unit else "", []
+    for kind in (FIXED_LINE, RIDGE):
+        sets = sets_of(grid, kind)
+        each = [f"{line['name']} {len(line['nodes'])} nodes, {line['length']:.4g}{unit}" for line in sets[:MOST_LINES]]
+        each += [f"and {len(sets) - MOST_LINES} more"] * (len(sets) > MOST_LINES)
+        if sets:
+            total = sum(line["length"] for line in sets)
+            count = (
+                f"{len(sets)} {kind}{'s' if len(sets) > 1 else ''}, {total:.4g}{unit} in all"
+                if len(sets) > 1
+                else f"1 {kind}"
+            )
+            lines.append(f"{count}: {'; '.join(each)}")
+    made = grid.settings
+    if made is not None and made.ridge_angle > 0.0 and made.method == "default" and not sets_of(grid, RIDGE):
+        lines.append(f"no ridge is folded by more than {made.ridge_angle:g} degrees")
     return lines
 
 
@@ -202,60 +227,6 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
         )
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
-    return lines
-
-
-def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of a table: the results of a member length, the next shorter one and the next longer one."""
-    radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
-    rows: list[tuple[str, ...]] = []
-    for each in dict.fromkeys((advice.next_below(length), length, advice.next_above(length))):
-        trial = advice.try_length(each)
-        members = advice.members(each) if trial is None or trial.grid is None else len(trial.grid.edges)
-        rows.append(
-            (
-                f"{each:g}",
-                f"{members:,}",
-                f"{each**2 / (8.0 * radius):.2g}",
-                f"{each / cloud.spacing:.3g}",
-                result_of(trial),
-            )
-        )
-    return (f"length{unit}", "members", f"sag L^2/8R{unit}", "L / spacing", "a quick run"), rows
-
-
-def result_of(trial: Trial | None) -> str:
-    """Return the result of a length in a few words."""
-    if trial is None:
-        return "not tried"
-    if trial.grid is None or trial.grid.certificate is None:
-        return "no grid passes"
-    found = trial.grid.certificate
-    holes = sum(part.number for part in found.left_out if part.kind == "hole")
-    said = ["passes with warnings" if found.warnings else "passes"]
-    said += [f"{100 * found.judged_out:.2g} % of the scan left out"] * (found.judged_out > 0)
-    said += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
-    return ", ".join(said)
-
-
-def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
-    """Return how noisy and how curved the scan is, and which length to take."""
-    unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
-    bent = (
-        f"R = {radius:.3g}{unit}: radius of curvature that 95 % of the scan exceeds"
-        if np.isfinite(radius)
-        else "the scan is flat"
-    )
-    lines = [bent]
-    if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
-        noise = trial.grid.certificate.noise
-        lines.append(f"noise {noise:.2g}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members")
-    if trial is not None and not trial.passed:
-        near = advice.nearby(length)
-        lines += [f"at {length:g}{unit}: {trial.fault}"]
-        lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
-    else:
-        lines.append(f"try --length {length:g}")
     return lines
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from ..errors import InputError
+from ..errors import InputError, LengthError
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud, measure_gap
 
@@ -23,7 +23,7 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
 
     Raises
     ------
-    InputError
+    LengthError
         The length is too small for the distance between the points, or too large for the extent of the scan.
     """
     shortest, longest, what = settings.length, settings.length, "length"
@@ -42,12 +42,12 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
             f" {round_length(high, 'down'):g} for {extent}; scan it more densely"
         )
     if longest > high * (1 + 1e-9):
-        raise InputError(
+        raise LengthError(
             f"{what.format('longest')} {longest:g}{unit} is too large for {extent};"
             f" use at most {round_length(high, 'down'):g}"
         )
     if shortest < low * (1 - 1e-9):
-        raise InputError(
+        raise LengthError(
             f"{what.format('shortest')} {shortest:g}{unit} is too small for {apart}; use at least {round_length(low, 'up'):g}"
         )
 

@@ -183,6 +183,11 @@ class BoundarySettings(_Checked):
         40.0, "the boundary has a corner where it turns by more than this", unit="degree", source="Sec. 3.3",
         low=10.0, high=180.0,
     )  # fmt: skip
+    boundary: Sequence[Sequence[Sequence[float]]] = _setting(
+        (),
+        "the true boundary, closed polylines that take the place of that of the scan; those inside others are holes",
+        unit="scan unit",
+    )
     fill_holes: float | None = _setting(
         None,
         f"close holes with a shorter boundary than this; 0 keeps all; none: {HOLE:g} member lengths",
@@ -203,6 +208,9 @@ class ConstraintSettings(_Checked):
         (),
         "polylines that must become chains of members, in the frame of the scan; closed if the last point is the first",
         unit="scan unit",
+    )
+    line_names: Sequence[str] = _setting(
+        (), "names of the fixed lines in their order, and so of the sets of their nodes; none: line 1, line 2, ..."
     )
     ridge_angle: float = _setting(
         40.0,

@@ -22,7 +22,15 @@ from .records import (
     SmoothingSettings,
     SurfaceSettings,
 )
-from .values import check_length_field, check_line, check_piece, check_positions, shortest_and_longest
+from .values import (
+    check_length_field,
+    check_line,
+    check_names,
+    check_piece,
+    check_positions,
+    check_ring,
+    shortest_and_longest,
+)
 
 RENAMED = {"stray_distance": "outlier_distance", "drop_repeated": "drop_duplicates"}  # names in settings files of 0.1.0
 
@@ -54,7 +62,9 @@ class Settings(
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         super().__post_init__()
         object.__setattr__(self, "fixed", check_positions(self.fixed))
-        object.__setattr__(self, "fixed_lines", tuple(map(check_line, self.fixed_lines)))
+        object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
+        object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))
+        object.__setattr__(self, "line_names", check_names(self.line_names, len(self.fixed_lines)))
 
     def __repr__(self) -> str:
         """Name the settings that are not the default."""

@@ -28,14 +28,32 @@ def check_positions(given: Any) -> tuple[tuple[float, ...], ...]:
     return _coordinates(given, f"fixed must be positions of three numbers, got {given!r}", "a fixed node needs")
 
 
-def check_line(line: Any) -> tuple[tuple[float, ...], ...]:
-    """Return a fixed line as tuples of numbers, no point twice in a row, or refuse it."""
-    refusal = f"fixed_lines must be polylines of positions of three numbers, got {line!r}"
-    points = _coordinates(line, refusal, "a fixed line needs points of")
+def check_line(line: Any, name: str = "fixed_lines", what: str = "a fixed line") -> tuple[tuple[float, ...], ...]:
+    """Return a polyline as tuples of numbers, no point twice in a row, or refuse it."""
+    refusal = f"{name} must be polylines of positions of three numbers, got {line!r}"
+    points = _coordinates(line, refusal, f"{what} needs points of")
     points = tuple(p for i, p in enumerate(points) if i == 0 or p != points[i - 1])
     if len(points) < 2:
-        raise InputError(f"a fixed line needs at least two different points, got {len(points)}")
+        raise InputError(f"{what} needs at least two different points, got {len(points)}")
     return points
+
+
+def check_ring(ring: Any) -> tuple[tuple[float, ...], ...]:
+    """Return a closed polyline as tuples of numbers, its first point not repeated, or refuse it."""
+    points = check_line(ring, "boundary", "a boundary")
+    points = points[:-1] if points[0] == points[-1] else points
+    if len(set(points)) < 3:
+        raise InputError(f"a boundary needs at least three different points, got {len(set(points))}")
+    return points
+
+
+def check_names(given: Any, count: int) -> tuple[str, ...]:
+    """Return the names of so many fixed lines, or none at all, or refuse them."""
+    if isinstance(given, str) or not all(isinstance(name, str) and name.strip() for name in given):
+        raise InputError(f"line_names must be words, one for each fixed line, got {given!r}")
+    if len(given) not in (0, count):
+        raise InputError(f"line_names has {len(given)} names for {count} fixed lines")
+    return tuple(given)
 
 
 def _coordinates(given: Any, refusal: str, needs: str) -> tuple[tuple[float, ...], ...]:

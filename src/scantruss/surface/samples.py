@@ -191,14 +191,18 @@ def local_field(surface: Surface, place: np.ndarray) -> float:
     return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
 
 
-def samples_with(samples: SurfaceSamples, added: np.ndarray, settings: Settings) -> SurfaceSamples:
-    """Return the samples of the same points and of added ones, which fill holes (F, 3) [scan unit]."""
-    points = samples.surface.points
+def samples_with(
+    samples: SurfaceSamples, added: np.ndarray, settings: Settings, kept: np.ndarray | None = None
+) -> SurfaceSamples:
+    """Return the samples of the same points, or of those of `surface.points` that are kept (P,) bool, and of added ones (F, 3)."""
+    points = samples.surface.points if kept is None else samples.surface.points[kept]
     both = np.concatenate([points, added])
     asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
         outlier_distance=0.0, drop_duplicates=False
     )
-    if not samples.smooth:  # then it is not smooth with more points either
+    if kept is not None:  # which parts are wanted is said by what is kept
+        asked = asked._replace(piece="all")
+    if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
     prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
     return replace(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...boundary.find import find_boundary
 from ...check.certify import COVER_REACH
 from ...check.distances import distances_to_grid
 from ...check.left_out import points_left_out
@@ -60,6 +61,9 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
     if grid.settings is None:
         return Shown(points)
     length, samples = grid.settings.length, sample_surface(cloud, grid.settings)
+    if grid.settings.boundary:
+        samples, _ = find_boundary(samples, grid.settings)
+        points = samples.scan + samples.origin - grid.origin
     distance, nearest = distances_to_grid(points, grid, length)
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = desired[grid.triangles].mean(axis=1)[nearest]

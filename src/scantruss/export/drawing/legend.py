@@ -46,6 +46,7 @@ class Mark:
     words: str
     where: Place  #: in the scan's own frame
     colour: np.ndarray  #: (3,)
+    also: tuple[Place, ...] = ()  #: more such places
 
 
 def marks_of(grid: Grid) -> list[Mark]:
@@ -55,7 +56,7 @@ def marks_of(grid: Grid) -> list[Mark]:
         return []
     marks = []
     for kind, colour in ((found.faults, FAULT), (found.warnings, WARNING)):
-        placed = [Mark(fault.words, fault.where, colour) for fault in kind if fault.where is not None]
+        placed = [Mark(fault.words, fault.where, colour, fault.also) for fault in kind if fault.where is not None]
         marks += placed[:MOST_MARKS]
     unit = f" {grid.unit}" if grid.unit else ""
     marks += [

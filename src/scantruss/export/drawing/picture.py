@@ -19,7 +19,7 @@ from ...runtime.ours import MARK
 from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
-from .legend import Ring, Text, marks_of, scale_bar
+from .legend import FAULT, Ring, Text, marks_of, scale_bar
 from .strokes import (
     INK,
     MOST_POINTS,
@@ -92,7 +92,7 @@ def encode_picture(
                     texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
         if caption:
             _legend(grid, shown, texts, (6 * em, tall - 3.7 * em), em)
-    return _paint((wide, tall), strokes, texts, rings, lines)
+    return paint((wide, tall), strokes, texts, rings, lines)
 
 
 def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size: tuple[int, int] | None) -> Image:
@@ -116,12 +116,20 @@ def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Rin
     flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
     for number, (mark, (x, y)) in enumerate(zip(marks, flat.tolist(), strict=True), 1):
         texts.append(Text(x + 1.3 * em, y + 1.0 * em, str(number), em, colour=mark.colour))
-    return [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
+    rings = [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
+    for mark in marks:
+        if mark.also:
+            others, _ = camera.project(np.array(mark.also) - grid.origin)
+            rings += [Ring(x, y, 0.8 * em, mark.colour) for x, y in others.tolist()]
+    return rings
 
 
 def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[float, float], em: float) -> None:
     """Add what colours and numbers mean, from a corner downwards."""
     x, y = corner
+    if grid.certificate is not None and not grid.certificate.passed:
+        texts.append(Text(x, y, "This grid fails its certificate:", 1.2 * em, "left", FAULT))
+        y -= 2.0 * em
     rows = [(part.words, part.colour, "\u25cf") for part in (shown.missed if shown else ())]
     rows += [(words, INK, "") for words in (shown.unread if shown else ())]
     rows += [(mark.words, mark.colour, str(number)) for number, mark in enumerate(marks_of(grid), 1)]
@@ -133,7 +141,7 @@ def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[fl
 
 def encode_cloud(cloud: PointCloud) -> bytes:
     """Return a picture of a scan, PNG: its points seen from obliquely above."""
-    return _paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
+    return paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
 
 
 def caption_of(grid: Grid) -> str:
@@ -180,10 +188,10 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
     ]
     titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
     texts = [Text(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
-    return write_files({path: _paint(PANELS, strokes, texts)})[0]
+    return write_files({path: paint(PANELS, strokes, texts)})[0]
 
 
-def _paint(
+def paint(
     size: tuple[int, int],
     strokes: Sequence[Strokes],
     texts: Iterable[Text],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -239,16 +240,30 @@ def _in_front(flat: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray, np.
     return inside, view.front[row, column], view.nearest[row, column]
 
 
-def cloud_strokes(cloud: PointCloud, size: tuple[int, int]) -> Strokes:
-    """Return the points of a scan as dots seen from obliquely above, the higher the lighter, in a picture of a size [pixel]."""
-    points = cloud.points[:: max(len(cloud.points) // MOST_POINTS[False], 1)]
-    turn, tilt = np.radians(-35.0), np.radians(35.0)
-    across = np.cos(turn) * points[:, 0] - np.sin(turn) * points[:, 1]
-    depth = np.sin(turn) * points[:, 0] + np.cos(turn) * points[:, 1]
-    flat = np.column_stack([across, np.sin(tilt) * depth + np.cos(tilt) * points[:, 2]])
+def oblique_view(cloud: PointCloud, size: tuple[int, int]) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Return what takes places (N, 3) to a picture of a scan from obliquely above: where they are [pixel], and how far behind."""
+
+    def project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        turn, tilt = np.radians(-35.0), np.radians(35.0)
+        across = np.cos(turn) * points[:, 0] - np.sin(turn) * points[:, 1]
+        depth = np.sin(turn) * points[:, 0] + np.cos(turn) * points[:, 1]
+        return np.column_stack([across, np.sin(tilt) * depth + np.cos(tilt) * points[:, 2]]), depth
+
+    flat, _ = project(some_of(cloud.points, MOST_POINTS[False]))
     low, high = flat.min(axis=0), flat.max(axis=0)
     scale = 0.9 * float((np.array(size) / np.maximum(high - low, 1e-300)).min())
-    flat = (flat - 0.5 * (low + high)) * scale + 0.5 * np.array(size)
+
+    def view(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        flat, depth = project(points)
+        return (flat - 0.5 * (low + high)) * scale + 0.5 * np.array(size), depth
+
+    return view
+
+
+def cloud_strokes(cloud: PointCloud, size: tuple[int, int]) -> Strokes:
+    """Return the points of a scan as dots seen from obliquely above, the higher the lighter, in a picture of a size [pixel]."""
+    points = some_of(cloud.points, MOST_POINTS[False])
+    flat, depth = oblique_view(cloud, size)(points)
     height = points[:, 2] - points[:, 2].min()
     colour = _mix(CLAY, height / max(float(height.max()), 1e-300), 0.8)
     return Strokes(-depth, _dots(flat), np.zeros_like(colour), colour, np.full(len(flat), 2.0))

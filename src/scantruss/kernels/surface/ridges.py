@@ -28,10 +28,16 @@ ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member leng
 CLEARLY = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
 FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
-SEARCHES, FOLD_FITS = 2, 5  # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
+SEARCHES, FOLD_FITS = (
+    2,
+    5,
+)  # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
 NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
 MIDDLE = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
-BESIDE, FARTHEST_MEETING = 0.2, 0.4  # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
+BESIDE, FARTHEST_MEETING = (
+    0.2,
+    0.4,
+)  # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
 SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet can be told [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
 POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight

@@ -1,0 +1,104 @@
+"""What `scantruss info` says of member lengths: what came of each that was tried, which pass, and which to take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import words_of_place
+
+if TYPE_CHECKING:
+    from ..scan.cloud import PointCloud
+    from .advice import Advice, Trial
+
+MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
+
+
+def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return head and rows of a table: what comes of a member length, of those around it and of others that were tried."""
+    radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
+    rows: list[tuple[str, ...]] = []
+    trials = {each: advice.try_length(each) for each in advice.around(length)}
+    trials |= {trial.length: trial for trial in advice.tried}
+    for each in sorted(trials):
+        trial = trials[each]
+        members = advice.members(each) if trial is None or trial.grid is None else len(trial.grid.edges)
+        rows.append(
+            (
+                f"{each:g}",
+                f"{members:,}",
+                f"{each**2 / (8.0 * radius):.2g}",
+                f"{each / cloud.spacing:.3g}",
+                result_of(trial),
+            )
+        )
+    return (f"length{unit}", "members", f"sag L^2/8R{unit}", "L / spacing", "a quick run"), rows
+
+
+def result_of(trial: Trial | None) -> str:
+    """Return in a few words what came of a length: what is lost and why, or why no grid passes."""
+    if trial is None:
+        return "not tried"
+    if trial.fault is not None:
+        return f"no grid passes: {_why(trial)}"
+    found = trial.grid.certificate if trial.grid is not None else None
+    if found is None:
+        return "passes"
+    said = ["passes with warnings" if found.warnings else "passes"]
+    shares: dict[str, float] = {}
+    for part in found.left_out:
+        if not part.asked and part.kind != "duplicates":
+            shares[part.words] = shares.get(part.words, 0.0) + part.share
+    said += [
+        f"{share:.1%} {words}"
+        for words, share in sorted(shares.items(), key=lambda kind: -kind[1])[:MOST_WORDS]
+        if share >= 0.0005
+    ]
+    holes = sum(part.kind == "hole" for part in found.left_out)
+    said += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
+    return ", ".join(said)
+
+
+def _why(trial: Trial) -> str:
+    """Return the first faults of the grid that came out, or why none did."""
+    grid = getattr(trial.fault, "grid", None)
+    if grid is not None and grid.certificate is not None:
+        return " and ".join(fault.words.partition(";")[0] for fault in grid.certificate.faults[:MOST_WORDS])
+    return str(trial.fault)
+
+
+def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
+    """Return how noisy and how bent the scan is, which lengths pass, and which to take."""
+    unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
+    bent = f"R = {radius:.3g}{unit}: 95 % of the scan is bent less" if np.isfinite(radius) else "the scan is flat"
+    lines = [bent]
+    if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
+        noise = trial.grid.certificate.noise
+        lines.append(f"noise {noise:.2g}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members")
+    lines += passing_lines(advice.tried, unit)
+    if trial is not None and not trial.passed:
+        where = trial.fault.where if trial.fault is not None else None
+        place = "" if where is None else f" (near {words_of_place(where)})"
+        near = advice.nearby(length)
+        lines += [f"at {length:g}{unit}: no grid passes: {_why(trial)}{place}"]
+        lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
+    else:
+        lines.append(f"try --length {length:g}")
+    return lines
+
+
+def passing_lines(trials: list[Trial], unit: str) -> list[str]:
+    """Return between which lengths all that were tried pass, the shortest first; nothing where none passes."""
+    spans: list[list[float]] = []
+    begins = True
+    for trial in trials:
+        if trial.passed and begins:
+            spans.append([])
+        if trial.passed:
+            spans[-1].append(trial.length)
+        begins = not trial.passed
+    if not spans:
+        return []
+    said = [f"{span[0]:g}" if len(span) == 1 else f"{span[0]:g} to {span[-1]:g}" for span in spans]
+    return [f"passes, of the {len(trials)} lengths tried: {', '.join(said)}{unit}"]
