@@ -46,6 +46,7 @@ LENGTHS = (
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
+MOST_FAULTS = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 COARSEST = 0.5  # largest of them, in desired lengths
@@ -59,6 +60,16 @@ class Attempt:
     starts: tuple[FieldStart, ...] | None = (
         None  #: how its fronts are laid out; None: as the effort of the settings allows
     )
+    faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+
+    def after(self, fault: FrontError) -> Attempt | None:
+        """The same attempt with the ridges given up where it failed; None where that is not known or follows no ridge."""
+        found = fault.grid.certificate if fault.grid is not None else None
+        places = [each.where for each in found.faults if each.where] if found is not None else []
+        places += [fault.where] if fault.where else []
+        new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
+        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
+        return replace(self, faults=self.faults + new) if new and follows and len(self.faults) < MOST_FAULTS else None
 
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

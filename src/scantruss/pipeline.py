@@ -124,7 +124,7 @@ def first_that_passes(
         if not hope.allows(attempt):
             continue
         try:
-            return make_grid(cloud, attempt, progress=progress)
+            return make_grid_with_most_ridges(cloud, attempt, progress=progress)
         except ScanTrussError as error:
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
                 if not isinstance(error, FrontError):
@@ -138,6 +138,19 @@ def first_that_passes(
     raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
 
 
+def make_grid_with_most_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
+    """Return the grid of one attempt; where it fails, ridges are given up near the faults, a few times."""
+    first: FrontError | None = None
+    later: Attempt | None = attempt
+    while later is not None:  # each turn gives up ridges at one more place at least, and there are not many
+        try:
+            return make_grid(cloud, later, progress=progress)
+        except FrontError as error:
+            first, later = first or error, later.after(error)
+    assert first is not None
+    raise first
+
+
 def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
     """Return the grid of one attempt, with its certificate: the method, one line a step (Figs. 1 and 4).
 
@@ -149,7 +162,7 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     settings = attempt.settings
     samples = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
     samples, boundary = find_boundary(samples, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
-    boundary, constraints = find_constraints(samples, boundary, settings)  # Sec. 4.2, lines, ridges
+    boundary, constraints = find_constraints(samples, boundary, settings, attempt.faults)  # Sec. 4.2, lines, ridges
     fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1

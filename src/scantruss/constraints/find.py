@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,10 @@ from .fixed_lines import add_polylines
 from .fixed_nodes import check_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
-from .ridges import add_ridges, find_ridges
+from .ridges import add_ridges, cut_around, find_ridges
 from .ridges_at_boundary import with_ridge_ends
+
+Place = tuple[float, float, float]
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -28,7 +31,9 @@ class Constraints:
     lines: Lines = NO_LINES  #: fixed lines and ridges
 
 
-def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> tuple[Boundary, Constraints]:
+def find_constraints(
+    samples: SurfaceSamples, boundary: Boundary, settings: Settings, faults: Sequence[Place] = ()
+) -> tuple[Boundary, Constraints]:
     """Return what the grid must keep: fixed nodes, fixed lines and the ridges of the scan; and the boundary with the ends of lines.
 
     Parameters
@@ -38,6 +43,8 @@ def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Sett
     boundary : Boundary
     settings : Settings
         `fixed`, `fixed_lines`, `ridge_angle`, `length`, `corner_angle`.
+    faults : places [scan unit], optional
+        Where grids failed that followed the ridges: there they are given up.
 
     Returns
     -------
@@ -52,14 +59,15 @@ def find_constraints(samples: SurfaceSamples, boundary: Boundary, settings: Sett
         leaves the scan.
     """
     positions = check_positions(settings.fixed, samples, settings.length)
-    ridges = ridges_that_are_kept(samples, settings)
+    ridges = wanted_ridges(samples, settings)
+    ridges = cut_around(ridges, np.reshape(faults, (-1, 3)) - samples.origin, settings.length)
     boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
     lines = find_lines(samples, boundary, ridges, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
     return replace(boundary, loops=ended), Constraints(positions, lines)
 
 
-def ridges_that_are_kept(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+def wanted_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
     """Return the ridges that the grid is to follow; see `ridges.find_ridges`."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
     return find_ridges(samples, settings) if wanted else []

@@ -41,6 +41,7 @@ FARTHEST = 20_000  # most places along a fold
 MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
+FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
 FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
 BETWEEN = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
 
@@ -199,9 +200,18 @@ class Tracer:
         sample = nearest_sample(self.surface, x, y, z)
         *normal, taken = kernels.points_around(self.surface, sample, (x, y, z), self.radii[-1], self.buffer)
         ahead, away = np.array(normal), self.buffer[:taken, :3]
+        if taken == 0:
+            return np.zeros(3)
+        squares = (away**2).sum(axis=1)
+        nearest = int(squares.argmin())
+        if (
+            squares[nearest] > max(FAR_OFF * self.length, 2.0 * self.spacing) ** 2
+        ):  # beside the scan, as a corner may be
+            beside: np.ndarray = -away[nearest]
+            return beside
         heights = away @ ahead
         radius = max(LOOK_AROUND * self.length, 2.5 * self.spacing)
-        heights = np.sort(heights[(away**2).sum(axis=1) - heights**2 < radius**2])
+        heights = np.sort(heights[squares - heights**2 < radius**2])
         tenth = len(heights) // 10
         low, high = (heights[tenth], heights[-1 - tenth]) if len(heights) >= FEWEST_AROUND else (0.0, 0.0)
         off = -low if low > 0.0 else (-high if high < 0.0 else 0.0)

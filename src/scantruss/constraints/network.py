@@ -209,7 +209,7 @@ class Network:
         found: list[tuple[float, int, int]] = []
         dropped = set()
         for track, (distance, foot) in zip(self.tracks, near, strict=True):
-            for begin, end in _runs(distance < MEETING_DISTANCE * self.length):
+            for begin, end in runs(distance < MEETING_DISTANCE * self.length):
                 whole = end - begin == len(points)
                 if arc[end - 1] - arc[begin] <= ALONGSIDE * self.length and not whole:
                     at = begin + int(distance[begin:end].argmin())
@@ -303,7 +303,7 @@ def _arc(points: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def _runs(marked: np.ndarray) -> list[tuple[int, int]]:
-    """First and one past the last index of each run of marked places."""
+def runs(marked: np.ndarray) -> list[tuple[int, int]]:
+    """Return first and one past the last index of each run of marked places (K,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

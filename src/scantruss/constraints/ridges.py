@@ -11,17 +11,19 @@ from ..boundary.polylines import divide
 from ..kernels.surface.ridges import BEND
 from .fixed_lines import LINE_STEP
 from .fold_tracing import FULL, STRIDE, Tracer
+from .network import Network, runs
 from .ridge_ends import Ridge, join_ends
 
 if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
-    from .network import Network
 
 BESIDE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
 NEARLY = 0.9  # share of the ridge angle that counts as full: noise takes some away
 SHARE = 0.55  # least share of a ridge that has the full angle ...
 LONG_FULL = 2.5  # ... unless it has it over this length [member lengths]
+CUT = 1.2  # distance from a fault within which ridges are given up [member lengths]
+LEFT = 2.0  # least length of what is left of such a ridge [member lengths]
 SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]
 SHORTEST = 0.35  # shortest such ridge [member lengths]
 
@@ -58,6 +60,23 @@ def kept_ridges(ridges: list[Ridge], length: float) -> list[Ridge]:
         kept.append(joined[0])
         others = [ridge for ridge in others if ridge is not joined[0]]
     return kept
+
+
+def cut_around(ridges: list[Ridge], places: np.ndarray, length: float) -> list[Ridge]:
+    """Return the ridges without what lies near some places (M, 3), where no grid could follow them; parts that are too short go."""
+    found = []
+    for ridge in ridges:
+        away = np.linalg.norm(ridge.places[:, None] - places, axis=2).min(axis=1) if len(places) else np.ones(1)
+        if len(places) == 0 or away.min() > CUT * length:
+            found.append(ridge)
+            continue
+        first = int(away.argmin()) if ridge.ring else 0
+        line, far = np.roll(ridge.places, -first, axis=0), np.roll(away, -first) > CUT * length
+        for begin, end in runs(far):
+            part = line[begin:end]
+            if np.linalg.norm(np.diff(part, axis=0), axis=1).sum() >= LEFT * length:
+                found.append(Ridge(part, ridge.sharp))
+    return found
 
 
 def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
