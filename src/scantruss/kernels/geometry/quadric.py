@@ -99,7 +99,7 @@ def fit_heights(
 
     buffer[:, AWAY] gets the heights over the fit. matrix (6, 7) is scratch.
     """
-    while True:
+    while True:  # the size falls from 6 to 3 to 1
         normal_equations(buffer, taken, matrix)
         for r in range(size):
             matrix[r, size] = matrix[r, 6]

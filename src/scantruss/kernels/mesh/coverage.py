@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, nearest, put, slot_of
 from ..geometry.triangles import distance_to_triangle
 from ..geometry.vectors import norm, row, subtract
+
+DOUBLINGS = 50  # times that a reach is doubled at most: from any box to all of them
 
 
 @kernel
@@ -49,13 +53,15 @@ def nearest_distances(
 ) -> None:
     """Distance (Q,) of each of the others (Q, 3) to the nearest place; the search starts with `near` and goes on to twice as far.
 
-    boxes : the places (P, 3) by box, one at least.
+    boxes : the places (P, 3) by box, one at least. Inf where the nearest is beyond `DOUBLINGS` of the first reach.
     """
     for q in range(len(others)):
         x, y, z = row(others, q)
         reach = near
         found = nearest(boxes, places, x, y, z, reach)
-        while found < 0:
+        for _ in range(DOUBLINGS):
+            if found >= 0:
+                break
             reach *= 2.0
             found = nearest(boxes, places, x, y, z, reach)
-        distance[q] = norm(subtract(row(places, found), (x, y, z)))
+        distance[q] = norm(subtract(row(places, found), (x, y, z))) if found >= 0 else math.inf

@@ -45,7 +45,7 @@ def fit_patches(
         while taken == ROOM and share > 1.0:
             share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
-        while True:
+        while True:  # the share falls to one
             fit(buffer, taken, share * radii[i], PATCH_FITS, patch, matrix)
             if patch[12] <= usual[i] or share <= 1.0:
                 break

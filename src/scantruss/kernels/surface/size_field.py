@@ -16,6 +16,7 @@ SPREAD, ASIDE = (
     14.4,
     14.0,
 )  # of a curvature: by noise in the middle of a patch, and how it grows towards the boundary of the scan
+GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
 NEAREST = 12  # given lengths that count at a place; the next one says how far away a length counts
 
 
@@ -56,11 +57,11 @@ def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: f
     """Shorten lengths (S,) that grow by more than `slope` per way over the links of the samples; returns the sweeps made.
 
     What is left is the largest field below the given one of which no place is longer than another by more than the slope times
-    the way between them: the least of all lengths each grown by its way, whatever the order of the sweeps.
+    the way between them: the least of all lengths each grown by its way, whatever the order of the sweeps. A sweep settles at least
+    one more sample of each way, so that there are no more than samples (Bellman and Ford).
     """
     sweeps = 0
-    changed = True
-    while changed:
+    for _ in range(len(mean) + 1):
         changed = False
         sweeps += 1
         for i in range(len(mean)):
@@ -76,6 +77,8 @@ def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: f
                 elif lengths[n] > lengths[s] + way:
                     lengths[n] = lengths[s] + way
                     changed = True
+        if not changed:
+            break
     return sweeps
 
 
@@ -97,10 +100,12 @@ def blend_lengths(
     for s in range(len(places)):
         place = row(places, s)
         reach *= 0.7
-        count = 0
-        while count < wanted:
+        count = search(boxes, given, place[0], place[1], place[2], reach, found)
+        for _ in range(GROWTHS):
+            if count >= wanted:
+                break
+            reach *= 1.5
             count = search(boxes, given, place[0], place[1], place[2], reach, found)
-            reach *= 1.0 if count >= wanted else 1.5
         kept = 0
         for i in range(count):
             away = norm(subtract(row(given, found[i]), place))
