@@ -474,13 +474,13 @@ def family_of(seed: int) -> str:
     return list(FAMILIES)[seed % len(FAMILIES)]
 
 
-def edged_surface(seed: int) -> RandomSurface:
-    """Return the surface of a seed; the same seed gives the same bytes."""
+def edged_surface(seed: int, nodes: tuple[int, int] = NODES) -> RandomSurface:
+    """Return the surface of a seed for a grid of about so many nodes; the same seed gives the same bytes."""
     rng = np.random.default_rng([seed, 20260])
     maker = FAMILIES[family_of(seed)](rng)
-    nodes = float(np.exp(rng.uniform(*np.log(NODES))))
+    wanted = float(np.exp(rng.uniform(*np.log(nodes))))
     unit = maker.form(1.0, 0.0)
-    size = max(np.sqrt(nodes * PER_NODE / unit.area), FACE / unit.face)
+    size = max(np.sqrt(wanted * PER_NODE / unit.area), FACE / unit.face)
     fillet = float(rng.choice([0.0, rng.uniform(0, 1)]))
     form = maker.form(float(size), fillet)
     density = float(np.exp(rng.uniform(np.log(20), np.log(120))))

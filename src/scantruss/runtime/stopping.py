@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
-PATIENCE = 1.0  # time in which the main thread may end by itself [s]
+PATIENCE = 0.5  # time in which the main thread may end by itself [s]
 STATUS: dict[int, int] = {signal.SIGINT: 130, signal.SIGTERM: 143}
 WORDS: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "stopped"}
 
