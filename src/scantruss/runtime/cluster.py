@@ -92,7 +92,7 @@ class Processes(Workers):
         self.words = f"on {count} processes of this machine"
         self._others = set(multiprocessing.active_children())
         self._folder = tempfile.TemporaryDirectory(prefix="scantruss-", ignore_cleanup_errors=True)
-        resource_tracker.ensure_running()  # started later, it would let signals through again
+        _start_tracker()
         self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_begin)
         left_behind(self._kill)
 
@@ -142,6 +142,18 @@ class Processes(Workers):
         for process in set(multiprocessing.active_children()) - self._others:
             process.kill()
         self._folder.cleanup()
+
+
+def _start_tracker() -> None:
+    """Start what removes the semaphores of a pool that is ended hard, silent about it; later it would let signals through again."""
+    with signals_held():
+        kept = os.environ.get("PYTHONWARNINGS")
+        os.environ["PYTHONWARNINGS"] = "ignore"
+        resource_tracker.ensure_running()
+        if kept is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = kept
 
 
 def _begin() -> None:
