@@ -44,9 +44,9 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud, *, force: bool = Fals
         What was written.
     """
     from ..export.formats import write
-    from .print import print_apart
     from ..report.figures import report_of
     from ..runtime.files import SaveTogether
+    from .print import print_apart
 
     with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
