@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from surfaces import Floats
@@ -17,6 +17,7 @@ NECK = 3.0  #: least width of necks and bays, least distance of holes [member]
 BEND = 0.5  #: most curvature of the heights, in both directions together [1 / member]
 SLOPE = 1.2  #: steepest rise
 NOISE = 0.1  #: most noise [member]
+Motion = Callable[[Floats], Floats]
 ROUND = np.linspace(0, 2 * np.pi, 721)[:-1]
 
 
@@ -39,6 +40,16 @@ class RandomSurface:
     def euler(self) -> int:
         """V - E + T of the true surface."""
         return 2 - len(self.loops)
+
+
+class Relief(Protocol):
+    """Heights over the plane, in members."""
+
+    def slope(self, xy: Floats) -> Floats:
+        """How steep the surface rises at places (K, 2), (K, 2)."""
+
+    def lift(self, xy: Floats) -> Floats:
+        """Places on the surface (K, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,15 +148,19 @@ def random_holes(
 
 def sample(
     rng: np.random.Generator,
-    heights: Heights,
+    heights: Relief,
     kept: Callable[[Floats], Any],
     half: float,
     density: float,
     facts: dict[str, float],
+    steepest: float = np.hypot(1, SLOPE),
 ) -> Floats:
-    """Return places on the kept part of the surface (N, 3), at least `density` of them a member squared."""
+    """Return places on the kept part of the surface (N, 3), at least `density` of them a member squared.
+
+    `steepest`: the most area over an area of the plan.
+    """
     ratio, even = facts["density ratio"], facts["even"] > 0
-    most = density * ratio * np.hypot(1, SLOPE)
+    most = density * ratio * steepest
     if even:
         side = np.arange(-half, half, 1 / np.sqrt(most))
         xy = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
@@ -155,8 +170,22 @@ def sample(
     thin = ratio ** ((xy[:, 0] - half) / (2 * half))
     xy = xy[rng.random(len(xy)) < thin]
     xy = xy[kept(xy)]
-    steep = np.hypot(1, np.linalg.norm(heights.slope(xy), axis=1)) / np.hypot(1, SLOPE)
+    steep = np.hypot(1, np.linalg.norm(heights.slope(xy), axis=1)) / steepest
     return rng.permutation(heights.lift(xy[rng.random(len(xy)) < steep]))
+
+
+def random_motion(rng: np.random.Generator) -> tuple[Motion, Motion, float]:
+    """Return a motion from members into the frame of a scan, the way back, and the member length there."""
+    turn, upper = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn *= np.sign(np.diag(upper))
+    turn[:, 0] *= np.linalg.det(turn)
+    length = float(10 ** rng.uniform(-2, 3))
+    shift = length * rng.normal(size=3) * float(rng.choice([0, 30, 1e6]))
+    return (
+        lambda p: np.asarray(length * (p @ turn.T) + shift),
+        lambda p: np.asarray((p - shift) @ turn / length),
+        length,
+    )
 
 
 def random_surface(seed: int) -> RandomSurface:
@@ -183,17 +212,10 @@ def random_surface(seed: int) -> RandomSurface:
 
     points = sample(rng, heights, kept, float(np.abs(rim).max()), facts["density"], facts)
     points += facts["noise"] * rng.normal(size=points.shape)
-    turn, upper = np.linalg.qr(rng.normal(size=(3, 3)))
-    turn *= np.sign(np.diag(upper))
-    turn[:, 0] *= np.linalg.det(turn)
-    length = float(10 ** rng.uniform(-2, 3))
-    shift = length * rng.normal(size=3) * float(rng.choice([0, 30, 1e6]))
-
-    def motion(p: Floats) -> Floats:
-        return np.asarray(length * (p @ turn.T) + shift)
+    motion, back, length = random_motion(rng)
 
     def distance(p: Floats) -> Floats:
-        own = (p - shift) @ turn / length
+        own = back(p)
         return np.asarray(
             length
             * np.abs(own[:, 2] - heights.at(own[:, :2]))

@@ -595,14 +595,16 @@ def test_a_fault_of_ours_is_one_line_too(
         (CertificateError("fails"), 3),
         (KeyboardInterrupt(), 130),
         (BrokenPipeError(), 141),
-        (cli._Stopped(), 143),
+        (signal.SIGTERM, 143),
     ],
 )
 def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(
     error: BaseException | None, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def run(_: Any) -> None:
-        if error is not None:
+        if isinstance(error, signal.Signals):
+            signal.raise_signal(error)
+        elif error is not None:
             raise error
 
     monkeypatch.delenv("SCANTRUSS_TRACEBACK", raising=False)

@@ -82,14 +82,15 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
     Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
     joined directly.
     """
-    while True:
+    for _ in range(len(curve)):  # each cut takes away more places than it adds
         normals = _normals_along(surface, curve)
         high = min(len(curve) // 2, round(30.0 * width / step))
         at, gap = kernels.widest_spike(curve, normals, width, round(2.5 * width / step), high)
         if gap == 0:
-            return curve
+            break
         curve = np.roll(curve, -at, axis=0)
         curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
+    return curve
 
 
 def smooth_between(

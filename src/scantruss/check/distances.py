@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 FIRST_REACH = 0.1  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
+GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
 BOX = 0.5  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]
 AROUND = 12  # points through which the plane at a node goes
@@ -57,11 +58,13 @@ def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np
     """
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     waiting, reach = np.arange(len(points)), FIRST_REACH * length
-    while len(waiting):
+    for _ in range(GROWTHS):
         index = triangle_boxes(grid.nodes, grid.triangles, max(BOX * length, reach), reach)
         look_up = partial(nearest_triangles, points, index, grid.nodes, grid.triangles, waiting, distance, nearest)
         in_parts(len(waiting), POINTS_PER_THREAD, lambda _, begin, end: look_up(begin, end))  # noqa: B023
         waiting = waiting[nearest[waiting] < 0]
+        if not len(waiting):
+            break
         reach *= 4.0
     return distance, nearest
 

@@ -44,9 +44,9 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud, *, force: bool = Fals
         What was written.
     """
     from ..export.formats import write
-    from ..export.solid import print_model
     from ..report.figures import report_of
     from ..runtime.files import SaveTogether
+    from .print import print_apart
 
     with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
@@ -54,7 +54,7 @@ def save_demo(folder: Path, grid: Grid, cloud: PointCloud, *, force: bool = Fals
             write(grid, save.beside(folder / name), cloud=cloud)
         save.json(folder / "grid.settings.json", (grid.settings or demo_settings()).to_dict())
         save.json(folder / "report.json", report_of(grid, len(cloud.points)))
-        print_model(
+        print_apart(
             grid,
             save.beside(folder / "model.3mf"),
             member_diameter=MEMBER_DIAMETER,

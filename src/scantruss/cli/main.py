@@ -5,16 +5,16 @@ A refusal is one line on stderr and an exit status of `HELP`; nothing is written
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import sys
 from collections.abc import Sequence
-from types import FrameType, ModuleType
+from types import ModuleType
 from typing import cast
 
 from .. import __version__
 from ..errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
+from ..runtime.stopping import STATUS, asked, note_told, signals_heard, words_of_stop
 
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equal members
@@ -45,9 +45,6 @@ Exit status (if it is not 0, one line says why):
   141  the reader of the output has gone, as in "| head -1" (no line)
   143  terminated (SIGTERM)
 """
-
-
-STOPPED = "stopped; nothing was written"
 
 
 def run(words: Sequence[str]) -> None:
@@ -96,58 +93,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Words after the name of the program; `sys.argv` by default.
     """
-    kept, _Stopped.asked = signal.getsignal(signal.SIGTERM), False
     try:
-        try_signal(signal.SIGTERM, _stop)
-        run(sys.argv[1:] if arguments is None else arguments)
-        sys.stdout.flush()
-    except BrokenPipeError:  # the reader of the output has gone, as in `scantruss info scan.ply | head -1`
+        with signals_heard():
+            try:
+                run(sys.argv[1:] if arguments is None else arguments)
+                sys.stdout.flush()
+            except BaseException as error:
+                return end(error)
+    except KeyboardInterrupt as error:  # while another end was told of
+        return end(error)
+    return 0
+
+
+def end(error: BaseException) -> int:
+    """Say why a command has ended early and return the exit status; what says nothing in words is raised again."""
+    if (number := asked()) is not None:  # whoever was interrupted may have made another error of it
+        return refuse(words_of_stop(number), STATUS[number])
+    if isinstance(
+        error, BrokenPipeError
+    ):  # the reader of the output has gone, as in `scantruss info scan.ply | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
-    except _Stopped:
-        return refuse(STOPPED, 143)
-    except KeyboardInterrupt:
-        return refuse("interrupted; nothing was written", 130)
-    except FrontError as error:
+    if isinstance(error, KeyboardInterrupt):
+        return refuse(words_of_stop(signal.SIGINT), STATUS[signal.SIGINT])
+    if isinstance(error, FrontError):
         place = "" if error.where is None else f" (near {words_of_place(error.where)})"
         return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)
-    except ScanTrussError as error:
+    if isinstance(error, ScanTrussError):
         return refuse(str(error))
-    except OSError as error:
+    if isinstance(error, OSError):
         names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name)
         return refuse(f"{error.strerror or error}{f': {names}' if names else ''}")
-    except MemoryError:
+    if isinstance(error, MemoryError):
         return refuse("not enough memory; use fewer points or a larger --length")
-    except Exception as error:
-        if _Stopped.asked:  # the interrupted code, such as the compiler, may have turned it into another error
-            return refuse(STOPPED, 143)
-        if os.environ.get("SCANTRUSS_TRACEBACK"):
-            raise
-        words = f"{type(error).__name__}: {error}"
-        return refuse(f"a bug in ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
-    finally:
-        try_signal(signal.SIGTERM, kept)
-    return 0
+    if os.environ.get("SCANTRUSS_TRACEBACK") or not isinstance(error, Exception):
+        raise error
+    words = f"{type(error).__name__}: {error}"
+    return refuse(f"a bug in ScanTruss, {words}; please report it with what SCANTRUSS_TRACEBACK=1 shows", 1)
 
 
 def refuse(message: str, status: int = 2) -> int:
     """Print the reason in one line and return the exit status."""
+    note_told()
     print("scantruss:", " ".join(message.split()), file=sys.stderr)
     return status
-
-
-class _Stopped(BaseException):
-    """The process was asked to end (SIGTERM); half-written files are removed."""
-
-    asked = False
-
-
-def _stop(number: int, frame: FrameType | None) -> None:
-    _Stopped.asked = True
-    raise _Stopped
-
-
-def try_signal(number: int, handler: object) -> None:
-    """Set a signal handler where that is possible (only the main thread may)."""
-    with contextlib.suppress(ValueError, TypeError):
-        signal.signal(number, handler)  # type: ignore[arg-type]

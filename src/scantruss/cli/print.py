@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from ..export.solid_files import Solid
+    from ..grid.grid import Grid
     from .options import Parser
+
+MOST_HERE = 500  # members and nodes that are united in this process
 
 
 def print_parser() -> Parser:
@@ -40,13 +44,12 @@ def print_solid(values: Namespace) -> None:
     for out in outs:
         claim(out, "model", taken, force=values.force)
     from ..export.json import read_grid
-    from ..export.solid import print_model
 
     result = read_grid(values.grid)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         for number, out in enumerate(outs):
             bars("solid", number / len(outs))
-            solid = print_model(
+            solid = print_apart(
                 result,
                 save.beside(out),
                 member_diameter=values.member_diameter,
@@ -58,6 +61,24 @@ def print_solid(values: Namespace) -> None:
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
     notes = [note for out in outs for note in model_note(out, solid.unit)]
     print_lines([*solid.notes, *notes, f"wrote {' '.join(map(str, outs))}: {bodies}, {size} {solid.unit}".rstrip()])
+
+
+def print_apart(grid: Grid, path: Path, **options: Any) -> Solid:
+    """Write the solid of a grid (see `print_model`), a large one in a process of its own, which can be ended at any moment.
+
+    The library that unites the parts lets nobody else work meanwhile, and nobody hear of a signal.
+    """
+    from ..runtime.cluster import Processes, Workers
+
+    with Processes(1) if len(grid.nodes) + len(grid.edges) > MOST_HERE else Workers() as worker:
+        return next(worker.run(_print, [(grid, path)], options))[1]
+
+
+def _print(job: tuple[Grid, Path], options: dict[str, Any]) -> Solid:
+    from ..export.solid import print_model
+
+    grid, path = job
+    return print_model(grid, path, **options)
 
 
 def model_note(out: Path, unit: str) -> list[str]:

@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from itertools import islice
@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 from .. import __version__
 from ..errors import InputError, ScanTrussError
 from .parallel import processors
+from .stopping import is_clean, left_behind, signals_held
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -91,8 +92,9 @@ class Processes(Workers):
         self.words = f"on {count} processes of this machine"
         self._others = set(multiprocessing.active_children())
         self._folder = tempfile.TemporaryDirectory(prefix="scantruss-", ignore_cleanup_errors=True)
-        resource_tracker.ensure_running()  # started later, it would let signals through again
+        _start_tracker()
         self._pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_begin)
+        left_behind(self._kill)
 
     def run(self, work: Work[Job, Result], jobs: Iterable[Job], shared: Any = None) -> Iterator[tuple[int, Result]]:
         """Yield the number of each job and its result, in the order in which jobs are done."""
@@ -102,7 +104,7 @@ class Processes(Workers):
         try:
             while True:
                 for number, job in islice(coming, AHEAD * self.count - len(running)):
-                    with _signals_held():  # a process that is half started can be neither used nor ended
+                    with signals_held():  # a process that is half started can be neither used nor ended
                         running[self._pool.submit(_with_shared, work, job, path)] = number
                 if not running:
                     return
@@ -127,13 +129,31 @@ class Processes(Workers):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the processes, whatever they do."""
-        with _signals_held():
+        """End the processes, after an error whatever they do."""
+        with signals_held():
             if kind:
-                for process in set(multiprocessing.active_children()) - self._others:
-                    process.kill()
+                self._kill()
             self._pool.shutdown(cancel_futures=True)
             self._folder.cleanup()
+            is_clean(self._kill)
+
+    def _kill(self) -> None:
+        """End the processes, whatever they do."""
+        for process in set(multiprocessing.active_children()) - self._others:
+            process.kill()
+        self._folder.cleanup()
+
+
+def _start_tracker() -> None:
+    """Start what removes the semaphores of a pool that is ended hard, silent about it; later it would let signals through again."""
+    with signals_held():
+        kept = os.environ.get("PYTHONWARNINGS")
+        os.environ["PYTHONWARNINGS"] = "ignore"
+        resource_tracker.ensure_running()
+        if kept is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = kept
 
 
 def _begin() -> None:
@@ -155,28 +175,6 @@ def _with_shared(work: Callable[[Any, Any], Any], job: Any, path: str) -> Any:
 @lru_cache(1)
 def _read_shared(path: str) -> Any:
     return pickle.loads(Path(path).read_bytes())
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Hold Ctrl-C and a polite end back until the block is done; processes started in it never receive Ctrl-C."""
-    came: list[int] = []
-    with ExitStack() as stack:
-        stack.callback(_raise_all, came)
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                if callable(kept := signal.getsignal(number)):
-                    signal.signal(number, lambda number, frame: came.append(number))
-                    stack.callback(signal.signal, number, kept)
-        if hasattr(signal, "pthread_sigmask"):  # processes and threads inherit the mask
-            stack.callback(signal.pthread_sigmask, signal.SIG_SETMASK, signal.pthread_sigmask(signal.SIG_BLOCK, []))
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        yield
-
-
-def _raise_all(numbers: list[int]) -> None:
-    for number in numbers:
-        signal.raise_signal(number)
 
 
 class Cluster(Workers):

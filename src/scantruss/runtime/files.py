@@ -10,13 +10,16 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from ..errors import FormatError
 from .ours import MARK, check_ours
+from .stopping import is_clean, left_behind, put_into_place, signals_held
 
 
 def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
@@ -79,6 +82,7 @@ class SaveTogether:
 
     def __enter__(self) -> SaveTogether:
         """Start."""
+        left_behind(self._remove)
         return self
 
     def __exit__(
@@ -88,19 +92,25 @@ class SaveTogether:
         try:
             if kind is None:
                 self._move()
-                self._made.clear()
             elif isinstance(error, FormatError):
                 raise FormatError(self._in_place(str(error))) from None
         finally:
-            for folder in (*self._folders.values(), *reversed(self._made)):
-                shutil.rmtree(folder, ignore_errors=True)
+            with signals_held():
+                self._remove()
+                is_clean(self._remove)
+
+    def _remove(self) -> None:
+        """Remove what is not in place."""
+        for folder in (*self._folders.values(), *reversed(self._made)):
+            shutil.rmtree(folder, ignore_errors=True)
 
     def make_folder(self, folder: str | Path) -> Path:
         """Make a folder for results; it is removed again if the run fails."""
         folder = Path(folder)
         missing = [place for place in (folder, *folder.parents) if not place.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
-        self._made.extend(reversed(missing))
+        with signals_held():
+            folder.mkdir(parents=True, exist_ok=True)
+            self._made.extend(reversed(missing))
         return folder
 
     def beside(self, path: str | Path) -> Path:
@@ -116,7 +126,8 @@ class SaveTogether:
     def _folder(self, place: Path) -> Path:
         """Return the temporary folder in a place."""
         if place not in self._folders:
-            self._folders[place] = Path(tempfile.mkdtemp(prefix=".scantruss-", dir=place))
+            with signals_held():
+                self._folders[place] = Path(tempfile.mkdtemp(prefix=".scantruss-", dir=place))
         return self._folders[place]
 
     def _in_place(self, message: str) -> str:
@@ -145,14 +156,31 @@ class SaveTogether:
         for file, target in pipes:
             with file.open("rb") as source, target.open("wb") as pipe:
                 shutil.copyfileobj(source, pipe)
-        for file, target in moves:
-            file.replace(target)
+        with put_into_place():
+            for file, target in moves:
+                file.replace(target)
+            self._made.clear()
 
     def _beside_linked(self, file: Path, link: Path) -> tuple[Path, Path]:
         """Return a copy of a file beside what a link points to, which may be on another disk, and that place."""
         linked = Path(os.path.realpath(link))
         folder = Path(tempfile.mkdtemp(prefix="linked-", dir=self._folder(linked.parent)))
         return Path(shutil.copyfile(file, folder / file.name)), linked
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Give a folder that is removed after the block, and however the command ends."""
+    with signals_held():
+        folder = Path(tempfile.mkdtemp(prefix="scantruss-"))
+        remove = partial(shutil.rmtree, folder, ignore_errors=True)
+        left_behind(remove)
+    try:
+        yield folder
+    finally:
+        with signals_held():
+            remove()
+            is_clean(remove)
 
 
 def write_files(contents: Mapping[Path, bytes]) -> list[Path]:

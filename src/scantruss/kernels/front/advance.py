@@ -102,7 +102,7 @@ def choose_by_quality(
                 score[i] = 0.95 * value  # a candidate node that the front has not reached yet
     enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = False
-    while True:
+    while True:  # each turn proposes the one new node or takes a candidate out
         best = -1
         for i in range(near + 1):
             if score[i] > 0.0 and (best < 0 or score[i] > score[best]):

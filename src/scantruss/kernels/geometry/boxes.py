@@ -99,36 +99,80 @@ def take(boxes: SearchBoxes, item: int, x: float, y: float, z: float) -> None:
 
 
 @kernel
+def is_wide(boxes: SearchBoxes, x: float, y: float, z: float, reach: float) -> bool:
+    """Whether more boxes than the table has slots may hold what is within `reach` of a place: then all that are occupied are looked at."""
+    total = 1
+    for axis in range(3):
+        at = x if axis == 0 else (y if axis == 1 else z)
+        total *= box_index(boxes, axis, at + reach) - box_index(boxes, axis, at - reach) + 1
+    return total > len(boxes.keys)
+
+
+@kernel
+def _search_box(
+    boxes: SearchBoxes,
+    slot: int,
+    positions: np.ndarray,
+    x: float,
+    y: float,
+    z: float,
+    reach: float,
+    found: np.ndarray,
+    count: int,
+) -> int:
+    """Add the items of a box within `reach` of a place to the `count` found so far; returns how many there are."""
+    item = boxes.first[slot]
+    while item >= 0:
+        dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
+        if dx * dx + dy * dy + dz * dz <= reach * reach and count < len(found):
+            found[count] = item
+            count += 1
+        item = boxes.next[item]
+    return count
+
+
+@kernel
 def search(
     boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float, found: np.ndarray
 ) -> int:
     """Find the items within `reach` of a place; returns how many, at most len(found)."""
     count = 0
+    if is_wide(boxes, x, y, z, reach):
+        for slot in range(len(boxes.first)):
+            count = _search_box(boxes, slot, positions, x, y, z, reach, found, count)
+        return count
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
             for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                item = boxes.first[slot_of(boxes, i, j, k)]
-                while item >= 0:
-                    dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
-                    if dx * dx + dy * dy + dz * dz <= reach * reach and count < len(found):
-                        found[count] = item
-                        count += 1
-                    item = boxes.next[item]
+                count = _search_box(boxes, slot_of(boxes, i, j, k), positions, x, y, z, reach, found, count)
     return count
+
+
+@kernel
+def _nearest_in_box(
+    boxes: SearchBoxes, slot: int, positions: np.ndarray, x: float, y: float, z: float, best: int, least: float
+) -> tuple[int, float]:
+    """The nearest of the items of a box and the best so far, and its squared distance."""
+    item = boxes.first[slot]
+    while item >= 0:
+        dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
+        dd = dx * dx + dy * dy + dz * dz
+        if dd < least or (dd == least and item < best):
+            best, least = item, dd
+        item = boxes.next[item]
+    return best, least
 
 
 @kernel
 def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: float, reach: float) -> int:
     """The item nearest to x, y, z within `reach`, of equals the first; -1 if there is none."""
     best, least = -1, reach * reach
+    if is_wide(boxes, x, y, z, reach):
+        for slot in range(len(boxes.first)):
+            best, least = _nearest_in_box(boxes, slot, positions, x, y, z, best, least)
+        return best
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
             for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                item = boxes.first[slot_of(boxes, i, j, k)]
-                while item >= 0:
-                    dx, dy, dz = positions[item, 0] - x, positions[item, 1] - y, positions[item, 2] - z
-                    dd = dx * dx + dy * dy + dz * dz
-                    if dd < least or (dd == least and item < best):
-                        best, least = item, dd
-                    item = boxes.next[item]
+                best, least = _nearest_in_box(boxes, slot_of(boxes, i, j, k), positions, x, y, z, best, least)
     return best

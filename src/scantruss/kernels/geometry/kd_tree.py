@@ -14,6 +14,7 @@ from ...runtime.jit import kernel
 
 POINTS_OF_LEAF = 10  # most points of a leaf
 STACK_LEVELS = 64  # levels that the stack of a search has room for, more than any tree has
+QUICK_TURNS = 200  # turns with the median of three, far more than usual, which is about two a level
 
 
 class KDTree(NamedTuple):
@@ -52,12 +53,28 @@ def _swap(tree: KDTree, i: int, j: int) -> None:
 
 
 @kernel
+def _range_of(tree: KDTree, axis: int, low: int, high: int) -> tuple[float, float]:
+    """Least and largest coordinate of the points from low to high."""
+    least, most = np.inf, -np.inf
+    for p in range(low, high + 1):
+        least, most = min(least, tree.points[p, axis]), max(most, tree.points[p, axis])
+    return least, most
+
+
+@kernel
 def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
     """Order the points from begin to end - 1 so that none before `middle` has a larger coordinate than any from it on."""
-    low, high = begin, end - 1
-    while low < high:
-        a, b, c = tree.points[low, axis], tree.points[(low + high) // 2, axis], tree.points[high, axis]
-        pivot = max(min(a, b), min(max(a, b), c))
+    low, high, turns = begin, end - 1, 0
+    while low < high:  # at least one point is left out of each turn
+        turns += 1
+        if (
+            turns > QUICK_TURNS
+        ):  # points in an order that defeats the median of three: the range of the values is halved
+            least, most = _range_of(tree, axis, low, high)
+            pivot = 0.5 * least + 0.5 * most
+        else:
+            a, b, c = tree.points[low, axis], tree.points[(low + high) // 2, axis], tree.points[high, axis]
+            pivot = max(min(a, b), min(max(a, b), c))
         i, j = low, high
         while i <= j:
             while tree.points[i, axis] < pivot:

@@ -107,7 +107,7 @@ def fit_heights(
     Where the points do not determine `size` coefficients, a plane is fitted, or their mean height. The residuals go into the buffer.
     matrix : (6, 7) scratch
     """
-    while True:
+    while True:  # the size falls from 6 to 3 to 1
         normal_equations(buffer, taken, matrix)
         for r in range(size):
             matrix[r, size] = matrix[r, TERMS_OF_QUADRIC]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, put
 from ..geometry.vectors import norm, row, subtract
+
+DOUBLINGS = 50  # times that a reach is doubled at most: from any box to all of them
 
 
 @kernel
@@ -22,13 +26,15 @@ def nearest_distances(
 ) -> None:
     """Fill in the distance (Q,) of each of the others (Q, 3) from the nearest place; the search radius is doubled from `near` on.
 
-    boxes : the places (P, 3) by box, at least one.
+    boxes : the places (P, 3) by box, at least one. Inf if the nearest is beyond `DOUBLINGS` of the first radius.
     """
     for q in range(len(others)):
         x, y, z = row(others, q)
         reach = near
         found = nearest(boxes, places, x, y, z, reach)
-        while found < 0:
+        for _ in range(DOUBLINGS):
+            if found >= 0:
+                break
             reach *= 2.0
             found = nearest(boxes, places, x, y, z, reach)
-        distance[q] = norm(subtract(row(places, found), (x, y, z)))
+        distance[q] = norm(subtract(row(places, found), (x, y, z))) if found >= 0 else math.inf

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.boxes import SearchBoxes, box_index, new_boxes, put_into, slot_of
+from ..geometry.boxes import SearchBoxes, box_index, is_wide, new_boxes, put_into, slot_of
 from ..geometry.planes import plane_of
 from ..geometry.triangles import distance_to_triangle
 from ..geometry.vectors import Vector, dot, norm, row, subtract
+
+GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
 
 
 class TriangleBoxes(NamedTuple):
@@ -93,32 +95,50 @@ def nearest_triangles(
 
 
 @kernel
+def _nearest_of_box(
+    boxes: SearchBoxes,
+    slot: int,
+    points: np.ndarray,
+    place: Vector,
+    reach: float,
+    found: np.ndarray,
+    squares: np.ndarray,
+    count: int,
+) -> int:
+    """Put the points of a box among the `count` nearest so far; returns how many there are."""
+    p = boxes.first[slot]
+    while p >= 0:
+        d = subtract(row(points, p), place)
+        square = dot(d, d)
+        most = len(found)
+        near = square <= reach * reach and (count < most or square <= squares[count - 1])
+        if near and not (count == most and square == squares[most - 1] and p > found[most - 1]):
+            at = min(count, most - 1)
+            while at > 0 and (squares[at - 1] > square or (squares[at - 1] == square and found[at - 1] > p)):
+                squares[at], found[at] = squares[at - 1], found[at - 1]
+                at -= 1
+            squares[at], found[at] = square, p
+            count = min(count + 1, most)
+        p = boxes.next[p]
+    return count
+
+
+@kernel
 def nearest_points(
     boxes: SearchBoxes, points: np.ndarray, place: Vector, reach: float, found: np.ndarray, squares: np.ndarray
 ) -> int:
     """Find the points nearest to a place within reach, nearest first, of equals the first; returns how many, at most len(found)."""
     count = 0
     x, y, z = place
+    if is_wide(boxes, x, y, z, reach):
+        for slot in range(len(boxes.first)):
+            count = _nearest_of_box(boxes, slot, points, place, reach, found, squares, count)
+        return count
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
             for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                p = boxes.first[slot_of(boxes, i, j, k)]
-                while p >= 0:
-                    dx, dy, dz = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
-                    square = dx * dx + dy * dy + dz * dz
-                    if square <= reach * reach and (count < len(found) or square <= squares[count - 1]):
-                        at = min(count, len(found) - 1)
-                        if count == len(found) and square == squares[at] and p > found[at]:
-                            p = boxes.next[p]
-                            continue
-                        while at > 0 and (
-                            squares[at - 1] > square or (squares[at - 1] == square and found[at - 1] > p)
-                        ):
-                            squares[at], found[at] = squares[at - 1], found[at - 1]
-                            at -= 1
-                        squares[at], found[at] = square, p
-                        count = min(count + 1, len(found))
-                    p = boxes.next[p]
+                slot = slot_of(boxes, i, j, k)
+                count = _nearest_of_box(boxes, slot, points, place, reach, found, squares, count)
     return count
 
 
@@ -135,7 +155,7 @@ def plane_distances(
     """Fill in the distance of places (Q, 3) from the plane through the `around` nearest points, or from the nearest if that is less.
 
     boxes : the points by box. near : first search radius [scan unit]. noise : (Q,), filled with the rms distance of those points
-    from their plane.
+    from their plane. A place that has not `around` points within `GROWTHS` of the radius is inf away.
     """
     wanted = min(around, len(points))
     found, squares, offsets = np.empty(wanted, np.int64), np.empty(wanted), np.empty((wanted, 3))
@@ -143,9 +163,14 @@ def plane_distances(
     for q in range(len(places)):
         place = row(places, q)
         count = nearest_points(boxes, points, place, reach, found, squares)
-        while count < wanted:  # ends when all points are within reach
+        for _ in range(GROWTHS):
+            if count == wanted:
+                break
             reach *= 1.5
             count = nearest_points(boxes, points, place, reach, found, squares)
+        if count < wanted:
+            distance[q], noise[q], reach = math.inf, 0.0, near
+            continue
         first = row(points, found[0])  # offsets from there stay exact, however far away the place is
         for k in range(wanted):
             offsets[k, 0], offsets[k, 1], offsets[k, 2] = subtract(row(points, found[k]), first)

@@ -47,7 +47,7 @@ def fit_patches(
         while taken == ROOM and share > 1.0:
             share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
-        while True:
+        while True:  # the share falls to one
             fit(buffer, taken, share * radii[i], PATCH_FITS, patches, i, matrix)
             if patches.rms[i] <= usual[i] or share <= 1.0:
                 break

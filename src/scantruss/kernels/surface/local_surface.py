@@ -79,7 +79,7 @@ def walk(surface: Surface, sample: int, place: Vector) -> int:
 def descend(surface: Surface, sample: int, target: Vector, place: Vector, reach: float) -> int:
     """Sample nearest to a target, reached over links that each come nearer to it, through samples within `reach` of a place only."""
     best = _square(row(surface.mean, sample), target)
-    while True:
+    while True:  # each step leads to a nearer sample, so to none twice
         to = -1
         for k in range(surface.neighbors.shape[1]):
             n = surface.neighbors[sample, k]
@@ -193,14 +193,14 @@ def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -
     ]  # a patch grows with the members; the wider it is, the fewer points of a sample are enough
     radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
     patch[NEAREST_SAMPLE] = sample
-    taken = 0
-    while True:
+    taken, widest = 0, max(1.6 * surface.patch_radius, surface.length) * local
+    while True:  # the radius grows by a quarter until it is the widest
         count = flood(surface, sample, place, radius + 0.5 * surface.step)
         if count < 1:
             count = 1
         buffer = np.empty((_points_at_most(surface, count, most), COLUMNS))
         taken = gather_points(surface, count, place, radius, most, facing, 0.0, buffer)
-        if taken >= 12 or radius >= max(1.6 * surface.patch_radius, surface.length) * local:
+        if taken >= 12 or not 0.0 < radius < widest:
             break
         radius *= 1.26
     _plane_of(buffer, taken, facing, patch)

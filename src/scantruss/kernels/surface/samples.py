@@ -94,7 +94,7 @@ def settle_points(
         place, sample = row(points, p), owner[p]
         d = subtract(row(places, sample), place)
         least = dot(d, d)
-        while True:
+        while True:  # each turn leads to a nearer sample, so to none twice
             to, first, nearly = sample, sample, least * (1.0 + TIE_TOLERANCE)
             for k in range(neighbors.shape[1]):
                 n = neighbors[sample, k]

@@ -17,6 +17,7 @@ CURVATURE_DEVIATION = 14.4  # standard deviation of a curvature inside the scan 
 DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the mean of the points [patch radii]
 RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
 BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
+GROWTHS = 90  # times that a search radius grows by half at most: from any box to all of them
 
 
 @kernel
@@ -55,11 +56,11 @@ def lengths_along(surface: Surface, places: np.ndarray, lengths: np.ndarray) -> 
 def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: float) -> int:
     """Shorten lengths (S,) until they differ by at most `slope` times the distance over the links; returns the sweeps made.
 
-    The result is the largest such field that nowhere exceeds the given one, whatever the order of the sweeps.
+    The result is the largest such field that nowhere exceeds the given one, whatever the order of the sweeps. Each sweep settles
+    at least one more sample along each path, so there are no more sweeps than samples (Bellman and Ford).
     """
     sweeps = 0
-    changed = True
-    while changed:
+    for _ in range(len(mean) + 1):
         changed = False
         sweeps += 1
         for i in range(len(mean)):
@@ -75,6 +76,8 @@ def grade(mean: np.ndarray, neighbors: np.ndarray, lengths: np.ndarray, slope: f
                 elif lengths[n] > lengths[s] + way:
                     lengths[n] = lengths[s] + way
                     changed = True
+        if not changed:
+            break
     return sweeps
 
 
@@ -96,10 +99,12 @@ def blend_lengths(
     for s in range(len(places)):
         place = row(places, s)
         reach *= 0.7
-        count = 0
-        while count < wanted:
+        count = search(boxes, given, place[0], place[1], place[2], reach, found)
+        for _ in range(GROWTHS):
+            if count >= wanted:
+                break
+            reach *= 1.5
             count = search(boxes, given, place[0], place[1], place[2], reach, found)
-            reach *= 1.0 if count >= wanted else 1.5
         kept = 0
         for i in range(count):
             away = norm(subtract(row(given, found[i]), place))

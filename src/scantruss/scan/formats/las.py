@@ -41,7 +41,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     try:
         notes = check_header(path)
         promised, said, chunks = _read(path, names, places_of)
-    except ScanTrussError:
+    except (KeyboardInterrupt, ScanTrussError):
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
@@ -89,6 +89,8 @@ def note_on_heights(path: Path) -> str:
         with laspy.open(path) as file:
             content = take(file.read_points(min(POINTS_LOOKED_AT, int(file.header.point_count))), ["return_count"])
             return look_like_feet(content.points, content.attributes["return_count"])
+    except KeyboardInterrupt:
+        raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
 

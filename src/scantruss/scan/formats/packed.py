@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import gzip
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...errors import FormatError
+from ...runtime.files import temporary_folder
 from .kinds import read_head, wrong_kind
 
 MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros pack to a thousandth
@@ -29,8 +29,8 @@ def unpacked(path: Path) -> Iterator[Path]:
     head = read_head(path)
     if not head.startswith(b"\x1f\x8b"):
         raise wrong_kind(path, head, "a gzip archive")
-    with tempfile.TemporaryDirectory(prefix="scantruss-") as folder:
-        inner = Path(folder) / path.name[:-3]
+    with temporary_folder() as folder:
+        inner = folder / path.name[:-3]
         _unpack(path, inner)
         try:
             yield inner

@@ -28,7 +28,7 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
     try:
         with parquet.ParquetFile(path, memory_map=True) as file:
             return _read(path, file, wanted)
-    except ScanTrussError:
+    except (KeyboardInterrupt, ScanTrussError):
         raise
     except BaseException as error:
         raise unreadable(path, "Parquet", error) from None

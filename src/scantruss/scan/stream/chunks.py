@@ -123,7 +123,7 @@ def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Conte
                 short = len(record) < expected
                 begin += len(record)
                 yield tile.source.said_of(take(record, names))
-    except (GeneratorExit, ScanTrussError):
+    except (GeneratorExit, KeyboardInterrupt, ScanTrussError):
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None

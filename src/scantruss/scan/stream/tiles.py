@@ -121,7 +121,7 @@ def _las(path: Path, head: bytes) -> Source:
                 in_one=_has_uneven_chunks(header),
                 notes=notes,
             )
-    except FormatError:
+    except (KeyboardInterrupt, FormatError):
         raise
     except BaseException as error:
         raise unreadable(path, "LAS or LAZ", error) from None
