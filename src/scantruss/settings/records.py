@@ -214,7 +214,8 @@ class ConstraintSettings(_Checked):
     )
     ridge_angle: float = _setting(
         40.0,
-        "a fold sharper than this is a ridge and becomes a chain of members; 0: no ridges (default method only)",
+        "a fold by more than this within a member, sharp or rounded, is a ridge and becomes a chain of members; 0: no ridges"
+        " (default method only)",
         unit="degree",
         low=0.0,
         high=180.0,
