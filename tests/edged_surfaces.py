@@ -71,7 +71,8 @@ class Relief:
 
     def at(self, xy: Floats) -> Floats:
         """Heights over places (K, 2)."""
-        return self.size * self.height(*(xy / self.size).T, self.fillet / self.size)
+        x, y = (xy / self.size).T
+        return self.size * self.height(x, y, self.fillet / self.size)
 
     def slope(self, xy: Floats) -> Floats:
         """How steep the surface rises, (K, 2)."""
@@ -184,7 +185,7 @@ def folded_plate(rng: np.random.Generator) -> Relief:
     """Parallel folds up and down."""
     count = int(rng.integers(2, 7))
     rise, long = rng.uniform(0.35, 1.0), rng.uniform(1, 2) * max(1.0, count / 3)
-    knots, values = np.arange(count + 1.0) - count / 2, rise * (np.arange(count + 1) % 2)
+    knots, values = np.arange(count + 1.0) - count / 2, rise * (np.arange(count + 1.0) % 2)
     return Relief(rectangle(count / 2, long), lambda x, y, r: creased(x, knots, values, r), 1.0)
 
 
@@ -192,7 +193,7 @@ def sawtooth(rng: np.random.Generator) -> Relief:
     """Long slopes up and steep ones down."""
     count, rise, share = int(rng.integers(2, 5)), rng.uniform(0.5, 0.8), rng.uniform(0.25, 0.35)
     knots = np.concatenate([[k, k + 1 - share] for k in range(count)] + [[count]]) - count / 2
-    values = rise * (np.arange(2 * count + 1) % 2)
+    values = rise * (np.arange(2 * count + 1.0) % 2)
     long = rng.uniform(1, 1.5) * count / 2
     return Relief(rectangle(count / 2, long), lambda x, y, r: creased(x, knots, values, r), np.hypot(share, rise))
 

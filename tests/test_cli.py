@@ -599,7 +599,10 @@ def test_a_fault_of_ours_is_one_line_too(
     ],
 )
 def test_every_exit_status_is_listed_in_the_help_and_in_the_readme(
-    error: BaseException | None, status: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    error: BaseException | signal.Signals | None,
+    status: int,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def run(_: Any) -> None:
         if isinstance(error, signal.Signals):

@@ -82,14 +82,14 @@ def assert_closed_loops(front: Front) -> None:
 def test_the_segments_of_an_initial_front_are_closed_loops(name: str) -> None:
     front, _, _ = initial_front(name)
     assert_closed_loops(front)
-    check_links(front)
+    check_links(front, np.zeros(3))
 
 
 def test_an_initial_front_that_is_not_closed_is_refused() -> None:
     front, _, _ = initial_front("folded plate")
     lists.link(front, 0, int(front.next[int(front.next[0])]))
     with pytest.raises(FrontError, match="two lines meet"):
-        check_links(front)
+        check_links(front, np.zeros(3))
 
 
 def test_each_gap_that_is_closed_or_cut_out_leaves_fewer_segments_in_closed_loops() -> None:
@@ -173,7 +173,7 @@ def test_lines_in_any_directions_leave_closed_loops(turns: list[int], on_boundar
     )
     link_around(hand.front, node)
     assert_closed_loops(hand.front)
-    check_links(hand.front)
+    check_links(hand.front, np.zeros(3))
 
 
 @given(strategies.lists(strategies.integers(1, 11), min_size=1, max_size=5, unique=True))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -22,7 +24,7 @@ kernels = pytest.mark.kernels
 
 @kernels
 @given(some.integers(0, 10**6), some.floats(0.5, 300.0))
-def test_a_wide_search_finds_what_looking_at_all_finds(seed, reach):
+def test_a_wide_search_finds_what_looking_at_all_finds(seed: int, reach: float) -> None:
     """Also where the reach spans more boxes than there are items."""
     rng = np.random.default_rng(seed)
     points = rng.uniform(0, 100, (40, 3))
@@ -41,7 +43,7 @@ def test_a_wide_search_finds_what_looking_at_all_finds(seed, reach):
 
 @kernels
 @pytest.mark.parametrize("near", [0.0, 1e-300, 1.0])
-def test_a_place_that_is_nowhere_is_infinitely_far(near):
+def test_a_place_that_is_nowhere_is_infinitely_far(near: float) -> None:
     points = np.random.default_rng(1).uniform(0, 10, (50, 3))
     boxes, places = boxes_of(points, 1.0), np.array([[np.nan, 0.0, 0.0], [5.0, 5.0, 5.0]])
     distance, off, noise = np.empty(2), np.empty(2), np.empty(2)
@@ -56,7 +58,7 @@ def test_a_place_that_is_nowhere_is_infinitely_far(near):
     some.lists(some.sampled_from([0.0, 1.0, 1.0 + 2**-52, -1e300, 1e300, 5e-324]) | some.floats(-9, 9), min_size=2),
     some.data(),
 )
-def test_points_are_selected_by_halving_their_range_too(values, data):
+def test_points_are_selected_by_halving_their_range_too(values: list[float], data: some.DataObject) -> None:
     """What is done where the median of three does not help, from the first turn on."""
     points = np.column_stack([values, np.arange(len(values)), np.zeros(len(values))])
     tree, middle = kd_tree.empty_kd_tree(points), data.draw(some.integers(1, len(values) - 1))
@@ -87,13 +89,14 @@ ENDED = {  # clouds, and the share of the range of lengths that is tried, in log
     "far from zero": 0.5,
     "a needle": 0.5,
 }
+WAYS: tuple[dict[str, Any], ...] = {"effort": "quick"}, {"method": "paper"}
 
 
 @compiled_only
 @pytest.mark.parametrize("name", ENDED)
-def test_a_grid_or_a_refusal_comes_of_any_cloud(name):
+def test_a_grid_or_a_refusal_comes_of_any_cloud(name: str) -> None:
     points = CLOUDS[name]()
-    for settings in ({"effort": "quick"}, {"method": "paper"}):
+    for settings in WAYS:
         try:
             low, high = length_range(st.PointCloud.from_array(points))
             length = low ** (1 - ENDED[name]) * high ** ENDED[name]
@@ -105,6 +108,6 @@ def test_a_grid_or_a_refusal_comes_of_any_cloud(name):
 
 
 @pytest.mark.parametrize("name", ["one place", "two places", "a line"])
-def test_what_is_no_surface_is_refused_before_any_look_at_it(name):
+def test_what_is_no_surface_is_refused_before_any_look_at_it(name: str) -> None:
     with pytest.raises(st.InputError, match=r"same place|on a line"):
         length_range(st.PointCloud.from_array(CLOUDS[name]()))

@@ -106,12 +106,13 @@ def test_a_folder_in_a_file_is_refused_at_the_start(
     assert "b.xyz is a file; name a folder" in refused(capsys, words.split())
 
 
-def test_each_stage_of_a_run_is_told_to_who_looks_on(tmp_path, monkeypatch):
+def test_each_stage_of_a_run_is_told_to_who_looks_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also writing pictures and solids, which take long."""
     from scantruss.report.terminal import Bars
 
     monkeypatch.chdir(tmp_path)
-    rng, told = np.random.default_rng(1), []
+    rng = np.random.default_rng(1)
+    told: list[str] = []
     monkeypatch.setattr(Bars, "__call__", lambda _, stage, share: told.append(stage))
     np.save("scan.npy", np.column_stack([rng.uniform(0, 12, (4000, 2)), np.zeros(4000)]))
     assert main(["grid", "scan.npy", "a.json", "a.png", "--length", "1.5", "--effort", "quick"]) == 0

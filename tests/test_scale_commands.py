@@ -349,7 +349,9 @@ def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(
 @pytest.mark.parametrize(
     "words", ["thin scan.npy -o thin.npy --spacing", "grid scan.npy a.obj --length 1 --thin-spacing"]
 )
-def test_a_spacing_that_leaves_hardly_a_point_asks_back(tmp_path, monkeypatch, capsys, words):
+def test_a_spacing_that_leaves_hardly_a_point_asks_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     np.save("scan.npy", np.random.default_rng(0).uniform(0, 9, (500, 3)))
     for spacing in ("1e9", "8"):

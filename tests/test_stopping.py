@@ -15,6 +15,8 @@ from stopped_runs import ENDS, Command, Run, make_scan, seconds_of, stop_at
 from scantruss.runtime import stopping
 from scantruss.runtime.files import SaveTogether, temporary_folder
 
+Commands = dict[str, tuple[Command, float]]
+
 pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
 STUCK = """
 import os, signal, sys, threading, time
@@ -53,16 +55,17 @@ JOIN = "threading.Thread(target=time.sleep, args=(1000,)).start(); time.sleep(10
 
 @pytest.mark.parametrize("number", list(ENDS))
 @pytest.mark.parametrize("wait", ["time.sleep(1000)", LOOP, JOIN])
-def test_what_never_comes_back_is_ended_and_cleaned_up(tmp_path, number, wait):
+def test_what_never_comes_back_is_ended_and_cleaned_up(tmp_path: Path, number: signal.Signals, wait: str) -> None:
     code = (KERNEL if wait == LOOP else "") + STUCK.format(wait=wait)
     script, place, temporary = tmp_path / "stuck.py", tmp_path / "place", tmp_path / "tmp"
-    place.mkdir(), temporary.mkdir()
+    place.mkdir()
+    temporary.mkdir()
     script.write_text(code)
     environment = os.environ | {"TMPDIR": str(temporary), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     with subprocess.Popen(
         [sys.executable, script], cwd=place, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as run:
-        assert run.stdout.readline() == "there\n"
+        assert run.stdout is not None and run.stdout.readline() == "there\n"
         run.send_signal(number)
         try:
             said = run.communicate(timeout=60)[1]
@@ -74,7 +77,7 @@ def test_what_never_comes_back_is_ended_and_cleaned_up(tmp_path, number, wait):
 
 
 @pytest.fixture(scope="module")
-def commands(tmp_path_factory):
+def commands(tmp_path_factory: pytest.TempPathFactory) -> Commands:
     """Commands on a small scan, and how long each runs."""
     scan = tmp_path_factory.mktemp("scan") / "scan.ply"
     make_scan(scan, 100_000)
@@ -99,7 +102,7 @@ def commands(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["grid", "print", "clean", "sweep"])
-def test_commands_stopped_at_random_moments_leave_nothing(commands, name):
+def test_commands_stopped_at_random_moments_leave_nothing(commands: Commands, name: str) -> None:
     """A short version of `python -m benchmarks.stops`, which looks at the time as well."""
     command, seconds = commands[name]
     rng = np.random.default_rng(3)
@@ -108,7 +111,7 @@ def test_commands_stopped_at_random_moments_leave_nothing(commands, name):
         assert [fault for fault in faults if not fault.startswith("took")] == []
 
 
-def test_a_run_that_is_not_stopped_has_no_fault(commands, tmp_path):
+def test_a_run_that_is_not_stopped_has_no_fault(commands: Commands, tmp_path: Path) -> None:
     """What the check of a stopped run looks at tells a whole result from a half-written one."""
     run = Run(commands["grid"][0], tmp_path)
     said = run.process.communicate()[1]
@@ -117,11 +120,13 @@ def test_a_run_that_is_not_stopped_has_no_fault(commands, tmp_path):
     assert "left" in run.faults(signal.SIGINT, 0.0, said)[0]
 
 
-def test_results_are_put_into_place_together_whatever_comes_meanwhile(tmp_path, monkeypatch):
+def test_results_are_put_into_place_together_whatever_comes_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A signal between the first file and the last waits until all are there."""
     replace = Path.replace
 
-    def replace_and_stop(self, target):
+    def replace_and_stop(self: Path, target: Path) -> Path:
         signal.raise_signal(signal.SIGINT)
         return replace(self, target)
 
@@ -133,7 +138,7 @@ def test_results_are_put_into_place_together_whatever_comes_meanwhile(tmp_path, 
     assert stopping.words_of_stop(signal.SIGINT) == "interrupted; what was written is whole"
 
 
-def test_what_is_left_behind_is_removed_at_the_end_of_the_command(tmp_path):
+def test_what_is_left_behind_is_removed_at_the_end_of_the_command(tmp_path: Path) -> None:
     """Where a stop comes between the end of a block and its clean-up."""
     save = SaveTogether()
     with stopping.signals_heard():
@@ -142,7 +147,7 @@ def test_what_is_left_behind_is_removed_at_the_end_of_the_command(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_only_the_first_signal_is_an_interruption_and_what_is_ignored_stays_so():
+def test_only_the_first_signal_is_an_interruption_and_what_is_ignored_stays_so() -> None:
     kept = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
         with stopping.signals_heard():
@@ -155,7 +160,7 @@ def test_only_the_first_signal_is_an_interruption_and_what_is_ignored_stays_so()
         signal.signal(signal.SIGTERM, kept)
 
 
-def test_a_temporary_folder_goes_with_its_block(monkeypatch, tmp_path):
+def test_a_temporary_folder_goes_with_its_block(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     with pytest.raises(ValueError, match="no"), temporary_folder() as folder:

@@ -74,7 +74,7 @@ def poisson(scan: Scan) -> Mesh:
     depth = int(np.clip(round(np.log2(1.1 * extent / scan.cell)), 5, 11))
     mesh, _ = open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth)
     far = np.asarray(open3d.geometry.PointCloud(mesh.vertices).compute_point_cloud_distance(cloud))
-    mesh.remove_vertices_by_mask(far > TRIM * scan.cell)
+    mesh.remove_vertices_by_mask((far > TRIM * scan.cell).tolist())
     return _taken(mesh)
 
 

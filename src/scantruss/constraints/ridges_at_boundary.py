@@ -34,7 +34,7 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
             end = scan_end(line, samples, length) if away[k] < AT_BOUNDARY * length else None
             if end is not None:
                 loops[k] = _bent(loops[k], end, length)
-    return Boundary(tuple(loops))
+    return replace(boundary, loops=tuple(loops))
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:

@@ -214,7 +214,7 @@ class ConstraintSettings(_Checked):
     )
     ridge_angle: float = _setting(
         40.0,
-        "a fold by more than this within a member, sharp or rounded, is a ridge and becomes a chain of members; 0: no ridges"
+        "a fold by more than this, sharp or rounded over up to half a member, becomes a chain of members; 0: no ridges"
         " (default method only)",
         unit="degree",
         low=0.0,

@@ -67,11 +67,9 @@ def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
     low, high, turns = begin, end - 1, 0
     while low < high:  # at least one point is left out of each turn
         turns += 1
-        if (
-            turns > QUICK_TURNS
-        ):  # points in an order that defeats the median of three: the range of the values is halved
+        if turns > QUICK_TURNS:  # an order of points that defeats the median of three: the range of the values is halved
             least, most = _range_of(tree, axis, low, high)
-            pivot = 0.5 * least + 0.5 * most
+            pivot = min(max(0.5 * least + 0.5 * most, least), most)  # which rounding must not leave
         else:
             a, b, c = tree.points[low, axis], tree.points[(low + high) // 2, axis], tree.points[high, axis]
             pivot = max(min(a, b), min(max(a, b), c))
