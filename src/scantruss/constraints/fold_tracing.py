@@ -41,6 +41,7 @@ FARTHEST = 20_000  # most places along a fold
 MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
+SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
 FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
 BETWEEN = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
@@ -153,10 +154,14 @@ class Tracer:
         back: list[np.ndarray] = []
         if not ring:
             back, ring = self._march(sample, fold, -1.0, ahead[-1][:3] if len(ahead) > RING else fold[:3], others)
-        steps = [*back[::-1], fold, *ahead]
-        folds = np.array([*steps, steps[0]] if ring else steps)
-        folds[:, :3] = smoothed(folds[:, :3])
-        return folds
+        folds = np.array([*back[::-1], fold, *ahead])
+        if not ring:
+            folds[:, :3] = smoothed(folds[:, :3])
+            return folds
+        folds = folds[:-1]  # the last place lies beside the first
+        around = np.take(folds[:, :3], np.arange(-RING, len(folds) + RING), axis=0, mode="wrap")
+        folds[:, :3] = smoothed(around)[RING:-RING]
+        return np.concatenate([folds, folds[:1]])
 
     def _march(
         self, sample: int, fold: np.ndarray, sign: float, goal: np.ndarray, others: list[np.ndarray]
@@ -205,7 +210,7 @@ class Tracer:
         squares = (away**2).sum(axis=1)
         nearest = int(squares.argmin())
         if (
-            squares[nearest] > max(FAR_OFF * self.length, 2.0 * self.spacing) ** 2
+            squares[nearest] > max(FAR_OFF * self.length, 4.0 * self.spacing) ** 2
         ):  # beside the scan, as a corner may be
             beside: np.ndarray = -away[nearest]
             return beside
@@ -215,7 +220,7 @@ class Tracer:
         tenth = len(heights) // 10
         low, high = (heights[tenth], heights[-1 - tenth]) if len(heights) >= FEWEST_AROUND else (0.0, 0.0)
         off = -low if low > 0.0 else (-high if high < 0.0 else 0.0)
-        moved: np.ndarray = ahead * (off if abs(off) > self.fits + 0.1 * radius else 0.0)
+        moved: np.ndarray = ahead * (off if abs(off) > self.fits + SHARE_BELOW * radius else 0.0)
         return moved
 
 

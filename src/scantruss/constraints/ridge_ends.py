@@ -11,7 +11,8 @@ STRAIGHT = 0.94  # least cosine of the angle between such an end and the way to 
 ROUND = 0.8  # the same cosine where the ends of one ridge make it a ring
 TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED = 1  # places at an end that are left out, because the third side disturbs them
-AIM = 5  # places from which the direction of an end is taken
+AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
+STEADY = 0.998  # least cosine of the angle between both directions of a straight ridge
 CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
 BACK = 0.5  # the same way back, where an end has gone too far [member lengths]
 MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
@@ -99,10 +100,18 @@ def _closes(line: np.ndarray, length: float) -> bool:
 
 
 def end_of(line: np.ndarray, number: int, at: int) -> End:
-    """Return an end (0 or -1) of a line (K, 3)."""
-    inner = line[min(AIM, len(line)) - 1] if at == 0 else line[-min(AIM, len(line))]
-    ahead = line[at] - inner
-    return End(number, at, line[at], ahead / max(float(np.linalg.norm(ahead)), 1e-300))
+    """Return an end (0 or -1) of a line (K, 3); the straighter the line, the farther back its direction is taken from."""
+    towards = line if at == -1 else line[::-1]
+    ahead = _direction(towards, AIM)
+    far = _direction(towards, FAR_AIM)
+    return End(number, at, towards[-1], far if far @ ahead > STEADY else ahead)
+
+
+def _direction(line: np.ndarray, places: int) -> np.ndarray:
+    """Direction (3,) of the last places of a line (K, 3)."""
+    way = line[-1] - line[-min(places, len(line))]
+    found: np.ndarray = way / max(float(np.linalg.norm(way)), 1e-300)
+    return found
 
 
 def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 AT_BOUNDARY = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
 TUBE = 0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
 AIM = 3  # places from which the direction at the end of a ridge is taken
+STEADY_PLACES, BLURRED = (
+    9,
+    3,
+)  # places at the end of a ridge from which its direction is told, and the last of them that are left out
+CLOSE = 0.1  # distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
 BACK = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
 FORWARD = 2.0  # how far the scan may go on along it [member lengths]
 GAPS = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
@@ -31,10 +36,21 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
         for line in () if ridge.ring or not loops else (ridge.places, ridge.places[::-1]):
             away = [np.linalg.norm(loop.points - line[-1], axis=1).min() for loop in loops]
             k = int(np.argmin(away))
-            end = scan_end(line, samples, length) if away[k] < AT_BOUNDARY * length else None
-            if end is not None:
-                loops[k] = _bent(loops[k], end, length)
+            if away[k] < AT_BOUNDARY * length and not _makes_for_corner(line, loops[k], length):
+                end = scan_end(line, samples, length)
+                loops[k] = loops[k] if end is None else _bent(loops[k], end, length)
     return replace(boundary, loops=tuple(loops))
+
+
+def _makes_for_corner(line: np.ndarray, loop: Loop, length: float) -> bool:
+    """Whether a ridge (K, 3), as far as it can be told some way back, makes for a corner of the boundary: then it is right."""
+    if not len(loop.corner_at) or len(line) < STEADY_PLACES:
+        return False
+    from_there = line[-BLURRED]
+    ahead = from_there - line[-STEADY_PLACES]
+    ahead /= max(float(np.linalg.norm(ahead)), 1e-300)
+    corner = loop.corners[np.linalg.norm(loop.corners - line[-1], axis=1).argmin()]
+    return bool(np.linalg.norm(np.cross(corner - from_there, ahead)) < CLOSE * length)
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:

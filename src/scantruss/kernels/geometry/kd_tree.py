@@ -67,7 +67,7 @@ def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
     low, high, turns = begin, end - 1, 0
     while low < high:  # at least one point is left out of each turn
         turns += 1
-        if turns > QUICK_TURNS:  # an order of points that defeats the median of three: the range of the values is halved
+        if turns > QUICK_TURNS:  # an order that defeats the median of three: the range of the values is halved
             least, most = _range_of(tree, axis, low, high)
             pivot = min(max(0.5 * least + 0.5 * most, least), most)  # which rounding must not leave
         else:
