@@ -231,7 +231,7 @@ def test_both_rings_of_a_can_are_chains() -> None:
     off = np.abs(np.linalg.norm(nodes[:, :2], axis=1) - 15.0)
     assert np.quantile(off, 0.9) < 0.05 * SIZE and off.max() < 0.1 * SIZE
     assert set(np.round(nodes[:, 2] / 30.0, 1)) == {0.0, 1.0}
-    assert valences(grid) == [0, len(nodes)] and abs(len(nodes) - 2 * 2 * np.pi * 15.0 / SIZE) < 2
+    assert valences(grid) == [0, len(nodes)] and abs(len(nodes) / (2 * 2 * np.pi * 15.0 / SIZE) - 1.0) < 0.15
     distance = known(known(grid.certificate).scan_distance)
     assert distance.p95 < 0.06 * SIZE and grid.topology.euler == 2
 
