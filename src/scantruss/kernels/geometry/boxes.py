@@ -5,6 +5,7 @@ Only occupied boxes are stored, in a hash table from the number of a box to its 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -104,6 +105,8 @@ def is_wide(boxes: SearchBoxes, x: float, y: float, z: float, reach: float) -> b
     total = 1
     for axis in range(3):
         at = x if axis == 0 else (y if axis == 1 else z)
+        if math.isnan(at):
+            return True  # it is in no box
         total *= box_index(boxes, axis, at + reach) - box_index(boxes, axis, at - reach) + 1
     return total > len(boxes.keys)
 
