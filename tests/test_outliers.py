@@ -14,6 +14,7 @@ from scantruss.kernels.surface import samples as kernels
 from scantruss.scan.clean import outliers
 from scantruss.scan.clean.nearby import Nearby
 from scantruss.scan.cloud import measure_gap
+from scantruss.scan.given_normals import NO_NORMALS
 from scantruss.surface.samples import sample_surface
 
 
@@ -111,9 +112,9 @@ def test_parts_of_the_sites_find_the_same_neighbours() -> None:
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 0.2, 500, 500)
     kernels.put_all(boxes, points, np.arange(500))
     whole, parts = (np.full((500, 6), -1, np.int64) for _ in range(2))
-    kernels.nearest_samples(points, boxes, 0.1, 0.5, whole, 0, 500)
+    kernels.nearest_samples(points, boxes, 0.1, 0.5, whole, NO_NORMALS, 0, 500)
     for begin, end in ((0, 7), (7, 300), (300, 500)):
-        kernels.nearest_samples(points, boxes, 0.1, 0.5, parts, begin, end)
+        kernels.nearest_samples(points, boxes, 0.1, 0.5, parts, NO_NORMALS, begin, end)
     assert np.array_equal(whole, parts)
 
 

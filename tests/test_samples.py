@@ -24,6 +24,7 @@ from scantruss.kernels.surface.normals import (
 )
 from scantruss.kernels.surface.samples import choose_samples, group_points, nearest_samples, put_all, settle_points
 from scantruss.scan.cloud import bounds_of
+from scantruss.scan.given_normals import NO_NORMALS
 from scantruss.surface import linked_samples as module
 from scantruss.surface.samples import sample_surface
 
@@ -53,7 +54,7 @@ def thinned(points: np.ndarray, radius: float, capacity: int | None = None) -> t
     chosen, places = np.full(capacity, -1, np.int64), np.empty((capacity, 3))
     boxes = new_boxes(lower, upper, 1.3 * radius, capacity, capacity)
     while True:
-        begin, count = choose_samples(points, radius, boxes, owner, chosen, places, begin, count)
+        begin, count = choose_samples(points, radius, boxes, owner, chosen, places, begin, count, NO_NORMALS)
         if begin == len(points):
             assert np.array_equal(places[:count], points[chosen[:count]])
             return owner, chosen[:count]
@@ -104,7 +105,7 @@ def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points: np.nda
     owner, chosen = thinned(points, radius)
     places, all_others = points[chosen], np.arange(len(chosen))
     links = np.stack([np.append(np.delete(all_others, s), -1) for s in all_others])
-    settle_points(points, places, links, owner, 0, len(points))
+    settle_points(points, places, links, owner, NO_NORMALS, chosen, 0, len(points))
     squares = ((points[:, None] - places) ** 2).sum(axis=2)
     assert owner.tolist() == (squares <= squares.min(axis=1, keepdims=True) * (1 + 1e-6)).argmax(axis=1).tolist()
 
@@ -121,8 +122,8 @@ def test_sites_move_with_the_cloud(points: np.ndarray, radius: float, seed: int)
     other, same = thinned(moved, radius)
     assert same.tolist() == chosen.tolist()
     links = np.stack([np.append(np.delete(np.arange(len(chosen)), s), -1) for s in range(len(chosen))])
-    settle_points(points, points[chosen], links, owner, 0, len(points))
-    settle_points(moved, moved[chosen], links, other, 0, len(points))
+    settle_points(points, points[chosen], links, owner, NO_NORMALS, chosen, 0, len(points))
+    settle_points(moved, moved[chosen], links, other, NO_NORMALS, chosen, 0, len(points))
     assert other.tolist() == owner.tolist()
 
 
@@ -153,7 +154,7 @@ def test_nearest_sites_are_the_nearest(seed: int, count: int, far: float) -> Non
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
     put_all(boxes, places, np.arange(count))
     found = np.full((count, 6), -1, np.int64)
-    nearest_samples(places, boxes, 0.1, far, found, 0, len(places))
+    nearest_samples(places, boxes, 0.1, far, found, NO_NORMALS, 0, len(places))
     for s in range(count):
         own = [n for n in found[s].tolist() if n >= 0]
         full = naive.nearest(places, s, 6, far)

@@ -58,5 +58,6 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray)
     pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
     ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
-    sample = first_disconnected(samples.surface.neighbors, nearest, first, ends, DISCONNECTED - 1, FEWEST_LINKS)
+    links, normals = samples.surface.neighbors, samples.surface.normals
+    sample = first_disconnected(links, normals, nearest, first, ends, DISCONNECTED - 1, FEWEST_LINKS)
     return samples.surface.mean[sample] if sample >= 0 else None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from .checks import (
     usual_extent,
 )
 from .units import check_unit
+
+if TYPE_CHECKING:
+    from .given_normals import GivenNormals
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
@@ -47,6 +51,7 @@ class PointCloud:
     left_out: tuple[tuple[str, int], ...] = ()  #: why other points of the file were not taken, and how many
     name: str = ""  #: file the points came from
     notes: tuple[str, ...] = ()  #: what a user should know about how it was read
+    normals: np.ndarray | None = None  #: (N, 3) that came with the points
 
     def __repr__(self) -> str:
         """Give the number of points and the extent."""
@@ -59,6 +64,13 @@ class PointCloud:
     def bounds(self) -> Bounds:
         """Smallest and largest coordinates, (3,) each [scan unit]."""
         return bounds_of(self.points)
+
+    @cached_property
+    def given_normals(self) -> GivenNormals | None:
+        """The normals that came with the points, by place; None where there are none or they face both ways."""
+        from .given_normals import GivenNormals
+
+        return None if self.normals is None else GivenNormals.of(self.points, self.normals)
 
     @property
     def z_is_up(self) -> bool:
@@ -87,7 +99,9 @@ class PointCloud:
         return measure_gap(self.points)
 
     @classmethod
-    def from_array(cls, points: np.ndarray, unit: str = "", name: str = "") -> PointCloud:
+    def from_array(
+        cls, points: np.ndarray, unit: str = "", name: str = "", normals: np.ndarray | None = None
+    ) -> PointCloud:
         """Return a cloud from an (N, 3) array; checks shape and values, moves to a local origin.
 
         Parameters
@@ -99,6 +113,8 @@ class PointCloud:
             Unit of the coordinates: mm, cm, m, inch, foot, or "" if it is not known.
         name : str
             File the points came from; messages start with it.
+        normals : (N, 3) array, optional
+            Normals that came with the points: they tell the two sides of something thin apart.
 
         Returns
         -------
@@ -115,22 +131,28 @@ class PointCloud:
         array = _as_coordinates(points, said)
         clean, lower, upper = _drop_not_finite(array, said)
         dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
+        if normals is not None and dropped:
+            normals = normals[np.isfinite(array).all(axis=1)]
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
             left_out = ((NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
+            normals = normals if normals is None else normals[~invalid]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:
             at, value = no_data
             notes = (*notes, no_data_note(int(at.sum()), value + 0.0))
             left_out = (*left_out, (NO_DATA, int(at.sum())))
             clean = np.ascontiguousarray(clean[~at])
+            normals = normals if normals is None else normals[~at]
             lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
         origin = _local_origin(lower, upper, extent)
         moved, sums = _moved(clean, origin)
         _check_not_on_a_line(len(moved), sums, extent, said)
-        cloud = cls(moved, origin, unit=unit, dropped=dropped, left_out=left_out, name=name, notes=notes)
+        cloud = cls(
+            moved, origin, unit=unit, dropped=dropped, left_out=left_out, name=name, notes=notes, normals=normals
+        )
         cloud.__dict__["bounds"] = lower - origin, upper - origin  # exact, as all points
         return cloud
 

@@ -10,6 +10,7 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from .vectors import dots
 
+NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit is not used
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
 SAMPLES_PER_THREAD = 1500  # fewest samples that are worth a thread
 STEEP = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
@@ -39,6 +40,17 @@ def _counted_off(piece: np.ndarray) -> np.ndarray:
     first = piece == np.arange(len(piece))
     number: np.ndarray = (np.cumsum(first) - 1)[piece]
     return number
+
+
+def face_as_given(normals: np.ndarray, facing: np.ndarray) -> None:
+    """Turn normals (S, 3) to the side of those given with the scan (S, 3), zero where unknown.
+
+    One that is more than 60 degrees off is replaced by that given.
+    """
+    cosine = dots(normals, facing)
+    normals[cosine < 0.0] *= -1.0
+    off = (np.abs(cosine) < NEAR_GIVEN) & (dots(facing, facing) > 0.0)
+    normals[off] = facing[off]
 
 
 def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> np.ndarray:

@@ -11,6 +11,7 @@ from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
 from ..runtime.parallel import in_parts
 from ..scan.cloud import Bounds, bounds_of
+from ..scan.given_normals import NO_NORMALS, GivenNormals
 from ..scan.normals import SAMPLES_PER_THREAD
 from .streamline import is_dense, streamlined
 
@@ -44,6 +45,7 @@ class Linked(NamedTuple):
     neighbors: np.ndarray  #: (S, NEIGHBORS) int64
     normals: np.ndarray  #: (S, 3)
     thickness: np.ndarray  #: (S,)
+    facing: np.ndarray = NO_NORMALS  #: (S, 3) normals given with the scan, (0, 3) where none are
 
 
 def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float) -> np.ndarray:
@@ -56,15 +58,19 @@ def thin_dense(points: np.ndarray, bounds: Bounds, radius: float, spacing: float
         points = points.take(streamlined(points, bounds, PATCH_SPACING * radius), axis=0)
     if len(points) < (SAMPLES_TO_SORT if spacing > LONE_SPACING * radius else POINTS_TO_SORT):
         return points
-    owner, _, places, _, _ = _settled(points, SORTING_RADIUS * radius, 0.0, 0.0)
+    owner, _, places, _, _ = _settled(points, SORTING_RADIUS * radius, 0.0, 0.0, NO_NORMALS)
     return group(points, owner, len(places))[0]
 
 
-def link_samples(points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the samples of points for one thinning radius."""
-    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing)
+def link_samples(
+    points: np.ndarray, radius: float, length: float, spacing: float, given: GivenNormals | None = None
+) -> Linked:
+    """Return the samples of points for one thinning radius, those that face opposite ways by the given normals apart."""
+    facing = given.at(points) if given is not None else NO_NORMALS
+    owner, chosen, _, boxes, neighbors = _settled(points, radius, length, spacing, facing)
     grouped, start, mean = group(points, owner, len(chosen))
-    return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
+    own = facing[chosen] if len(facing) else facing
+    return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors), own)
 
 
 def is_smooth(found: Linked, length: float, uneven: float) -> bool:
@@ -84,7 +90,9 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
     return bool(marks.sum() <= SAMPLES_WITHOUT_ROOM_FOR_RIDGE)
 
 
-def link_finer(points: np.ndarray, radius: float, length: float, spacing: float) -> tuple[Linked, float] | None:
+def link_finer(
+    points: np.ndarray, radius: float, length: float, spacing: float, given: GivenNormals | None = None
+) -> tuple[Linked, float] | None:
     """Return finer samples and their radius if they form smooth sheets, else None.
 
     Sheets that lie only a few samples apart look like one rough layer; finer samples tell them apart.
@@ -93,7 +101,7 @@ def link_finer(points: np.ndarray, radius: float, length: float, spacing: float)
         radius *= 0.5
         if radius < FINEST_RADIUS * spacing:
             return None
-        found = link_samples(points, radius, length, spacing)
+        found = link_samples(points, radius, length, spacing, given)
         if not is_rough(found, ROUGH * length):
             return found, radius
     return None
@@ -103,10 +111,24 @@ def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: fl
     """Return the samples of a rough layer moved to its middle, thinned and linked again."""
     moved = np.empty_like(found.mean)
     kernels.settle_samples(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
-    joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing)
+    joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing, found.facing)
     owner = joined[found.owner]
     grouped, start, _ = group(points, owner, len(chosen))
-    return Linked(owner, found.chosen[chosen], grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
+    facing = found.facing[chosen] if len(found.facing) else found.facing
+    chosen = found.chosen[chosen]
+    return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors), facing)
+
+
+def without_bends(found: Linked, rough: float) -> np.ndarray:
+    """Return the roughness of the samples (S,): the thickness, but for what of it above `rough` is a bend [scan unit]."""
+    roughness = np.empty_like(found.thickness)
+    linked = found.mean, found.normals, found.neighbors, found.thickness
+    in_parts(
+        len(roughness),
+        SAMPLES_PER_THREAD,
+        lambda _, begin, end: normal_kernels.rough_of_bent(*linked, rough, roughness, begin, end),
+    )
+    return roughness
 
 
 def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
@@ -114,7 +136,9 @@ def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
     return bool((found.thickness > rough).mean() > some)
 
 
-def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
+def samples_of_points(
+    points: np.ndarray, radius: float, facing: np.ndarray = NO_NORMALS
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes]:
     """Return a sample within the radius of each point, the point of each sample, its position (S, 3), and the samples by box.
 
     Each point with no earlier sample within the radius becomes a sample.
@@ -126,7 +150,7 @@ def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np
     while True:
         boxes = new_boxes(lower, upper, BOX_SIZE * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
-        begin, count = kernels.choose_samples(points, radius, boxes, owner, chosen, places, begin, count)
+        begin, count = kernels.choose_samples(points, radius, boxes, owner, chosen, places, begin, count, facing)
         if begin == len(points):
             break
         chosen = np.concatenate([chosen[:count], np.empty(3 * capacity, np.int64)])
@@ -139,20 +163,22 @@ def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np
 
 
 def _settled(
-    points: np.ndarray, radius: float, length: float, spacing: float
+    points: np.ndarray, radius: float, length: float, spacing: float, facing: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, SearchBoxes, np.ndarray]:
     """Return the nearest sample of each point, the point and position of each sample, the samples by box, and their neighbours."""
-    owner, chosen, places, boxes = samples_of_points(points, radius)
-    neighbors = _neighbors(places, boxes, length, radius, spacing)
+    owner, chosen, places, boxes = samples_of_points(points, radius, facing)
+    neighbors = _neighbors(places, boxes, length, radius, spacing, facing[chosen] if len(facing) else facing)
     in_parts(
         len(points),
         POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end),
+        lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, facing, chosen, begin, end),
     )
     return owner, chosen, places, boxes, neighbors
 
 
-def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:
+def _neighbors(
+    places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float, facing: np.ndarray
+) -> np.ndarray:
     """Return the neighbours of each sample (S, 3) among the others."""
     neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
@@ -160,8 +186,10 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
     in_parts(
         len(places),
         SAMPLES_PER_THREAD,
-        lambda _, begin, end: kernels.nearest_samples(places, boxes, near, far, neighbors, begin, end),
+        lambda _, begin, end: kernels.nearest_samples(places, boxes, near, far, neighbors, facing, begin, end),
     )
+    if len(facing):
+        kernels.cut_across_grooves(places, neighbors, facing)
     kernels.link_back(places, neighbors)
     return neighbors
 

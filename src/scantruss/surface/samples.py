@@ -17,7 +17,8 @@ from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
-from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
+from ..scan.given_normals import GivenNormals
+from ..scan.normals import STEEP, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .linked_samples import (
@@ -34,6 +35,7 @@ from .linked_samples import (
     link_samples,
     settle_to_sheet,
     thin_dense,
+    without_bends,
 )
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
@@ -76,6 +78,7 @@ class SurfaceSamples:
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
+    given: GivenNormals | None = None  #: normals that came with the scan
 
     @property
     def outliers(self) -> int:
@@ -174,7 +177,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
-        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked)
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, cloud.given_normals)
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)
@@ -204,7 +207,7 @@ def samples_with(
         asked = asked._replace(piece="all")
     if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
-    prepared = _prepare(both, bounds_of(both), samples.spacing, asked, len(points))
+    prepared = _prepare(both, bounds_of(both), samples.spacing, asked, samples.given, len(points))
     return replace(
         prepared,
         scan=samples.scan,
@@ -278,6 +281,7 @@ def _prepare(
     bounds: Bounds,
     spacing: float,
     asked: _Asked,
+    given: GivenNormals | None,
     measured: int | None = None,
 ) -> SurfaceSamples:
     """Return the samples of points; those after the first `measured` were added to fill holes, and none is left out then."""
@@ -287,8 +291,8 @@ def _prepare(
         points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
-        points, bounds, spacing, asked, thinned
+    chosen = _smooth_samples(points, bounds, spacing, asked, given, thinned) or _usual_samples(
+        points, bounds, spacing, asked, given, thinned
     )
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
@@ -296,7 +300,7 @@ def _prepare(
         rod = _rods_of(scan[judged == KEPT], spacing, asked)
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
-        chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), thinned)
+        chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
     found = chosen.found
     surface, piece = _faced_surface(found, chosen.radius, length, spacing)
     surface = surface._replace(field=length_field(surface, asked.wish))
@@ -324,6 +328,7 @@ def _prepare(
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
+        given=given,
     )
 
 
@@ -335,35 +340,41 @@ def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
     return rod_points(found, len(points), asked.length, supports)
 
 
-def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
+def _smooth_samples(
+    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
+) -> _Chosen | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
     if asked.box_size is not None or asked.judge_always or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_samples(some, radius, length, spacing)
+    found = link_samples(some, radius, length, spacing, given)
     if has_outliers(found.neighbors) or not is_smooth(found, length, asked.uneven):
         return None
     return _Chosen(found, radius, some, points, None, True)
 
 
-def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
+def _usual_samples(
+    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
+) -> _Chosen:
     """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets."""
     length, judged = asked.length, None
     radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_samples(some, radius, length, spacing)
+    found = link_samples(some, radius, length, spacing, given)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
         outlier, sparse = judge_points(points, asked.outlier_distance, length)
         if outlier.any() or sparse.any():
             judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
             points = np.ascontiguousarray(points[judged == KEPT])
             some = thin_dense(points, bounds_of(points), radius, spacing)
-            found = link_samples(some, radius, length, spacing)
+            found = link_samples(some, radius, length, spacing, given)
     if is_rough(found, SHEETS * length):
-        fine = link_finer(points, radius, length, spacing)
+        fine = link_finer(points, radius, length, spacing, given)
         if fine is not None:
             some, (found, radius) = points, fine
+    if is_rough(found, ROUGH * length, MANY_ROUGH):
+        found = found._replace(thickness=without_bends(found, ROUGH * length))
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
     return _Chosen(found, radius, some, points, judged, False)
@@ -375,6 +386,8 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
+    if len(found.facing):
+        face_as_given(normals, found.facing)
     normals = mean_normals(normals, neighbors, 0.7)
     face_outside(mean, normals, piece)
     surface = Surface(

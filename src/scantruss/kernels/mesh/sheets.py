@@ -9,10 +9,15 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import dot, row, subtract
 from ..surface.local_surface import Surface, flood
 
+AWAY = 2.0  # what a distance counts to a node on the other side of a fold of more than 90 degrees
+
 
 @kernel
 def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach: float, nearest: np.ndarray) -> None:
     """Find the nearest node (V, 3) of each sample within `reach` over the links of its own sheet; -1 if there is none.
+
+    A node on the other side of a fold is `AWAY` times as far: past the end of a wall that is thin, or a gap that is narrow, one on the
+    other side may be nearer than the sample's own.
 
     boxes : of the samples. nearest : (S,) int64, filled.
     """
@@ -32,19 +37,28 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
                 s = surface.queue[i]
                 d = subtract(row(surface.mean, s), place)
                 dd = dot(d, d)
+                if dot(row(surface.normals, s), row(surface.normals, near)) < 0.0:
+                    dd *= AWAY * AWAY
                 if nearest[s] < 0 or dd < distance[s]:
                     nearest[s], distance[s] = v, dd
 
 
 @kernel
 def first_disconnected(
-    links: np.ndarray, nearest: np.ndarray, first: np.ndarray, ends: np.ndarray, most: int, enough: int
+    links: np.ndarray,
+    normals: np.ndarray,
+    nearest: np.ndarray,
+    first: np.ndarray,
+    ends: np.ndarray,
+    most: int,
+    enough: int,
 ) -> int:
     """The first sample whose node is far in the grid from the node of a linked sample; -1 if there are fewer than `enough` such links.
 
     Parameters
     ----------
-    links : (S, K) int64, linked samples, -1 for none
+    links : (S, K) int64, linked samples, -1 for none; those across a fold of more than 90 degrees do not count
+    normals : (S, 3) of the samples
     nearest : (S,) int64, node of each sample, -1 for none
     first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of the members of each node
     most : members between two nodes up to which they are close
@@ -55,7 +69,7 @@ def first_disconnected(
         a = nearest[s]
         for k in range(links.shape[1] if a >= 0 else 0):
             b = nearest[links[s, k]] if links[s, k] >= 0 else -1
-            if b <= a:
+            if b <= a or dot(row(normals, s), row(normals, links[s, k])) < 0.0:
                 continue
             number += 1
             queue[0], stamp[a] = a, number

@@ -7,24 +7,57 @@ that no later search strays to another sheet close by.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
-from ..geometry.vectors import dot, row, smallest_eigenvector, subtract
+from ..geometry.quadric import (
+    COLUMNS,
+    RESIDUAL,
+    TERMS_OF_PLANE,
+    TERMS_OF_QUADRIC,
+    WEIGHT,
+    fit_heights,
+    project,
+    second_moments,
+)
+from ..geometry.vectors import Vector, across, along, dot, norm, put_vector, row, smallest_eigenvector, subtract, unit
 
 TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances count as equal
+SETTLING_TURNS = 3  # fits of a sheet, those after the first with points far off it weighing less
+BENT = 0.7  # share of the spread about a plane below which that about a quadric says that the sheet is bent
+SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
+ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
+ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
+OPPOSITE = -0.7  # cosine of the normals given with two points below which they lie on opposite sides of something thin
+
+
+@kernel
+def may_share_sheet(facing: np.ndarray, p: int, q: int) -> bool:
+    """Whether two points do not face opposite ways; facing (N, 3) normals given with the points, (0, 3) where none are."""
+    return len(facing) == 0 or dot(row(facing, p), row(facing, q)) > OPPOSITE
 
 
 @kernel
 def _sample_within(
-    boxes: SearchBoxes, places: np.ndarray, i: int, j: int, k: int, x: float, y: float, z: float, square: float
+    boxes: SearchBoxes,
+    places: np.ndarray,
+    i: int,
+    j: int,
+    k: int,
+    place: Vector,
+    square: float,
+    facing: np.ndarray,
+    chosen: np.ndarray,
+    p: int,
 ) -> int:
-    """A sample of a search box whose squared distance from x, y, z is below `square`; -1 if there is none."""
+    """A sample of a search box that point p may belong to, its squared distance from the place below `square`; -1 if there is none."""
     item = boxes.first[slot_of(boxes, i, j, k)]
     while item >= 0:
-        dx, dy, dz = places[item, 0] - x, places[item, 1] - y, places[item, 2] - z
-        if dx * dx + dy * dy + dz * dz < square:
+        d = subtract(row(places, item), place)
+        if dot(d, d) < square and may_share_sheet(facing, p, chosen[item]):
             return item
         item = boxes.next[item]
     return -1
@@ -40,8 +73,11 @@ def choose_samples(
     places: np.ndarray,
     begin: int,
     count: int,
+    facing: np.ndarray,
 ) -> tuple[int, int]:
     """Choose samples from points[begin:] so that every point has one within `radius` and no two are nearer to each other.
+
+    Points that face opposite ways have no sample in common.
 
     Parameters
     ----------
@@ -50,6 +86,7 @@ def choose_samples(
     owner : (N,) int64, filled with a sample within the radius of each point
     chosen, places : (capacity,) int64 and (capacity, 3), filled with the point of each sample and its position
     begin, count : the point to go on from, and the number of samples so far
+    facing : (N, 3) normals given with the points, (0, 3) where none are
 
     Returns
     -------
@@ -59,7 +96,10 @@ def choose_samples(
     for p in range(begin, len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         a, b, c = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
-        home = _sample_within(boxes, places, a, b, c, x, y, z, square)  # most points find one in their own box
+        place = (x, y, z)
+        home = _sample_within(
+            boxes, places, a, b, c, place, square, facing, chosen, p
+        )  # most find one in their own box
         if home < 0:
             i0, i1 = box_index(boxes, 0, x - radius), box_index(boxes, 0, x + radius)
             j0, j1 = box_index(boxes, 1, y - radius), box_index(boxes, 1, y + radius)
@@ -68,7 +108,7 @@ def choose_samples(
                 for j in range(j0, j1 + 1):
                     for k in range(k0, k1 + 1):
                         if home < 0 and (i != a or j != b or k != c):
-                            home = _sample_within(boxes, places, i, j, k, x, y, z, square)
+                            home = _sample_within(boxes, places, i, j, k, place, square, facing, chosen, p)
         if home < 0:
             if count == len(chosen) or 2 * (count + 1) > len(boxes.keys):
                 return p, count
@@ -83,7 +123,14 @@ def choose_samples(
 
 @kernel
 def settle_points(
-    points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray, begin: int, end: int
+    points: np.ndarray,
+    places: np.ndarray,
+    neighbors: np.ndarray,
+    owner: np.ndarray,
+    facing: np.ndarray,
+    chosen: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
     """Give each point from `begin` to `end` - 1 to its nearest sample, by going from its owner (N,) over the links to nearer ones.
 
@@ -102,6 +149,8 @@ def settle_points(
                     break
                 d = subtract(row(places, n), place)
                 dd = dot(d, d)
+                if dd <= nearly and not may_share_sheet(facing, p, chosen[n]):
+                    continue
                 if dd <= nearly:
                     first = min(first, n)
                 if dd < least:
@@ -138,12 +187,33 @@ def group_points(
 
 
 @kernel
+def _alike(count: int, found: np.ndarray, facing: np.ndarray, s: int) -> int:
+    """Keep those of the first `count` samples found that do not face away from sample s; returns how many."""
+    if len(facing) == 0:
+        return count
+    held = 0
+    for c in range(count):
+        if may_share_sheet(facing, s, found[c]):
+            found[held] = found[c]
+            held += 1
+    return held
+
+
+@kernel
 def nearest_samples(
-    positions: np.ndarray, boxes: SearchBoxes, near: float, far: float, neighbors: np.ndarray, begin: int, end: int
+    positions: np.ndarray,
+    boxes: SearchBoxes,
+    near: float,
+    far: float,
+    neighbors: np.ndarray,
+    facing: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
     """Find the K nearest samples of each sample from `begin` to `end` - 1, nearest first, -1 where there are fewer within `far`.
 
-    The search starts with radius `near`. Where it finds fewer than six the scan is sparse, and it goes on to twice `far`.
+    The search starts with radius `near`. Where it finds fewer than six the scan is sparse, and it goes on to twice `far`. Samples that
+    face opposite ways are no neighbours; facing (S, 3) normals given with the scan, (0, 3) where none are.
     """
     k = neighbors.shape[1]
     found = np.empty(4096, np.int64)
@@ -151,10 +221,10 @@ def nearest_samples(
     for s in range(begin, end):
         x, y, z = row(positions, s)
         reach = near
-        count = search(boxes, positions, x, y, z, reach, found)
+        count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
         while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):
             reach = min(1.5 * reach, far if reach < far else 2.0 * far)
-            count = search(boxes, positions, x, y, z, reach, found)
+            count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
         held = 0
         for c in range(count):
             other = found[c]
@@ -172,6 +242,55 @@ def nearest_samples(
             distance[at] = dd
             neighbors[s, at] = other
             held = min(held + 1, k)
+
+
+@kernel
+def cut_across_grooves(positions: np.ndarray, neighbors: np.ndarray, facing: np.ndarray) -> None:
+    """Cut the links across a groove, or a gap between two walls, above its bottom; facing (S, 3) normals given with the scan.
+
+    Two samples look at each other across it, and one of them is linked to a third that lies deeper and looks across it too. At the
+    bottom of a valley there is none.
+    """
+    k_most = neighbors.shape[1]
+    cut = np.zeros(neighbors.shape, np.bool_)
+    for s in range(len(positions)):
+        for k in range(k_most):
+            t = neighbors[s, k]
+            if t < 0:
+                break
+            a, b, d = row(facing, s), row(facing, t), subtract(row(positions, t), row(positions, s))
+            far = norm(d)
+            if dot(a, b) < SIDE_OF_GROOVE and dot(d, a) > ACROSS * far and dot(d, b) < -ACROSS * far:
+                up = unit((a[0] + b[0], a[1] + b[1], a[2] + b[2]))
+                cut[s, k] = _goes_deeper(positions, neighbors, facing, s, t, up, far) or _goes_deeper(
+                    positions, neighbors, facing, t, s, up, far
+                )
+    for s in range(len(positions)):
+        held = 0
+        for k in range(k_most):
+            if neighbors[s, k] >= 0 and not cut[s, k]:
+                neighbors[s, held] = neighbors[s, k]
+                held += 1
+        neighbors[s, held:] = -1
+
+
+@kernel
+def _goes_deeper(
+    positions: np.ndarray, neighbors: np.ndarray, facing: np.ndarray, s: int, t: int, up: Vector, far: float
+) -> bool:
+    """Whether the side of a groove at sample s, which looks at t, goes on deeper."""
+    for k in range(neighbors.shape[1]):
+        n = neighbors[s, k]
+        if n < 0:
+            break
+        down = -dot(subtract(row(positions, n), row(positions, s)), up)
+        if (
+            down > ACROSS * far
+            and dot(row(facing, n), row(facing, s)) > ONE_SIDE
+            and dot(row(facing, n), row(facing, t)) < 0.0
+        ):
+            return True
+    return False
 
 
 @kernel
@@ -203,15 +322,14 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 def settle_samples(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
-    """Move each rough sample (thickness above `rough`) onto the plane of the samples linked to it within a radius.
+    """Move each rough sample (thickness above `rough`) onto the sheet of the samples linked to it within a radius.
 
     Noise, plants and doubled layers thicker than a sample leave a cloud of samples; this turns it back into a sheet. Samples far off
-    the plane weigh less.
+    weigh less.
     """
     count = len(mean)
     stamp = np.full(count, -1, np.int64)
     queue = np.empty(count, np.int64)
-    weight = np.empty(count)
     for s in range(count):
         place = row(mean, s)
         settled[s, 0], settled[s, 1], settled[s, 2] = place
@@ -231,38 +349,42 @@ def settle_samples(
                     if dot(d, d) < radius * radius:
                         queue[found] = n
                         found += 1
+        buffer = np.empty((found, COLUMNS))
         for i in range(found):
-            d = subtract(row(mean, queue[i]), place)
-            w = 1.0 - dot(d, d) / (radius * radius)
-            weight[i] = w * w
-        for turn in range(3):
-            total = cx = cy = cz = 0.0
-            for i in range(found):
-                d = subtract(row(mean, queue[i]), place)
-                w = weight[i]
-                total, cx, cy, cz = total + w, cx + w * d[0], cy + w * d[1], cz + w * d[2]
-            cx, cy, cz = cx / total, cy / total, cz / total
-            xx = xy = xz = yy = yz = zz = 0.0
-            for i in range(found):
-                d = subtract(row(mean, queue[i]), place)
-                w = weight[i]
-                x, y, z = d[0] - cx, d[1] - cy, d[2] - cz
-                xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
-                yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
-            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
-            off = cx * v[0] + cy * v[1] + cz * v[2]
-            if turn < 2:
-                spread = 0.0
-                for i in range(found):
-                    spread += weight[i] * abs(dot(subtract(row(mean, queue[i]), place), v) - off)
-                spread = max(spread / total, 1e-300)
-                for i in range(found):
-                    d = subtract(row(mean, queue[i]), place)
-                    w = 1.0 - dot(d, d) / (radius * radius)
-                    r = (dot(d, v) - off) / (1.5 * spread)
-                    weight[i] = w * w / (1.0 + r * r)
-        for c in range(3):
-            settled[s, c] = place[c] + off * v[c]
+            buffer[i, 0], buffer[i, 1], buffer[i, 2] = subtract(row(mean, queue[i]), place)
+        put_vector(settled[s], 0, _settled_place(buffer, found, place, radius))
+
+
+@kernel
+def _settled_place(buffer: np.ndarray, taken: int, place: Vector, radius: float) -> Vector:
+    """A place moved onto the sheet through the points of a buffer (relative to it): a plane, or a quadric where that fits much better."""
+    heights, matrix, off, least = np.empty(TERMS_OF_QUADRIC), np.empty((6, 7)), 0.0, math.inf
+    _weigh(buffer, taken, radius, math.inf)
+    normal = smallest_eigenvector(*second_moments(buffer, taken))
+    project(buffer, taken, radius, normal, across(normal))
+    for terms in (TERMS_OF_PLANE, TERMS_OF_QUADRIC):
+        _weigh(buffer, taken, radius, math.inf)
+        spread = 0.0
+        for _ in range(SETTLING_TURNS):
+            fit_heights(buffer, taken, radius, terms, heights, matrix)
+            spread, total = 0.0, 0.0
+            for i in range(taken):
+                spread += buffer[i, WEIGHT] * abs(buffer[i, RESIDUAL])
+                total += buffer[i, WEIGHT]
+            spread /= max(total, 1e-300)
+            _weigh(buffer, taken, radius, 1.5 * max(spread, 1e-300))
+        if spread < least:
+            off, least = heights[0], BENT * spread
+    return along(place, off, normal)
+
+
+@kernel
+def _weigh(buffer: np.ndarray, taken: int, radius: float, far: float) -> None:
+    """Weigh the points of a fit by their distance from the middle and, in terms of `far` where that is finite, from what was fitted."""
+    for i in range(taken):
+        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        w, r = 1.0 - dot(d, d) / (radius * radius), buffer[i, RESIDUAL] / far if far < math.inf else 0.0
+        buffer[i, WEIGHT] = w * w / (1.0 + r * r)
 
 
 @kernel

@@ -25,7 +25,11 @@ NAMES = {
     "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
     "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
     "confidence": ("confidence", "scalarconfidence", "conf"),
+    "nx": ("nx", "normalx", "scalarnx", "xnormal"),
+    "ny": ("ny", "normaly", "scalarny", "ynormal"),
+    "nz": ("nz", "normalz", "scalarnz", "znormal"),
 }
+NORMAL = ("nx", "ny", "nz")  # attributes that are a normal together
 
 
 def clean_name(name: str) -> str:

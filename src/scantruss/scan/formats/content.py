@@ -25,6 +25,7 @@ class Content:
     unread: dict[str, int] = field(
         default_factory=dict
     )  #: points that a reader skipped because they lie outside a part of the selection, by words for them
+    normals: np.ndarray | None = None  #: (N, 3)
     feet: str = ""  #: note that heights look like feet, used unless their unit is known
 
 

@@ -1,4 +1,4 @@
-"""Points of OBJ, STL and OFF files: all their vertices, with or without a face.
+"""Points of OBJ, STL and OFF files: all their vertices, with or without a face, and their normals by the faces.
 
 These readers are our own: libraries for such files drop vertices without a face, or reorder and repeat them.
 """
@@ -13,6 +13,7 @@ import numpy as np
 
 from ...errors import FormatError
 from .content import Content
+from .faces import normals_from_faces
 from .kinds import is_text, kind_of, read_head, wrong_kind
 
 STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -20,18 +21,37 @@ STL_START = 84  # bytes: a comment of 80 and the number of facets
 
 
 def read_obj(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the `v` lines of an OBJ file."""
+    """Return the points of the `v` lines of an OBJ file, with normals where it has faces."""
     head = read_head(path)
     if b"\0" in head or kind_of(head) not in ("", "an OBJ file"):
         raise wrong_kind(path, head, "an OBJ file")
+    lines, faces = list[str](), list[str]()
     with path.open(encoding="latin-1") as file:
-        lines = [line for line in file if line.lstrip()[:2] in ("v ", "v\t")]
+        for line in file:
+            if (start := line.lstrip()[:2]) in ("v ", "v\t"):
+                lines.append(line)
+            elif start in ("f ", "f\t"):
+                faces.append(line)
     if not lines:
         raise FormatError(f"{path} has no line `v x y z`, so no points")
     try:
-        return Content(np.loadtxt(lines, usecols=(1, 2, 3), ndmin=2))
+        points = np.loadtxt(lines, usecols=(1, 2, 3), ndmin=2)
     except ValueError:
         raise FormatError(f"{path} has a line `v` without three numbers; the file is damaged") from None
+    return Content(points, normals=normals_from_faces(points, _obj_faces(faces, len(points))))
+
+
+def _obj_faces(lines: list[str], points: int) -> list[np.ndarray]:
+    """Return the faces of `f` lines, those of as many corners together; none where one is damaged."""
+    by_corners = dict[int, list[str]]()
+    for line in lines:
+        words = line.split()[1:]
+        by_corners.setdefault(len(words), []).append(" ".join(word.partition("/")[0] for word in words))
+    try:
+        faces = [np.loadtxt(rows, np.int64, ndmin=2) for corners, rows in by_corners.items() if corners > 2]
+    except ValueError:
+        return []
+    return [np.where(face < 0, face + points, face - 1) for face in faces]
 
 
 def read_off(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -52,30 +72,47 @@ def read_off(path: Path, wanted: Sequence[str] = ()) -> Content:
     if not count:
         return Content(np.empty((0, 3)))
     try:
-        return Content(np.loadtxt(rows[:count], usecols=(0, 1, 2), ndmin=2))
+        points = np.loadtxt(rows[:count], usecols=(0, 1, 2), ndmin=2)
     except ValueError:
         raise FormatError(f"{path} has a vertex without three numbers; the file is damaged") from None
+    return Content(points, normals=normals_from_faces(points, _off_faces(rows[count : count + faces])))
+
+
+def _off_faces(rows: list[str]) -> list[np.ndarray]:
+    """Return the faces of an OFF file, those of as many corners together; none where one is damaged."""
+    by_corners = dict[str, list[str]]()
+    for row in rows:
+        by_corners.setdefault(row.split(None, 1)[0], []).append(row)
+    try:
+        return [
+            np.loadtxt(own, np.int64, usecols=range(1, int(corners) + 1), ndmin=2)
+            for corners, own in by_corners.items()
+            if int(corners) > 2
+        ]
+    except ValueError:
+        return []
 
 
 def read_stl(path: Path, wanted: Sequence[str] = ()) -> Content:
-    """Return the corners of an STL file, each once."""
+    """Return the corners of an STL file, each once, with normals by its facets."""
     head = read_head(path)
     size = path.stat().st_size
     facets = int(np.frombuffer(head, "<u4", 1, 80)[0]) if size >= STL_START else -1
     if facets >= 0 and size == STL_START + facets * STL_FACET.itemsize:
-        return Content(_read_stl_binary(path, facets))
+        return _each_once(_read_stl_binary(path, facets))
     if re.match(rb"\s*solid\b", head) and b"\0" not in head:
-        return Content(_read_stl_text(path))
+        return _each_once(_read_stl_text(path))
     if facets < 0 or kind_of(head) or is_text(head):
         raise wrong_kind(path, head, "an STL file")
     if size < STL_START + facets * STL_FACET.itemsize:
         raise FormatError(f"{path} ends early: its header promises {facets:,} triangles; copy it again")
-    return Content(_read_stl_binary(path, facets))
+    return _each_once(_read_stl_binary(path, facets))
 
 
 def _read_stl_binary(path: Path, facets: int) -> np.ndarray:
     rows = np.fromfile(path, STL_FACET, facets, offset=STL_START)
-    return _each_once(rows["corners"].reshape(-1, 3))
+    corners: np.ndarray = rows["corners"].reshape(-1, 3)
+    return corners
 
 
 def _read_stl_text(path: Path) -> np.ndarray:
@@ -85,15 +122,19 @@ def _read_stl_text(path: Path) -> np.ndarray:
     if len(corners) == len(lines) or len(corners) % 3:
         raise FormatError(f"{path} ends before its line endsolid; copy it again")
     try:
-        return _each_once(np.loadtxt(corners, usecols=(1, 2, 3), ndmin=2)) if corners else np.empty((0, 3))
+        return np.loadtxt(corners, usecols=(1, 2, 3), ndmin=2) if corners else np.empty((0, 3))
     except ValueError:
         raise FormatError(f"{path} has a line `vertex` without three numbers; the file is damaged") from None
 
 
-def _each_once(corners: np.ndarray) -> np.ndarray:
-    """Return every place once, in the order of first appearance, (N, 3) float64."""
+def _each_once(corners: np.ndarray) -> Content:
+    """Return every place once, in the order of first appearance, with normals by the facets of which these are the corners (3 F, 3)."""
     order = np.lexsort(corners.T)
     ordered = corners[order]
     fresh = np.ones(len(order), dtype=bool)
     fresh[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    return corners[np.sort(order[fresh])].astype(np.float64)
+    first = np.sort(order[fresh])
+    points = corners[first].astype(np.float64)
+    of_corner = np.empty(len(corners), np.int64)
+    of_corner[order] = np.searchsorted(first, order[fresh])[np.cumsum(fresh) - 1]
+    return Content(points, normals=normals_from_faces(points, [of_corner.reshape(-1, 3)]))

@@ -15,12 +15,14 @@ import numpy as np
 from ...errors import FormatError
 from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of
-from .columns import find_attributes
+from .columns import NORMAL, find_attributes
 from .content import Cloud, Content
+from .faces import normals_from_faces
 from .kinds import read_head, wrong_kind
 from .ply_header import PLY, Element, Header, ends_early, read_header
 
 LONGEST_LIST = 1 << 26  # entries
+LISTS_OF_CORNERS = ("vertex_indices", "vertex_index")  # properties of a face
 MOST_RUNS = 20_000  # changes of list length walked through behind the points
 
 
@@ -47,7 +49,51 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     else:
         table = _read_binary(path, header, vertex, columns)
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
-    return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=metres_of(header.unit))
+    points, normals = np.ascontiguousarray(table[:, :3]), None
+    if not all(name in attributes for name in NORMAL):
+        normals = normals_from_faces(points, _faces(path, header))
+    return Content(points, attributes, metres=metres_of(header.unit), normals=normals)
+
+
+def _faces(path: Path, header: Header) -> list[np.ndarray]:
+    """Return the faces of a PLY file, those of as many corners together; none where they are damaged or there are none."""
+    element = next((each for each in header.elements if each.name == "face"), None)
+    names = [] if element is None else [p.name for p in element.properties if p.count_type]
+    if element is None or not element.count or not set(names) & set(LISTS_OF_CORNERS):
+        return []
+    try:
+        return _binary_faces(path, header, element) if header.order else _ascii_faces(path, header, element)
+    except (FormatError, ValueError):
+        return []
+
+
+def _binary_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]:
+    data, offset = np.memmap(path, dtype=np.uint8, mode="r"), header.start
+    for element in header.elements[: header.elements.index(face)]:
+        offset = _skip(path, data, offset, header.order, element, None)
+    number = next(i for i, p in enumerate(face.properties) if p.name in LISTS_OF_CORNERS)
+    runs, found = _runs(path, data, offset, header.order, face), list[np.ndarray]()
+    for rows, _ in itertools.islice(runs, MOST_RUNS):
+        found.append(np.array(rows[f"list {number}"]))
+    whole = sum(map(len, found)) == face.count
+    return found if whole else []
+
+
+def _ascii_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]:
+    place = header.elements.index(face)
+    if face.properties[0].name not in LISTS_OF_CORNERS:
+        return []
+    with _open_data(path, header) as file:
+        lines = (line for line in file if not line.isspace())
+        _pass(lines, sum(element.count for element in header.elements[:place] if element.properties))
+        by_corners = dict[str, list[str]]()
+        for line in itertools.islice(lines, face.count):
+            by_corners.setdefault(line.split(None, 1)[0], []).append(line)
+    return [
+        np.loadtxt(rows, np.int64, usecols=range(1, int(corners) + 1), ndmin=2)
+        for corners, rows in by_corners.items()
+        if int(corners) > 2
+    ]
 
 
 def _read_binary(path: Path, header: Header, vertex: Element, columns: Sequence[str]) -> np.ndarray:

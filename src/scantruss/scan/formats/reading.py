@@ -15,6 +15,7 @@ from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
 from ..units import check_unit
 from .choose import check_attributes, choose, describe, places_in
+from .columns import NORMAL
 from .common_unit import to_common_unit
 from .content import Content
 from .copc import Place
@@ -23,6 +24,8 @@ from .las import Places, read_las
 from .packed import unpacked
 from .paths import Source, files_of, name_of_files
 from .table import PACKED, READERS
+
+WITH_NORMALS = (".ply", ".pcd", ".npy", ".npz", ".parquet")  # suffixes of files whose columns of normals are read
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,7 @@ class Part:
     left_out: dict[str, int]  #: points that the file marks as none, and points that each part of the selection left out
     held: str  #: what could have been selected, if nothing was
     notes: tuple[str, ...]
+    normals: np.ndarray | None = None  #: (N, 3)
 
 
 def read_points(path: Source, unit: str = "", selection: Selection | None = None) -> PointCloud:
@@ -54,7 +58,8 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     Returns
     -------
     PointCloud
-        All points that are taken, in the order of the files; faces, normals, colours and other properties are left aside.
+        All points that are taken, in the order of the files, with their normals where all files have them or have faces; colours
+        and other properties are left aside.
         `notes` says what was left out or converted.
 
     Raises
@@ -74,7 +79,9 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
     points, unit, notes = _join(files, parts)
     if not len(points):
         raise _nothing_left(files, parts)
-    cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path))
+    normals = [part.normals for part in parts if part.normals is not None]
+    given = np.concatenate(normals) if len(normals) == len(parts) else None
+    cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path), normals=given)
     left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
     return replace(cloud, notes=(*notes, *cloud.notes, *degrees_note(cloud)), left_out=tuple(left_out.items()))
 
@@ -85,7 +92,10 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     def places_of(said: Content) -> list[Place]:
         return places_in_file(path, said, unit, selection, common)
 
-    content = read_content(path, selection.needs, places_of if selection.crop else None)
+    wanted = (*selection.needs, *(NORMAL if path.suffix.lower() in WITH_NORMALS else ()))
+    content = read_content(path, wanted, places_of if selection.crop else None)
+    if all(name in content.attributes for name in NORMAL):
+        content = replace(content, normals=np.column_stack([content.attributes[name] for name in NORMAL]))
     return select(path, content, unit, selection, common)
 
 
@@ -103,11 +113,13 @@ def select(
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, chosen = choose(points, content.attributes, selection)
     held = "" if kept.any() else _describe(points, content, described)
+    normals = content.normals
     if not kept.all():
         points = points[kept]
+        normals = normals if normals is None else normals[kept]
     left_out = add_counts([content.left_out, chosen, content.unread])
     count = len(points) + sum(left_out.values())
-    return Part(points, unit, content.system, count, left_out, held, notes)
+    return Part(points, unit, content.system, count, left_out, held, notes, normals)
 
 
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:

@@ -12,6 +12,7 @@ from ...kernels.surface import normals as normal_kernels
 from ...kernels.surface import samples as kernels
 from ...runtime.parallel import in_parts
 from ...surface.linked_samples import samples_of_points
+from ..given_normals import NO_NORMALS
 from ..normals import face_one_side, mean_normals
 
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
@@ -103,7 +104,7 @@ def link(points: np.ndarray, spacing: float) -> np.ndarray:
         len(points),
         3000,
         lambda _, begin, end: kernels.nearest_samples(
-            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
+            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, NO_NORMALS, begin, end
         ),
     )
     far = 3.3 * spacing  # the kernel searches farther if there are few; here those are outliers

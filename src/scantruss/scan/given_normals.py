@@ -1,0 +1,55 @@
+"""Normals that a scan comes with: they tell the two sides of something thin apart where the points alone do not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.geometry.kd_tree import KDTree, nearest_of_places
+from ..runtime.parallel import in_parts
+from .clean.nearby import POINTS_PER_THREAD, build_kd_tree
+
+NO_NORMALS = np.empty((0, 3))  # where none are given
+POINTS_TO_JUDGE = 2000  # points by which it is judged whether normals can be trusted
+BESIDE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
+MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
+SAME_PLACE = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
+
+
+@dataclass(frozen=True, eq=False)
+class GivenNormals:
+    """Normals by place."""
+
+    tree: KDTree
+    normals: np.ndarray  #: (N, 3) unit normals in the order of the points
+    same: float  #: distance from a point within which a place has its normal [scan unit]
+
+    @classmethod
+    def of(cls, points: np.ndarray, normals: np.ndarray) -> GivenNormals | None:
+        """Return the normals (N, 3) of points (N, 3), None where they face both ways, as those of a plane fit may do."""
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        known = (lengths[:, 0] > 0.0) & np.isfinite(lengths[:, 0])
+        unit = np.where(known[:, None], normals / np.where(known[:, None], lengths, 1.0), 0.0)
+        given = cls(build_kd_tree(points), unit, SAME_PLACE * float(np.ptp(points, axis=0).max()))
+        some = np.linspace(0, len(points) - 1, min(len(points), POINTS_TO_JUDGE)).astype(np.int64)
+        other, _ = given._nearest(points[some], 2)
+        apart = points[other] - points[some]
+        beside = np.abs((apart * unit[some]).sum(axis=1)) < BESIDE * np.linalg.norm(apart, axis=1)
+        opposite = (unit[some] * unit[other]).sum(axis=1) < 0.0
+        return given if (opposite & beside).mean() <= MOST_OPPOSITE else None
+
+    def at(self, places: np.ndarray) -> np.ndarray:
+        """Return the normals at places (P, 3), those of the points there; zero where there is none, (P, 3)."""
+        which, squares = self._nearest(places, 1)
+        return np.where(squares[:, None] <= self.same * self.same, self.normals[which], 0.0)
+
+    def _nearest(self, places: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the point nearest to each place (P,) for rank 1, the second nearest for rank 2, and its squared distance (P,)."""
+        squares, which = np.empty(len(places)), np.empty(len(places), np.int64)
+
+        def look_up(_: int, begin: int, end: int) -> None:
+            nearest_of_places(self.tree, places[begin:end], rank, squares[begin:end], which[begin:end])
+
+        in_parts(len(places), POINTS_PER_THREAD, look_up)
+        return which, squares
