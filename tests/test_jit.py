@@ -141,7 +141,7 @@ def test_no_home_is_no_error(tmp_path: Path, no_home: None, monkeypatch: pytest.
 
 
 def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiling, "FOLDER", None)
+    monkeypatch.setattr(compiling, "KERNEL_FOLDER", None)
 
     @compiling.kernel
     def twice(x: float) -> float:

@@ -14,7 +14,7 @@ from scantruss.kernels.geometry.boxes import nearest
 from scantruss.kernels.scan import blend as blending
 from scantruss.kernels.scan import features as feature_kernels
 from scantruss.kernels.scan import overlap as kernels
-from scantruss.scan.register.features import BINS, find_features, flip
+from scantruss.scan.register.features import ANGLE_BINS, find_features, flip
 from scantruss.scan.register.fine import align, judge, solve
 from scantruss.scan.register.matching import fit_pose
 from scantruss.scan.register.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
@@ -92,7 +92,7 @@ def test_features_do_not_change_when_a_scan_is_moved(views: tuple[View, View, np
     plain, other, opposite = find_features([view, moved, turned])
     assert (np.abs(plain - other) > 20).mean() < 0.01  # a value on the edge of a bin may change sides
     assert (np.abs(flip(plain) - opposite) > 20).mean() < 0.01
-    assert plain.shape == (len(view.points), 6 * BINS) and np.array_equal(plain, np.round(plain))
+    assert plain.shape == (len(view.points), 6 * ANGLE_BINS) and np.array_equal(plain, np.round(plain))
 
 
 def slow_sums(

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, walk
+from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, walk
 
 if TYPE_CHECKING:
     from ..settings import Settings
 
-COARSE = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
+POINTS_UNDER_LINE = 120.0  # points of the scan that a patch under a line or a boundary is fitted to
+ZIGZAG_WIDTH = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
 
 
 def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
@@ -63,7 +64,7 @@ def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, setting
     """Return which of the points (M, 3) of a line are corners, the sharpest first: where it turns by more than `corner_angle`."""
     places = points[vertices]
     whole = np.concatenate([places, places[:1]]) if closed else places
-    coarse = simplify(whole, COARSE * settings.length, closed)
+    coarse = simplify(whole, ZIGZAG_WIDTH * settings.length, closed)
     before, after = np.diff(coarse, axis=0), np.diff(coarse, axis=0)[1:]
     if closed:
         after = np.concatenate([after, before[:1]])
@@ -79,7 +80,7 @@ def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, setting
 
 def feet_on_scan(points: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the feet (M, 3) on the scan of the points of a polyline, and how far it leaves the scan there (M,) [scan unit]."""
-    patch, feet, gaps, sample = np.zeros(PATCH), np.empty_like(points), np.empty(len(points)), -1
+    patch, feet, gaps, sample = np.zeros(PATCH_COLUMNS), np.empty_like(points), np.empty(len(points)), -1
     for k, place in enumerate(points.tolist()):
         at = (place[0], place[1], place[2])
         sample = walk(surface, sample, at) if sample >= 0 else nearest_sample(surface, *at)

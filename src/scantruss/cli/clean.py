@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..scan.clean.steps import CleanCloud
     from .options import Parser
 
-LARGEST = {"duplicates": 1.0, "loose-pieces": 0.5, "layer-distance": 20.0}  # beyond these most of a scan is lost
+LARGEST_VALUES = {"duplicates": 1.0, "loose-pieces": 0.5, "layer-distance": 20.0}  # beyond these most of a scan is lost
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "remove points closer to an earlier one than this share of the spacing"),
     "outlier-distance": (
@@ -29,7 +29,7 @@ SHARES = {  # option, step that it steers, metavar, default, what it is
     ),
     "layer-distance": ("NUMBER", 2.0, "merge two layers up to this many spacings apart"),
 }
-KEEP = {
+KEEP_OPTIONS = {
     "duplicates": ("keep-duplicates", "keep duplicate points"),
     "outlier-distance": ("keep-outliers", "keep outliers"),
     "loose-pieces": ("keep-pieces", "keep loose pieces"),
@@ -54,7 +54,7 @@ def clean_parser() -> Parser:
         steps.add_argument(
             f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
         )
-        keep, said = KEEP[name]
+        keep, said = KEEP_OPTIONS[name]
         steps.add_argument(f"--{keep}", action="store_true", help=said)
     steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: remove no noise")
     steps.add_argument(
@@ -121,14 +121,14 @@ def _steps(values: Namespace) -> dict[str, Any]:
     }
     for name in SHARES:
         field = name.replace("-", "_")
-        steps[field] = None if given[KEEP[name][0].replace("-", "_")] else given[field]
+        steps[field] = None if given[KEEP_OPTIONS[name][0].replace("-", "_")] else given[field]
         if steps[field] is not None and not 0 <= steps[field] < float("inf"):
             raise InputError(f"--{name} must be a number of 0 or more, got {given[field]:g}")
-        if (steps[field] or 0.0) > LARGEST.get(name, float("inf")):
+        if (steps[field] or 0.0) > LARGEST_VALUES.get(name, float("inf")):
             _, default, words = SHARES[name]
             raise InputError(
                 f"--{name} {given[field]:g} would {words.partition(',')[0]}, and so most of the scan;"
-                f" it must be at most {LARGEST[name]:g} (default {default:g})"
+                f" it must be at most {LARGEST_VALUES[name]:g} (default {default:g})"
             )
         if name == "outlier-distance" and 0 < (steps[field] or 0.0) < 1:
             raise InputError(f"--{name} {given[field]:g} would remove most of the scan; it must be 0, or 1 or more")

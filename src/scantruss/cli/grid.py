@@ -13,7 +13,7 @@ from ..export.drawing.style import VIEWS
 from ..export.style import OBJ_ELEMENTS, FileStyle
 from .outputs import claim, inputs_of, outs_of
 from .shared import (
-    SCAN,
+    SCAN_HELP,
     add_memory,
     note_compiling,
     note_layers,
@@ -42,7 +42,7 @@ def grid_parser() -> Parser:
         "Turn a scan into a triangular grid truss of a desired member length.\n"
         "The options come in three parts: everyday, expert, and for the method of the paper only.",
     )
-    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_outs(parser, "results; the suffix names the format", "*")
     files = parser.add_argument_group("files")
     files.add_argument(

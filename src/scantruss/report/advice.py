@@ -34,9 +34,8 @@ LADDER = (
 )  # fmt: skip
 NEXT = 1.4  # a length is suggested if that many times it passes too
 NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths that are tried in place of one that failed
-SURE_PER_SPACING = (
-    8.0  # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
-)
+# spacings in a member from which holes in the sampling are seldom taken for holes of the surface
+SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
 RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it

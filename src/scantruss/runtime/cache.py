@@ -133,7 +133,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         """Make what Python calls when it first does: of most kernels it never does."""
         if name != "alone":
             raise AttributeError(name)
-        with MAKING:
+        with MAKING_KERNELS:
             if name not in vars(self):
                 alone = numba.jit(**self.targetoptions)(self.py_func)
                 alone._compiler._customize_flags = Flags
@@ -161,13 +161,13 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return self.overloads[arguments].entry_point
 
 
-MAKING = RLock()  # numba asks one name for the folder, and a kernel is made once
+MAKING_KERNELS = RLock()  # numba asks one name for the folder, and a kernel is made once
 
 
 @contextmanager
 def stored_in(folder: Path) -> Iterator[None]:
     """Say to numba where it keeps machine code, while a block asks it to, which is left where numba cannot."""
-    with MAKING, suppress(RuntimeError):  # "cannot cache function"
+    with MAKING_KERNELS, suppress(RuntimeError):  # "cannot cache function"
         kept, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
         try:
             yield

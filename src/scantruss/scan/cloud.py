@@ -25,15 +25,15 @@ from .units import check_unit
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
 INVALID = "with coordinates a million times too large"
-NO_DATA = "with a height that stands for no data"
+AT_NO_DATA = "with a height that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
 SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # ... and those of these files
-COPIES = 5  # times that a scan may be stored with every point repeated
+MOST_COPIES = 5  # times that a scan may be stored with every point repeated
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
-ROUGHLY = 60  # points among them for a first estimate
+POINTS_FOR_FIRST_SPACING = 60  # points among them for a first estimate
 POINTS_FOR_GAP = 200  # points at which the gap is measured
-POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
+COORDINATES_PER_THREAD = 50_000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +117,13 @@ class PointCloud:
         dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
-            left_out = ((NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
+            left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:
             at, value = no_data
             notes = (*notes, no_data_note(int(at.sum()), value + 0.0))
-            left_out = (*left_out, (NO_DATA, int(at.sum())))
+            left_out = (*left_out, (AT_NO_DATA, int(at.sum())))
             clean = np.ascontiguousarray(clean[~at])
             lower, upper = bounds_of(clean)
         extent = _check_extent(lower, upper, said)
@@ -175,7 +175,7 @@ def bounds_of(array: np.ndarray) -> Bounds:
     array = np.ascontiguousarray(array)
     found = np.empty((processors(), 2, 3))
     found[:, 0], found[:, 1] = math.inf, -math.inf
-    in_parts(len(array), POINTS_PER_THREAD, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
+    in_parts(len(array), COORDINATES_PER_THREAD, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
     return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
@@ -212,7 +212,7 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
     in_parts(
         blocks,
-        POINTS_PER_THREAD // POINTS_PER_BLOCK,
+        COORDINATES_PER_THREAD // POINTS_PER_BLOCK,
         lambda _, begin, end: move_points(points, origin, moved, sums, begin, end),
     )
     return moved, sums.sum(axis=0)
@@ -256,7 +256,7 @@ def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
     sample, place = np.unique(sample, axis=0, return_inverse=True)
     if len(place) < len(points):
         reach = float(np.linalg.norm(upper - lower))
-        some = _nearest_of(sample[:: len(sample) // ROUGHLY + 1], sample, same)
+        some = _nearest_of(sample[:: len(sample) // POINTS_FOR_FIRST_SPACING + 1], sample, same)
         nearest = _refine(points, sample, some, np.bincount(place.ravel()), same, reach)
     else:
         parts = np.array_split(sample, len(sample) // 500 + 1)
@@ -277,7 +277,7 @@ def measure_gap(points: np.ndarray) -> float:
     float
         About one spacing for points in a triangular pattern, 2.7 times the distance to the nearest for random ones.
     """
-    most = min(6 * COPIES, len(points) - 1)
+    most = min(6 * MOST_COPIES, len(points) - 1)
     gaps = []
     for place in points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_GAP)).astype(np.int64)]:
         squared = np.zeros(len(points))
@@ -334,7 +334,7 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     from ..kernels.geometry.boxes import new_boxes
     from ..kernels.scan import nearby
 
-    copies = nearby.COPIES * len(sample)
+    copies = nearby.BOXES_OF_A_PLACE * len(sample)
     boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.5 * size, copies, copies)
     marked = np.zeros(1 << 16, np.bool_)
     nearby.spread_sample(boxes, sample, size, marked)
@@ -343,6 +343,6 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     def search_part(part: int, begin: int, end: int) -> None:
         nearby.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
 
-    in_parts(len(points), POINTS_PER_THREAD, search_part)
+    in_parts(len(points), COORDINATES_PER_THREAD, search_part)
     nearest: np.ndarray = np.sqrt(squares.min(axis=0))
     return nearest

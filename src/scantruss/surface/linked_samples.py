@@ -11,16 +11,16 @@ from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
 from ..runtime.parallel import in_parts
 from ..scan.cloud import Bounds, bounds_of
-from ..scan.normals import SAMPLES_PER_THREAD
+from ..scan.normals import NORMALS_PER_THREAD
 from .streamline import is_dense, streamlined
 
-NEIGHBORS = 12  # most links of a sample
+LINKS_OF_A_SAMPLE = 12  # most links of a sample
 BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
 POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
 SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
 LONE_SPACING = 0.3  # point spacing above which most points are samples themselves [sample radii]
 SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]
-POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
+LINKED_POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
 PATCH_SPACING = 0.3  # point spacing that is dense enough for fitting patches [sample radii]
 ROUGH = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
 SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
@@ -78,7 +78,7 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
     linked = found.mean, found.normals, found.neighbors
     in_parts(
         len(marks),
-        SAMPLES_PER_THREAD,
+        NORMALS_PER_THREAD,
         lambda _, begin, end: normal_kernels.mark_uneven(*linked, least, marks, begin, end),
     )
     return bool(marks.sum() <= SAMPLES_WITHOUT_ROOM_FOR_RIDGE)
@@ -146,7 +146,7 @@ def _settled(
     neighbors = _neighbors(places, boxes, length, radius, spacing)
     in_parts(
         len(points),
-        POINTS_PER_THREAD,
+        LINKED_POINTS_PER_THREAD,
         lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end),
     )
     return owner, chosen, places, boxes, neighbors
@@ -154,12 +154,12 @@ def _settled(
 
 def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:
     """Return the neighbours of each sample (S, 3) among the others."""
-    neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
+    neighbors = np.full((len(places), LINKS_OF_A_SAMPLE), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
     in_parts(
         len(places),
-        SAMPLES_PER_THREAD,
+        NORMALS_PER_THREAD,
         lambda _, begin, end: kernels.nearest_samples(places, boxes, near, far, neighbors, begin, end),
     )
     kernels.link_back(places, neighbors)
@@ -171,7 +171,7 @@ def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.nd
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
     in_parts(
         len(mean),
-        SAMPLES_PER_THREAD,
+        NORMALS_PER_THREAD,
         lambda _, begin, end: normal_kernels.sample_normals(mean, neighbors, normals, thickness, begin, end),
     )
     return normals, thickness

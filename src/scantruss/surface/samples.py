@@ -17,13 +17,13 @@ from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
-from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
+from ..scan.normals import STEEP_SINE, cut_steep_links, face_one_side, face_outside, mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .linked_samples import (
+    LINKED_POINTS_PER_THREAD,
     MANY_ROUGH,
     PATCH_SPACING,
-    POINTS_PER_THREAD,
     ROUGH,
     SHEETS,
     Linked,
@@ -47,8 +47,8 @@ WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not r
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
-ALL = 24.0  # most points per sample to which a patch is fitted when nodes are projected
+PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
+PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,9 +226,9 @@ def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
     radius = np.sqrt(points * samples.area / (np.pi * len(surface.points)))
     surface = surface._replace(
         patch_radius=float(np.clip(radius, 0.1 * surface.length, surface.patch_radius)),
-        patch_points=ALL * (SMOOTH_SAMPLE_SPACING / SAMPLE_SPACING) ** 2
+        patch_points=PATCH_POINTS_TO_PROJECT * (SMOOTH_SAMPLE_SPACING / SAMPLE_SPACING) ** 2
         if samples.smooth
-        else ALL,  # as many for an area
+        else PATCH_POINTS_TO_PROJECT,  # as many for an area
     )
     if np.isfinite(points):  # the number of points does not depend on the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
@@ -245,7 +245,7 @@ def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_poin
     owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
     in_parts(
         len(near),
-        POINTS_PER_THREAD,
+        LINKED_POINTS_PER_THREAD,
         lambda _, begin, end: nearest_places(near, samples.boxes, means, far, owner, begin, end),
     )
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
@@ -372,7 +372,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
     """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP_SINE)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
     normals = mean_normals(normals, neighbors, 0.7)
@@ -386,7 +386,7 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         length=float(length),
         radius=float(radius),
         patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=POINTS_ON_THE_WAY,
+        patch_points=PATCH_POINTS_ON_THE_WAY,
         step=float(max(radius, 1.3 * spacing)),
         stamp=np.zeros(len(mean), np.int64),
         queue=np.zeros(len(mean), np.int64),

@@ -20,8 +20,8 @@ VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, 
 NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
 DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
 VOLUME_PLACES = 0.35  # the same for a volume: places near its surface see only half of it
-FEW = 30  # samples within a member below which all that lie there are looked at
-NEAREST = 16  # points around a place that always count
+FEWEST_SAMPLES_AROUND_PLACE = 30  # samples within a member below which all that lie there are looked at
+NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
@@ -44,7 +44,7 @@ def check_is_surface(samples: SurfaceSamples) -> None:
     lines = volumes = looked = 0
     for place in mean[_of_most_points(samples.surface)]:
         near = _within(some, place, samples.surface.length)
-        near = near if len(near) >= FEW else _within(mean, place, samples.surface.length)
+        near = near if len(near) >= FEWEST_SAMPLES_AROUND_PLACE else _within(mean, place, samples.surface.length)
         if len(near) < 5:
             continue
         looked += 1
@@ -78,7 +78,7 @@ def _nearest_points(surface: Surface, place: np.ndarray) -> np.ndarray:
     """Return the points (N, 3) within half a member of a place, or the nearest few where these are more."""
     points = _points_near(surface, place, surface.length)
     away = ((points - place) ** 2).sum(axis=1)
-    return points[away <= max((0.5 * surface.length) ** 2, np.sort(away)[min(NEAREST, len(away)) - 1])]
+    return points[away <= max((0.5 * surface.length) ** 2, np.sort(away)[min(NEAREST_COUNTED, len(away)) - 1])]
 
 
 def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:

@@ -16,12 +16,15 @@ PAPER = np.array([0.984, 0.980, 0.969])
 GROUND = np.array([0.925, 0.918, 0.898])
 INK = np.array([0.098, 0.180, 0.290])  # members
 BOUNDARY_COLOR = np.array([0.047, 0.098, 0.176])  # members on a boundary
-OUTSIDE = (np.array([0.345, 0.525, 0.620]), np.array([0.835, 0.925, 0.930]))  # triangles in the shade, in the light
-INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
+OUTSIDE_SHADES = (
+    np.array([0.345, 0.525, 0.620]),
+    np.array([0.835, 0.925, 0.930]),
+)  # triangles in the shade, in the light
+INSIDE_SHADES = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
 CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
 PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
-MARK = np.array([0.851, 0.290, 0.180])  # fixed nodes
-BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
+FIXED_NODE_COLOUR = np.array([0.851, 0.290, 0.180])  # fixed nodes
+COLOUR_BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +164,7 @@ def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Stroke
     """Return shadow, triangles, members, fixed nodes and, if given, the points of the scan (N, 3)."""
     strokes = [
         shadow_strokes(grid.nodes, grid.triangles, view.camera),
-        _surface_strokes(view, OUTSIDE, INSIDE),
+        _surface_strokes(view, OUTSIDE_SHADES, INSIDE_SHADES),
         _member_strokes(grid, view),
     ]
     if scan is not None:
@@ -212,7 +215,7 @@ def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) ->
     on = (triangle >= 0) & (near < nearest + slack)
     key = np.where(on, np.maximum(view.key[triangle], near), near) + slack
     light = np.where(triangle >= 0, view.light[triangle], 0.5)
-    colour = _hazy(_mix((INK, OUTSIDE[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
+    colour = _hazy(_mix((INK, OUTSIDE_SHADES[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
 
 
@@ -225,7 +228,7 @@ def missed_strokes(
     flat, near = flat[shown], near[shown]
     inside, _, nearest = _in_front(flat, view)
     shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-    shown[:, 3] = np.where(inside & (near < nearest), BEHIND, 1.0)
+    shown[:, 3] = np.where(inside & (near < nearest), COLOUR_BEHIND, 1.0)
     return Strokes(
         near + 1e-6 * view.camera.distance, _dots(flat), np.zeros_like(shown), shown, np.full(len(flat), 3.0)
     )
@@ -282,9 +285,9 @@ def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
     seen = near > nearest - 0.5 * float(np.mean(grid.lengths))
     shape = _dots(flat)
     strokes = []
-    for colour, width in ((PAPER, 15.0), (MARK, 11.0)):
+    for colour, width in ((PAPER, 15.0), (FIXED_NODE_COLOUR, 11.0)):
         shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-        shown[:, 3] = np.where(seen, 1.0, BEHIND)
+        shown[:, 3] = np.where(seen, 1.0, COLOUR_BEHIND)
         front = np.full(len(flat), np.inf)
         strokes.append(Strokes(front, shape, np.zeros_like(shown), shown, np.full(len(flat), width)))
     return strokes

@@ -11,7 +11,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from .grid import Net
 
-BETWEEN = -1  # label of the nodes between the halves
+BETWEEN_HALVES = -1  # label of the nodes between the halves
 
 
 @kernel
@@ -55,4 +55,4 @@ def part(net: Net, nearer: np.ndarray, label: np.ndarray) -> None:
         label[v] = nearer[v]
         for i in range(net.degree[v]):
             if nearer[net.ring[v, i]] != nearer[v]:
-                label[v] = BETWEEN
+                label[v] = BETWEEN_HALVES

@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, nearest, put_into, slot_of
 
-COPIES = 27  # boxes that a place may be put into
+BOXES_OF_A_PLACE = 27  # boxes that a place may be put into
 
 
 @kernel
@@ -36,7 +36,7 @@ def spread_sample(boxes: SearchBoxes, sample: np.ndarray, size: float, marked: n
     """
     for s in range(len(sample)):
         x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]
-        item = COPIES * s
+        item = BOXES_OF_A_PLACE * s
         for i in range(box_index(boxes, 0, x - size), box_index(boxes, 0, x + size) + 1):
             for j in range(box_index(boxes, 1, y - size), box_index(boxes, 1, y + size) + 1):
                 for k in range(box_index(boxes, 2, z - size), box_index(boxes, 2, z + size) + 1):
@@ -68,7 +68,7 @@ def lower_to_nearest(
         if marked[_mark_of(boxes, i, j, k) & mask]:
             item = boxes.first[slot_of(boxes, i, j, k)]
             while item >= 0:
-                s = item // COPIES
+                s = item // BOXES_OF_A_PLACE
                 dx, dy, dz = sample[s, 0] - x, sample[s, 1] - y, sample[s, 2] - z
                 dd = dx * dx + dy * dy + dz * dz
                 if same * same < dd < square[s] and dd <= size * size:

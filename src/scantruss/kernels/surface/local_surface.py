@@ -39,7 +39,7 @@ from ..geometry.vectors import (
     vector_from,
 )
 
-PATCH = 31  # columns of a patch
+PATCH_COLUMNS = 31  # columns of a patch
 CENTRE = 0  # first of three columns: where the patch was fitted [scan unit]
 NORMAL = 3  # first of three columns: oriented unit normal of its plane
 TANGENT = 6  # first of three columns: unit vector u in the plane; v = normal x u

@@ -9,9 +9,9 @@ import numpy as np
 from ...kernels.geometry import kd_tree as kernels
 from ...runtime.parallel import in_parts
 
-NEAREST = 16  # neighbours of each point
+NEIGHBORS_OF_A_POINT = 16  # neighbours of each point
 REACH_TO = 8  # a point's reach is the distance to this one of them
-POINTS_PER_THREAD = 2000  # fewest points that are worth a thread
+SEARCHES_PER_THREAD = 2000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +26,13 @@ class Nearby:
     def of(cls, points: np.ndarray) -> Nearby:
         """Look up the nearest of all points (N, 3)."""
         tree = build_kd_tree(points)
-        neighbors, squares = np.empty((len(points), NEAREST), np.int64), np.empty((len(points), NEAREST))
+        neighbors, squares = (
+            np.empty((len(points), NEIGHBORS_OF_A_POINT), np.int64),
+            np.empty((len(points), NEIGHBORS_OF_A_POINT)),
+        )
         in_parts(
             len(points),
-            POINTS_PER_THREAD,
+            SEARCHES_PER_THREAD,
             lambda _, begin, end: kernels.nearest_others(tree, neighbors, squares, begin, end),
         )
         return cls(tree, neighbors, squares)

@@ -11,9 +11,9 @@ from ...errors import InputError
 from ...selection import Selection, parts_of
 from .copc import Place
 
-WORDS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
+PLURALS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
 POINTS_PER_TEST = 1 << 17  # points tested against a polygon in one go
-NONE = np.empty(0)
+NO_VALUES = np.empty(0)
 
 
 def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection: Selection) -> None:
@@ -21,7 +21,7 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
     if missing := [name for name in selection.needs if name not in attributes]:
         option = {"class": "--class", "confidence": "--confidence"}.get(missing[0], "--returns")
         raise InputError(
-            f"{path} has no {WORDS[missing[0]]}, which {option} needs; LAS files have classes and returns, other files"
+            f"{path} has no {PLURALS[missing[0]]}, which {option} needs; LAS files have classes and returns, other files"
             " where a property or column is named classification, return_number, number_of_returns or confidence"
         )
 
@@ -34,9 +34,9 @@ def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     held = {name: values[real & np.isfinite(values)] for name, values in attributes.items()}
     said = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
-        if len(values := held.get(name, NONE)):
+        if len(values := held.get(name, NO_VALUES)):
             said.append(f" {words} {' '.join(f'{value:g}' for value in np.unique(values)[:20])}")
-    if len(values := held.get("confidence", NONE)):
+    if len(values := held.get("confidence", NO_VALUES)):
         said.append(f" confidence up to {values.max():.4g}")
     corners = (points[real].min(axis=0), points[real].max(axis=0))
     said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))

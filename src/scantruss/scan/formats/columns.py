@@ -20,7 +20,7 @@ _FAMILIES = (_DIRECT, _COUNTED, _MAP, (*_DIRECT[:2], _MAP[2]))
 _NUMBER_OF_POINT = re.compile("id|ids|nr|no|num|number|index|idx|point|pointid|pt|name|label|fid|punkt|punktnummer|")
 
 #: attribute -> names that columns and properties have for it, in lower case, letters and digits only
-NAMES = {
+COLUMN_NAMES = {
     "class": ("classification", "class", "scalarclassification", "classid"),
     "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
     "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
@@ -51,7 +51,7 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
     return {
         attribute: column
         for attribute in wanted
-        if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
+        if (column := next((clean.index(name) for name in COLUMN_NAMES[attribute] if name in clean), -1)) >= 0
     }
 
 

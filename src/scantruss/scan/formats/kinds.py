@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...errors import FormatError
 
-HEAD = 4096  # bytes examined
+BYTES_OF_KIND = 4096  # bytes examined
 
 _SIGNATURES = (
     (b"ply\n", "a PLY file"),
@@ -54,7 +54,7 @@ def read_head(path: Path) -> bytes:
         if not path.exists():
             raise FormatError(f"{path} does not exist; check the name of the scan")
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            head = file.read(BYTES_OF_KIND)
     except (OSError, ValueError) as error:
         raise FormatError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not head:

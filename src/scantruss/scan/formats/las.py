@@ -17,16 +17,16 @@ from ...settings import UNITS
 from ..cloud import measure_spacing
 from .content import Cloud, Content
 from .copc import Place, find_boxes, read_boxes, touching
-from .heights import POINTS_LOOKED_AT, look_like_feet
+from .heights import MOST_HEIGHTS, look_like_feet
 from .kinds import read_head, unreadable, wrong_kind
 from .las_header import check_header
 from .systems import system_of
 
 POINTS_PER_CHUNK = 1_000_000  # points
-FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
+FIELD_OF_ATTRIBUTE = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
 LOST_OF_SPACING = 1e-3  # rounding of a coordinate, as a share of the spacing
-LARGEST_INTEGER = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
-CODES = {"m": 9001, "foot": 9002}  # EPSG
+LARGEST_INT32 = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
+UNIT_CODES = {"m": 9001, "foot": 9002}  # EPSG
 WITHHELD = "marked as withheld"  # the format's term for deleted
 
 Places = Callable[[Content], list[Place]]  # by the units that a file states
@@ -58,7 +58,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:
     """Return the wanted attributes that the format has, each once."""
-    return [name for name in dict.fromkeys(wanted) if name in FIELDS]
+    return [name for name in dict.fromkeys(wanted) if name in FIELD_OF_ATTRIBUTE]
 
 
 def take(record: Any, names: Sequence[str]) -> Content:
@@ -67,7 +67,7 @@ def take(record: Any, names: Sequence[str]) -> Content:
     for axis, name in enumerate("XYZ"):
         np.multiply(record[name], record.scales[axis], out=points[:, axis])
         points[:, axis] += record.offsets[axis]
-    attributes = {name: np.array(record[FIELDS[name]]) for name in names}
+    attributes = {name: np.array(record[FIELD_OF_ATTRIBUTE[name]]) for name in names}
     kept = np.array(record["withheld"]) == 0
     if kept.all():
         return Content(points, attributes)
@@ -87,7 +87,7 @@ def note_on_heights(path: Path) -> str:
 
     try:
         with laspy.open(path) as file:
-            content = take(file.read_points(min(POINTS_LOOKED_AT, int(file.header.point_count))), ["return_count"])
+            content = take(file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"])
             return look_like_feet(content.points, content.attributes["return_count"])
     except KeyboardInterrupt:
         raise
@@ -146,7 +146,7 @@ def write_las(path: Path, cloud: Cloud) -> None:
     scale = las_scale(points)
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle = 0.5 * (lower + upper) if cloud.origin is None else np.asarray(cloud.origin, dtype=np.float64)
-    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST_INTEGER:
+    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST_INT32:
         middle = 0.5 * (lower + upper)
     header.scales, header.offsets = np.full(3, scale), np.round(middle / scale) * scale
     if normals is not None:
@@ -175,7 +175,7 @@ def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarr
 def las_scale(points: np.ndarray) -> float:
     """Return the step of the coordinates: a power of ten below a thousandth of the spacing."""
     extent = float(np.ptp(points, axis=0).max())
-    finest = extent / (1.9 * LARGEST_INTEGER)
+    finest = extent / (1.9 * LARGEST_INT32)
     wanted = LOST_OF_SPACING * measure_spacing(points) or 1e-6 * extent or 1e-3
     scale = float(f"1e{math.floor(math.log10(wanted))}")
     if scale >= finest:
@@ -197,13 +197,13 @@ def _unit_records(unit: str) -> list[Any]:
 
     own = 32767  # "user defined"
     metres = UNITS[unit]
-    if code := CODES.get(unit):
+    if code := UNIT_CODES.get(unit):
         keys = [(1024, 0, 1, 1), (3072, 0, 1, own), (3076, 0, 1, code), (4099, 0, 1, code)]
     else:
         keys = [(1024, 0, 1, 1), (3072, 0, 1, own), (3076, 0, 1, own), (3077, 34736, 1, 0), (4099, 0, 1, own)]
     words = [1, 1, 0, len(keys), *(word for key in keys for word in key)]
     body = struct.pack(f"<{len(words)}H", *words)
     records = [laspy.VLR("LASF_Projection", 34735, "GeoKeyDirectoryTag", body)]
-    if unit not in CODES:
+    if unit not in UNIT_CODES:
         records.append(laspy.VLR("LASF_Projection", 34736, "GeoDoubleParamsTag", struct.pack("<d", metres)))
     return records

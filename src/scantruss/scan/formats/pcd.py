@@ -21,9 +21,9 @@ from .columns import find_attributes
 from .content import Cloud, Content, surplus_note
 from .kinds import kind_of, read_head, unreadable, wrong_kind
 
-LONGEST_HEADER = 1 << 16  # bytes
-MOST_SHRUNK = 100  # LZF makes at most 264 bytes of 3
-TYPES = {("F", s): f"<f{s}" for s in (2, 4, 8)} | {(t, s): f"<{t.lower()}{s}" for t in "IU" for s in (1, 2, 4, 8)}
+LONGEST_PCD_HEADER = 1 << 16  # bytes
+MOST_LZF = 100  # LZF makes at most 264 bytes of 3
+PCD_TYPES = {("F", s): f"<f{s}" for s in (2, 4, 8)} | {(t, s): f"<{t.lower()}{s}" for t in "IU" for s in (1, 2, 4, 8)}
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
 def read_pcd_header(path: Path) -> Header:
     """Return the header of a PCD file; FormatError if it is none."""
     with path.open("rb") as file:
-        raw = file.read(LONGEST_HEADER)
+        raw = file.read(LONGEST_PCD_HEADER)
     end = re.search(rb"(?:^|\n)[ \t]*DATA[ \t]+(\w+)[ \t]*\r?(\n|$)", raw)
     if not end:
         raise FormatError(f"{path} ends before the line DATA of its header; copy it again")
@@ -87,7 +87,7 @@ def read_pcd_header(path: Path) -> Header:
     try:
         sizes = [int(word) for word in words.get("SIZE", ["4"] * len(names))]
         counts = [int(word) for word in words.get("COUNT", ["1"] * len(names))]
-        types = [TYPES[pair] for pair in zip(words.get("TYPE", ["F"] * len(names)), sizes, strict=True)]
+        types = [PCD_TYPES[pair] for pair in zip(words.get("TYPE", ["F"] * len(names)), sizes, strict=True)]
         area = math.prod(int(words[key][0]) for key in ("WIDTH", "HEIGHT") if key in words)
         points = int(words["POINTS"][0]) if "POINTS" in words else area
         place = [float(word) for word in words.get("VIEWPOINT", [])]
@@ -150,7 +150,7 @@ def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.n
     if len(sizes) < 2 or len(packed) < sizes[0]:
         raise _ends_early(path, header, f"{len(packed):,} packed bytes")
     size = header.points * header.row.itemsize
-    if sizes[1] != size or size > MOST_SHRUNK * len(packed):
+    if sizes[1] != size or size > MOST_LZF * len(packed):
         raise FormatError(
             f"{path}: {header.points:,} points do not fit its {int(sizes[1]):,} bytes; the file is damaged"
         )

@@ -23,8 +23,8 @@ from .views import boxes_of, make_view
 AS_GOOD = 0.03  # difference in agreement up to which another place is as good
 AS_CLOSE = 1.25  # largest residual there, over the present one
 AS_MUCH = 0.2  # least share of the places that agree now which must agree there
-LEAST = 0.08  # ... and of all places of the scan
-ELSEWHERE = 1.5  # distance beyond which a place is another one [coarse spacings]
+LEAST_OF_ALL = 0.08  # ... and of all places of the scan
+OTHER_PLACE_DISTANCE = 1.5  # distance beyond which a place is another one [coarse spacings]
 FEWEST_SCANS = 3  # fewest scans that can decide between several ways
 PUSH = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]
 
@@ -84,10 +84,10 @@ def _fits_elsewhere(scans: list[Scan], group: Group, i: int) -> bool:
     def is_rival(pair: Pair) -> bool:
         fit = pair.fit
         return (
-            apart(pair.pose, pose, scan.coarse) > ELSEWHERE * scan.coarse.spacing
+            apart(pair.pose, pose, scan.coarse) > OTHER_PLACE_DISTANCE * scan.coarse.spacing
             and fit.agreement > now.agreement - AS_GOOD
             and fit.residual < AS_CLOSE * now.residual
-            and fit.agreeing > max(AS_MUCH * now.agreeing, 2.0 * LEAST * len(scan.middle.points))
+            and fit.agreeing > max(AS_MUCH * now.agreeing, 2.0 * LEAST_OF_ALL * len(scan.middle.points))
         )
 
     for pushed in _pushed(scan, pose):

@@ -15,10 +15,10 @@ from ...kernels.scan import features as kernels
 from ...runtime.parallel import in_parts
 from .views import View
 
-BINS = 11
+ANGLE_BINS = 11
 FEATURE_REACH = 6.0  # radius of a feature, in spacings of the view
 FEATURE_STEPS = 1000.0  # steps to which a feature is rounded
-SAMPLES = 200_000  # values of each scan from which the bins are found
+VALUES_FOR_BINS = 200_000  # values of each scan from which the bins are found
 
 
 def find_features(views: Sequence[View]) -> list[np.ndarray]:
@@ -29,7 +29,7 @@ def find_features(views: Sequence[View]) -> list[np.ndarray]:
 
 def flip(features: np.ndarray) -> np.ndarray:
     """Return what the features would be if the normals faced the other side: two of the three angles change sign."""
-    parts = features.reshape(len(features), 2, 3, BINS).copy()
+    parts = features.reshape(len(features), 2, 3, ANGLE_BINS).copy()
     parts[:, :, 1:] = parts[:, :, 1:, ::-1]
     return parts.reshape(features.shape)
 
@@ -38,13 +38,15 @@ def _edges(views: Sequence[View]) -> np.ndarray:
     """Return the bounds between bins (3, BINS - 1): quantiles of the values of all views, the same for both sides."""
     values = []
     for view in views:
-        sample = np.empty((SAMPLES, 3))
-        every = max(len(view.points) * 15 // SAMPLES, 1)
+        sample = np.empty((VALUES_FOR_BINS, 3))
+        every = max(len(view.points) * 15 // VALUES_FOR_BINS, 1)
         reach = FEATURE_REACH * view.spacing
         count = kernels.sample_values(view.points, view.normals, view.boxes, reach, every, sample)
         values.append(sample[:count])
     sizes = np.sort(np.abs(np.concatenate(values)), axis=0)  # mirrored, they serve both sides
-    halves = [sizes[int(len(sizes) * (2 * part + 1) / BINS)] for part in range(BINS // 2)] if len(sizes) else []
+    halves = (
+        [sizes[int(len(sizes) * (2 * part + 1) / ANGLE_BINS)] for part in range(ANGLE_BINS // 2)] if len(sizes) else []
+    )
     upper = np.array(halves).reshape(-1, 3)
     return np.ascontiguousarray(np.concatenate([-upper[::-1], upper]).T)
 
@@ -52,7 +54,7 @@ def _edges(views: Sequence[View]) -> np.ndarray:
 def _histograms(view: View, edges: np.ndarray) -> np.ndarray:
     """Return the features of one view."""
     reach, count = FEATURE_REACH * view.spacing, len(view.points)
-    plain = np.zeros((count, 6 * BINS))
+    plain = np.zeros((count, 6 * ANGLE_BINS))
     mixed = np.zeros_like(plain)
     in_parts(
         count,

@@ -18,7 +18,7 @@ from .poses import invert, move, small_motion
 from .scans import Scan
 from .views import View
 
-SURE = 0.88  # agreement of two groups at which they belong together
+SURE_AGREEMENT = 0.88  # agreement of two groups at which they belong together
 AGREEING_SHARE = 0.08  # share of the smaller group's places that must agree
 CONTRADICTION = 0.6  # agreement of two overlapping scans below which they contradict a pair of groups
 CONTRADICTED = 0.08  # least share of the places of the smaller one for that to count
@@ -157,7 +157,7 @@ def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, l
     smaller = min(
         sum(len(scans[i].middle.points) for i in group.members) / len(group.members) for group in (one, other)
     )
-    if agreeing <= 2.0 * AGREEING_SHARE * smaller or all_of_them.agreement < (0.6 if loose else SURE):
+    if agreeing <= 2.0 * AGREEING_SHARE * smaller or all_of_them.agreement < (0.6 if loose else SURE_AGREEMENT):
         return None
     return all_of_them
 

@@ -19,10 +19,10 @@ from .views import View
 ALIKE_PLACES = 3  # most similar places of the other scan for each place
 MOST_PAIRS = 800  # most pairs of similar places
 DISTANCE_TOLERANCE = 1.2  # largest difference of distances of two agreeing pairs, in spacings
-ANGLE = 0.30  # the same for the cosines of the normals
+COSINE_TOLERANCE = 0.30  # the same for the cosines of the normals
 PAIR_DISTANCE = 3.0  # least distance between the places of two agreeing pairs, in spacings
-SEEDS = 60  # groups that become candidates
-GROUP = 24  # pairs in a group
+GROUPS_KEPT = 60  # groups that become candidates
+PAIRS_IN_GROUP = 24  # pairs in a group
 FEWEST_PAIRS = 5  # fewest pairs of a group that count
 
 
@@ -88,11 +88,11 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
     found: list[Candidate] = []
     free = np.ones(len(pairs), bool)
     for seed in np.argsort(-weight, kind="stable"):
-        if len(found) >= SEEDS or weight[seed] <= 0.0:
+        if len(found) >= GROUPS_KEPT or weight[seed] <= 0.0:
             break
         if not free[seed]:
             continue
-        group = np.argsort(-shared[seed], kind="stable")[:GROUP]
+        group = np.argsort(-shared[seed], kind="stable")[:PAIRS_IN_GROUP]
         group = np.append(group[shared[seed, group] > 0.0], seed)
         if len(group) < FEWEST_PAIRS:
             continue
@@ -118,7 +118,7 @@ def _agree(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: 
     length = one[0]
     agree = (np.abs(length - two[0]) < DISTANCE_TOLERANCE * spacing) & (length > PAIR_DISTANCE * spacing)
     for a, b in zip(one[1:], two[1:], strict=True):
-        agree &= np.abs(a - b) < ANGLE
+        agree &= np.abs(a - b) < COSINE_TOLERANCE
     agree &= agree.T
     return agree.astype(np.float32)
 

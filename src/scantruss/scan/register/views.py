@@ -17,7 +17,7 @@ from ..normals import face_one_side, mean_normals
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
 FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out, as it lies on no surface
 BOUNDARY_OFFSET = 0.32  # offset of the mean of its neighbours from a place at the boundary, as a share of their reach
-PIECE = 0.02  # least share of the places of a piece whose normals count for the side that it faces
+LEAST_PIECE_SHARE = 0.02  # least share of the places of a piece whose normals count for the side that it faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
     counts = np.bincount(piece)
     sums = np.stack([np.bincount(piece, normals[:, c]) for c in range(3)], axis=1)
     sign = np.ones(len(counts))
-    votes = np.flatnonzero(counts >= PIECE * len(places))
+    votes = np.flatnonzero(counts >= LEAST_PIECE_SHARE * len(places))
     view = sums[np.argmax(counts)] if len(counts) else np.zeros(3)
     for _ in range(5):
         sign = np.where(sums @ view < 0.0, -1.0, 1.0)

@@ -15,18 +15,18 @@ from ..formats.columns import find_attributes
 from ..formats.content import Content
 from ..formats.copc import Place
 from ..formats.kinds import unreadable
-from ..formats.las import check_count, fields_for, fields_of, records_near, take
+from ..formats.las import POINTS_PER_CHUNK, check_count, fields_for, fields_of, records_near, take
 from ..formats.reading import places_in_file, read_content, select
-from ..formats.text import EMPTY, NAME_IT, is_number_of_point, read_lines
+from ..formats.text import EMPTY_LINES, NAME_IT, is_number_of_point, read_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from .source import Source, Tile
 
-POINTS_PER_CHUNK = 1_000_000  # points
+
 POINTS_DESCRIBED = 10_000  # points that are described if none is taken
-TEXT_BYTES_PER_BLOCK = 1 << 24  # bytes of text
+CHUNK_BYTES = 1 << 24  # bytes of text
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             file.seek(tile.begin - 1)
             file.readline()  # the rest of a line that belongs to the previous tile
         while (at := file.tell()) < tile.end:
-            block = file.read(min(TEXT_BYTES_PER_BLOCK, tile.end - at))
+            block = file.read(min(CHUNK_BYTES, tile.end - at))
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
@@ -205,5 +205,5 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
                         )
                     rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
-                left_out = {EMPTY: empty} if empty else {}
+                left_out = {EMPTY_LINES: empty} if empty else {}
                 yield source.said_of(Content(rows[:, :3], more, left_out=left_out))

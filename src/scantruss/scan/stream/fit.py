@@ -11,7 +11,7 @@ import numpy as np
 
 from ...runtime.memory import available_memory
 from ...runtime.progress import Progress
-from ..checks import BULK, degrees_note, usual_extent
+from ..checks import POINTS_OF_BULK, degrees_note, usual_extent
 from ..cloud import LARGEST_COORDINATE, PointCloud
 from ..formats.kinds import read_head
 from ..formats.paths import Source as Names
@@ -27,11 +27,11 @@ from .tiles import find_source, tiles_of
 if TYPE_CHECKING:
     from ...settings import Settings
 
-FINENESS = 20.0  # boxes along a member if a scan is thinned to fit into memory
-BYTES = 100.0  # memory per point on the way to a grid; 55 to 90 were measured [bytes]
+BOXES_PER_MEMBER = 20.0  # boxes along a member if a scan is thinned to fit into memory
+BYTES_PER_POINT = 100.0  # memory per point on the way to a grid; 55 to 90 were measured [bytes]
 PACKED_POINT = 8  # bytes of a point in a packed text, about
 NEVER_TOO_MANY_POINTS = 100_000  # points that are never too many
-LOOK = 1000.0  # boxes along the diagonal of a scan for a first look
+BOXES_OF_FIRST_LOOK = 1000.0  # boxes along the diagonal of a scan for a first look
 MEMORY_SHARE = 0.5  # share of the available memory that a scan may take
 
 
@@ -55,10 +55,10 @@ def spacing_to_fit(names: Names, settings: Settings, memory: float | None = None
     if points <= NEVER_TOO_MANY_POINTS:
         return 0.0
     memory = MEMORY_SHARE * available_memory() if memory is None else memory
-    if points * BYTES > memory and settings.selection.crop:
+    if points * BYTES_PER_POINT > memory and settings.selection.crop:
         sources, reading, _ = open_scan(names, settings.unit, settings.selection)
         points -= sum(count_unread(source, reading) for source in sources)
-    return settings.length / FINENESS if points * BYTES > memory else 0.0
+    return settings.length / BOXES_PER_MEMBER if points * BYTES_PER_POINT > memory else 0.0
 
 
 def spacing_to_look(names: Names, settings: Settings, progress: Progress | None = None) -> float:
@@ -70,11 +70,11 @@ def spacing_to_look(names: Names, settings: Settings, progress: Progress | None 
     some = _sample(sources, reading, Share(progress, "look", sources))
     if not len(some):
         return 1.0  # thinning will report the reason
-    return float(np.linalg.norm(np.ptp(usual_extent(some), axis=0))) / LOOK or 1.0
+    return float(np.linalg.norm(np.ptp(usual_extent(some), axis=0))) / BOXES_OF_FIRST_LOOK or 1.0
 
 
 def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.ndarray:
-    """Return points from all parts of a scan, (K, 3): all of a small one, up to twice `BULK` of a large one.
+    """Return points from all parts of a scan, (K, 3): all of a small one, up to twice `POINTS_OF_BULK` of a large one.
 
     They are random, with a fixed seed, because every n-th point may be of one column of the scanner.
     """
@@ -84,7 +84,7 @@ def _sample(sources: Sequence[Source], reading: Reading, report: Share) -> np.nd
             report(chunk.read)
             new = chunk.points if share == 1.0 else chunk.points[rng.random(len(chunk.points)) < share]
             some = np.concatenate([some, new[(np.abs(new) <= LARGEST_COORDINATE).all(axis=1)]])
-            while len(some) > 2 * BULK:
+            while len(some) > 2 * POINTS_OF_BULK:
                 some, share = some[rng.random(len(some)) < 0.5], 0.5 * share
     return some
 

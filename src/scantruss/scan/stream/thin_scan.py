@@ -21,12 +21,12 @@ from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
 from .source import Source, Tile
 from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
-from .tiles import TILE, tiles_of
+from .tiles import POINTS_PER_TILE, tiles_of
 
-KEEP = ("mean", "nearest")
-SMALLEST = 500_000  # fewest points of a tile that are worth a worker
-FEWEST = 24  # fewest points of a surface
-TILES = 4  # for each worker at least, so that all end at about the same time
+KEEP_CHOICES = ("mean", "nearest")
+FEWEST_POINTS_OF_TILE = 500_000  # fewest points of a tile that are worth a worker
+FEWEST_POINTS_OF_SURFACE = 24  # fewest points of a surface
+TILES_PER_WORKER = 4  # for each worker at least, so that all end at about the same time
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def check_enough(thinned: Thinned, spacing: float, option: str) -> None:
         Fewer points are left than a surface needs, of more that were read.
     """
     left, read = len(thinned.points), thinned.read - thinned.dropped
-    if left < FEWEST <= read:
+    if left < FEWEST_POINTS_OF_SURFACE <= read:
         raise InputError(
             f"{option} {spacing:g} leaves {left} of {read:,} points, too few for a surface; give a smaller spacing, in the unit of the scan"
         )
@@ -111,8 +111,8 @@ def thin_open_scan(
 ) -> Thinned:
     """Return one point for each box of a scan whose headers are read; see `thin_scan`."""
     check_spacing(spacing)
-    if keep not in KEEP:
-        raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
+    if keep not in KEEP_CHOICES:
+        raise InputError(f"keep must be one of {' '.join(KEEP_CHOICES)}, got {keep!r}")
     workers = workers or Workers()
     sources, reading, notes = scan
     rows, summary = _all_rows(sources, reading, spacing, boundary, workers, Share(progress, "read", sources))
@@ -222,7 +222,7 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     """Return tiles for several workers, which may run on other machines."""
     there = [replace(source, path=source.path.absolute()) for source in sources]
     total = sum(source.points for source in sources)
-    return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
+    return _Tiles(there, min(max(total // (TILES_PER_WORKER * workers.count), FEWEST_POINTS_OF_TILE), POINTS_PER_TILE))
 
 
 def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, ReadSummary]:
