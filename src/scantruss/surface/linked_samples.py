@@ -15,6 +15,7 @@ from ..scan.normals import NORMALS_PER_THREAD
 from .streamline import is_dense, streamlined
 
 LINKS_OF_A_SAMPLE = 12  # most links of a sample
+LINK_BOX = 4.0  # size d_B of the search boxes of the samples (Eq. 1), in which they are linked [sample radii]
 BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
 POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
 SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
@@ -133,7 +134,7 @@ def samples_of_points(points: np.ndarray, radius: float) -> tuple[np.ndarray, np
         places = np.concatenate([places[:count], np.empty((3 * capacity, 3))])
         capacity = len(chosen)
     places, chosen = places[:count].copy(), chosen[:count].copy()
-    boxes = new_boxes(lower, upper, 4.0 * radius, count, count)
+    boxes = new_boxes(lower, upper, LINK_BOX * radius, count, count)
     kernels.put_all(boxes, places, np.arange(count))
     return owner, chosen, places, boxes
 

@@ -21,6 +21,7 @@ from ..scan.normals import STEEP_SINE, cut_steep_links, face_one_side, face_outs
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .linked_samples import (
+    LINK_BOX,
     LINKED_POINTS_PER_THREAD,
     MANY_ROUGH,
     PATCH_SPACING,
@@ -161,7 +162,7 @@ _SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSa
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
-    """Return the samples of a cloud for a member length; kept as long as the cloud lives.
+    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); kept as long as the cloud lives.
 
     Parameters
     ----------
@@ -327,9 +328,17 @@ def _prepare(
     )
 
 
+def radius_of_samples(asked: _Asked, spacing: float) -> float:
+    """Return the least distance between samples; their search boxes are `LINK_BOX` times as wide.
+
+    So they are never narrower than the spacing of the points, the lower bound of Eq. 1; holes need no upper one (docs/choices.md).
+    """
+    return max((asked.box_size or SAMPLE_SPACING) * asked.length, spacing / LINK_BOX)
+
+
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
     """Return which points (N, 3) belong to rods, (N,) bool."""
-    radius = max((asked.box_size or SAMPLE_SPACING) * asked.length, 0.25 * spacing)
+    radius = radius_of_samples(asked, spacing)
     found = link_samples(points, radius, asked.length, spacing)
     supports = support_samples(found, asked.length) if asked.z_is_up else None
     return rod_points(found, len(points), asked.length, supports)
@@ -350,7 +359,7 @@ def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _
 def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
     """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets."""
     length, judged = asked.length, None
-    radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
+    radius = radius_of_samples(asked, spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):

@@ -75,25 +75,25 @@ def try_node(front: Front, s: int, p: int, rules: Rules, found: np.ndarray, near
 
 @kernel
 def close_triangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 1: the neighbours meet."""
+    """Table 1, case 1: the neighbours meet."""
     return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
 def close_left(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 6: a triangle with the previous neighbour."""
+    """Table 1, case 6: a triangle with the previous neighbour."""
     return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
 def close_right(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 5: a triangle with the next neighbour."""
+    """Table 1, case 5: a triangle with the next neighbour."""
     return try_node(front, s, front.head[front.next[s]], rules, found, near)
 
 
 @kernel
 def close_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 2: the better diagonal of a quadrangle; its other triangle is then case 1."""
+    """Table 1, case 2: the better diagonal of a quadrangle; its other triangle is then case 1."""
     a, b = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
     c = row(front.nodes, front.tail[front.previous[s]])
     d = row(front.nodes, front.head[front.next[s]])
@@ -141,7 +141,7 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 
 @kernel
 def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
+    """Table 1, case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
     Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
     """
@@ -351,7 +351,7 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
 def new_node(
     surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.ndarray
 ) -> bool:
-    """Case 4: the three steps of Sec. 3.4."""
+    """Table 1, case 4: the three steps of Sec. 3.4."""
     if not optimal_point(surface, front, s, rules, patch):
         return False
     p = front.count[NODES]
