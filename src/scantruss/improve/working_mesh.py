@@ -35,7 +35,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     """Open a grid: return it as rings of neighbours.
 
     A node whose triangles form several fans becomes several nodes of the net; these and the nodes of seams (edges inside the grid
-    without two triangles of one orientation) are LOCKED. Boundary nodes, fixed nodes and those of lines are at REST.
+    without two triangles of one orientation) are LOCKED. Boundary nodes, fixed nodes and those of lines are AT_REST.
 
     Returns
     -------
@@ -120,7 +120,7 @@ class WorkingMesh:
     net: Net
     source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 for a new one
     surface: Surface
-    patches: np.ndarray  #: (C, PATCH) local surface of each node
+    patches: np.ndarray  #: (C, PATCH_COLUMNS) local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at fixed positions
     curves: Curves
     length: float  #: desired member length where the length field is 1 [scan unit]

@@ -42,7 +42,7 @@ class Linked(NamedTuple):
     start: np.ndarray  #: (S + 1,) int64 where each sample's points start
     boxes: SearchBoxes
     mean: np.ndarray  #: (S, 3)
-    neighbors: np.ndarray  #: (S, NEIGHBORS) int64
+    neighbors: np.ndarray  #: (S, LINKS_OF_A_SAMPLE) int64
     normals: np.ndarray  #: (S, 3)
     thickness: np.ndarray  #: (S,)
 

@@ -151,9 +151,9 @@ def sample_disc(surface: Surface, sample: int, direction: float, radius: float) 
 
 @kernel
 def _nearest_clear(cover: np.ndarray) -> int:
-    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS if there is none.
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; SWEEP_BINS if there is none.
 
-    cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
+    cover : (SWEEP_BINS + 1,) changes of the number of arcs at each direction; becomes their number.
     """
     for b in range(1, SWEEP_BINS):
         cover[b] += cover[b - 1]

@@ -26,7 +26,7 @@ class Net(NamedTuple):
     ring: np.ndarray  #: (C, W) int64 neighbours, anticlockwise
     degree: np.ndarray  #: (C,) int64 number of neighbours; 0 for a free node
     is_open: np.ndarray  #: (C,) int64, 1 on the boundary, 0 inside
-    kind: np.ndarray  #: (C,) int64 INTERIOR, ON_CURVE, REST or LOCKED
+    kind: np.ndarray  #: (C,) int64 INTERIOR, ON_CURVE, AT_REST or LOCKED
     curve: np.ndarray  #: (C,) int64 curve of the boundary or of a line on which the node slides, -1 for none
     ideal: np.ndarray  #: (C,) int64 ideal number of neighbours: 6 inside, on the boundary by its angle
     line: np.ndarray  #: (C,) int64, bit i is set if the member to neighbour i of the ring is part of a line

@@ -31,8 +31,8 @@ def _mark_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
 def spread_sample(boxes: SearchBoxes, sample: np.ndarray, size: float, marked: np.ndarray) -> None:
     """Put each place (K, 3) into all boxes within `size` of it, and mark these.
 
-    boxes : no smaller than `size`, so that a place reaches at most three along an axis, with room for COPIES * K items; item i
-    stands for place i // COPIES. marked : (2^m,) bool, several boxes may share a mark.
+    boxes : no smaller than `size`, so that a place reaches at most three along an axis, with room for BOXES_OF_A_PLACE * K items; item i
+    stands for place i // BOXES_OF_A_PLACE. marked : (2^m,) bool, several boxes may share a mark.
     """
     for s in range(len(sample)):
         x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]

@@ -35,7 +35,7 @@ def choose_first(
     points : (N, 3)
     boxes : SearchBoxes, of which only bounds, sizes and counts are used
     blocks : SearchBoxes of the blocks of boxes, each with its row of `taken` as its first item
-    taken : (B, BYTES) uint8, zero at the start: a bit for each box of a block
+    taken : (B, BLOCK_BYTES) uint8, zero at the start: a bit for each box of a block
     chosen : (capacity,) int64, filled with the points
     begin, end : where to go on and to stop in `among`
     count : (2,) int64 the points and the blocks so far

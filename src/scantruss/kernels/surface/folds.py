@@ -73,7 +73,7 @@ def fit_fold(surface: Surface, patch: np.ndarray, members: float, strength: floa
 def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
     """Place on the crest of a fold or in its corner near a place on the rounded surface; the same place where there is no fold.
 
-    The least of the quadric with CLING times the squared distance moved; the way is at most FARTHEST.
+    The least of the quadric with CLING times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
     """
     local = surface.length * surface.field[int(patch[15])]
     x, y, z = subtract(place, (patch[0], patch[1], patch[2]))
@@ -99,7 +99,7 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
 
 @kernel
 def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> float:
-    """Energy of a place off the planes around node v, at most MOST; nothing where the surface is smooth."""
+    """Energy of a place off the planes around node v, at most FAR_ENERGY; nothing where the surface is smooth."""
     if patches[v, FOLD_WEIGHT] == 0.0:
         return 0.0
     k = STRENGTH * patches[v, FOLD_WEIGHT] / patches[v, DESIRED_LENGTH] ** 2

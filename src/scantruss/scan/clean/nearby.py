@@ -19,8 +19,8 @@ class Nearby:
     """Points in a k-d tree, and a table of the nearest of each; all rows in the order of the tree."""
 
     tree: kernels.KDTree
-    neighbors: np.ndarray  #: (N, NEAREST) int64, nearest first, -1 where there are fewer
-    squares: np.ndarray  #: (N, NEAREST) squared distances, inf if there are fewer [scan unit^2]
+    neighbors: np.ndarray  #: (N, NEIGHBORS_OF_A_POINT) int64, nearest first, -1 where there are fewer
+    squares: np.ndarray  #: (N, NEIGHBORS_OF_A_POINT) squared distances, inf if there are fewer [scan unit^2]
 
     @classmethod
     def of(cls, points: np.ndarray) -> Nearby:

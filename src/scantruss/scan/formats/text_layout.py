@@ -39,7 +39,7 @@ class Layout:
     """Where the coordinates of a text file are."""
 
     encoding: str
-    separator: str | None  #: one character, None for blanks, or ANY
+    separator: str | None  #: one character, None for blanks, or ANY_SEPARATOR
     comma: bool  #: a comma may be the decimal sign
     skip: int  #: lines before the first point
     columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number

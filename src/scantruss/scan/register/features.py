@@ -22,7 +22,7 @@ VALUES_FOR_BINS = 200_000  # values of each scan from which the bins are found
 
 
 def find_features(views: Sequence[View]) -> list[np.ndarray]:
-    """Return the features (S, 2 * 3 * BINS) of each view, whole numbers as float32, comparable among these views."""
+    """Return the features (S, 2 * 3 * ANGLE_BINS) of each view, whole numbers as float32, comparable among these views."""
     edges = _edges(views)
     return [_histograms(view, edges) for view in views]
 
@@ -35,7 +35,7 @@ def flip(features: np.ndarray) -> np.ndarray:
 
 
 def _edges(views: Sequence[View]) -> np.ndarray:
-    """Return the bounds between bins (3, BINS - 1): quantiles of the values of all views, the same for both sides."""
+    """Return the bounds between bins (3, ANGLE_BINS - 1): quantiles of the values of all views, the same for both sides."""
     values = []
     for view in views:
         sample = np.empty((VALUES_FOR_BINS, 3))
@@ -68,5 +68,5 @@ def _histograms(view: View, edges: np.ndarray) -> np.ndarray:
         300,
         lambda _, begin, end: kernels.mix_histograms(view.points, view.boxes, reach, plain, mixed, begin, end),
     )
-    # roots weigh rare values as much as frequent ones; whole numbers up to FINE can be multiplied and added exactly in float32
+    # roots weigh rare values as much as frequent ones; whole numbers up to FEATURE_STEPS can be multiplied and added exactly in float32
     return np.round(FEATURE_STEPS * np.sqrt(mixed)).astype(np.float32)

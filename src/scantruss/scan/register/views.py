@@ -96,7 +96,7 @@ def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
 
 
 def link(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Return the nearest neighbours (N, AROUND) of each point within a few spacings, -1 where there are fewer."""
+    """Return the nearest neighbours (N, NEIGHBORS_FOR_NORMAL) of each point within a few spacings, -1 where there are fewer."""
     neighbors = np.full((len(points), NEIGHBORS_FOR_NORMAL), -1, np.int64)
     boxes = boxes_of(points, 2.2 * spacing)
     in_parts(
