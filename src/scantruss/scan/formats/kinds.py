@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from ...errors import FormatError
+from ...errors import FormatError, ScanTrussError
 
 BYTES_OF_KIND = 4096  # bytes examined
 
@@ -88,11 +90,15 @@ def wrong_kind(path: Path, head: bytes, wanted: str) -> FormatError:
     return FormatError(f"{path} is not {wanted} but {kind}; give it the suffix of what it is, or export the scan again")
 
 
-def unreadable(path: Path, kind: str, error: BaseException) -> FormatError:
-    """Return the error for a file that a library cannot read; errors not caused by the file are raised unchanged."""
-    if isinstance(error, MemoryError | OSError) or not (
-        isinstance(error, Exception) or type(error).__name__ == "PanicException"  # Rust's, not an Exception
-    ):
-        raise error
-    said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
-    return FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again")
+@contextmanager
+def reading_as(path: Path, kind: str) -> Iterator[None]:
+    """Say in one line that a library cannot read a file; our own errors, and those not caused by the file, pass unchanged."""
+    try:
+        yield
+    except (ScanTrussError, MemoryError, OSError):
+        raise
+    except BaseException as error:
+        if not (isinstance(error, Exception) or type(error).__name__ == "PanicException"):  # Rust's, not an Exception
+            raise
+        said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
+        raise FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again") from None

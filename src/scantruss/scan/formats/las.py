@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FormatError, InputError, ScanTrussError
+from ...errors import FormatError, InputError
 from ...settings import UNITS
 from ..cloud import measure_spacing
 from .content import Cloud, Content
 from .copc import Place, find_boxes, read_boxes, touching
 from .heights import MOST_HEIGHTS, look_like_feet
-from .kinds import read_head, unreadable, wrong_kind
+from .kinds import read_head, reading_as, wrong_kind
 from .las_header import check_header
 from .systems import system_of
 
@@ -38,13 +38,9 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
     names = fields_of((*wanted, "return_count"))
-    try:
+    with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
         promised, said, chunks = _read(path, names, places_of)
-    except (KeyboardInterrupt, ScanTrussError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
     withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
     unread = sum(said.unread.values())
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
@@ -85,14 +81,9 @@ def note_on_heights(path: Path) -> str:
     """Return a note if the heights of a LAS or LAZ file look like feet, by its first points; "" if it states their unit."""
     import laspy
 
-    try:
-        with laspy.open(path) as file:
-            content = take(file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"])
-            return look_like_feet(content.points, content.attributes["return_count"])
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
+    with reading_as(path, "LAS or LAZ"), laspy.open(path) as file:
+        content = take(file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"])
+        return look_like_feet(content.points, content.attributes["return_count"])
 
 
 def fields_for(names: Sequence[str]) -> Any:

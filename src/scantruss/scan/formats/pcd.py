@@ -19,7 +19,7 @@ from ...runtime.ours import CLOUD_MARK
 from ..units import PATTERN, metres_of
 from .columns import find_attributes
 from .content import Cloud, Content, surplus_note
-from .kinds import kind_of, read_head, unreadable, wrong_kind
+from .kinds import kind_of, read_head, reading_as, wrong_kind
 
 LONGEST_PCD_HEADER = 1 << 16  # bytes
 MOST_LZF = 100  # LZF makes at most 264 bytes of 3
@@ -113,14 +113,11 @@ def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarra
     place = np.concatenate([[0], np.cumsum(header.counts)])
     if header.points > path.stat().st_size:
         raise _ends_early(path, header, f"{path.stat().st_size:,} bytes")
-    try:
-        with path.open("rb") as file:
-            file.seek(header.start)
-            lines = (line for line in file if not line.isspace())
-            usecols = [int(place[column]) for column in columns]
-            table = np.loadtxt(lines, usecols=usecols, ndmin=2, comments=None)
-    except ValueError as error:
-        raise unreadable(path, "PCD", error) from None
+    with reading_as(path, "PCD"), path.open("rb") as file:
+        file.seek(header.start)
+        lines = (line for line in file if not line.isspace())
+        usecols = [int(place[column]) for column in columns]
+        table = np.loadtxt(lines, usecols=usecols, ndmin=2, comments=None)
     if len(table) < header.points:
         raise _ends_early(path, header, f"{len(table):,}")
     return table
@@ -156,10 +153,8 @@ def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.n
         )
     from lzf import decompress
 
-    try:
+    with reading_as(path, "PCD"):
         raw = decompress(packed, size)
-    except ValueError as error:
-        raise unreadable(path, "PCD", error) from None
     if raw is None or len(raw) != size:
         raise FormatError(f"{path} cannot be unpacked; copy it again")
     table = np.empty((header.points, len(columns)))

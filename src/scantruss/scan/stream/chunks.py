@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...errors import FormatError, ScanTrussError
+from ...errors import FormatError
 from ...selection import Selection
 from ..formats.columns import find_attributes
 from ..formats.content import Content
 from ..formats.copc import Place
-from ..formats.kinds import unreadable
+from ..formats.kinds import reading_as
 from ..formats.las import POINTS_PER_CHUNK, check_count, fields_for, fields_of, records_near, take
 from ..formats.reading import places_in_file, read_content, select
 from ..formats.text import EMPTY_LINES, NAME_IT, is_number_of_point, read_lines
@@ -110,23 +110,21 @@ def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Conte
     names = fields_of(reading.selection.needs)
     backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
     begin, short = tile.begin, False
-    try:
-        with laspy.open(path, laz_backend=backend, decompression_selection=fields_for(names)) as file:
-            if near := records_near(path, file.header, _places_of(tile.source, reading), names, size):
-                yield from _near(tile.source, names, *near)
-                return
-            if begin:
-                file.seek(begin)
-            while begin < tile.end and not short:
-                expected = min(size, tile.end - begin)
-                record: Any = file.read_points(expected)
-                short = len(record) < expected
-                begin += len(record)
-                yield tile.source.said_of(take(record, names))
-    except (GeneratorExit, KeyboardInterrupt, ScanTrussError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
+    with (
+        reading_as(path, "LAS or LAZ"),
+        laspy.open(path, laz_backend=backend, decompression_selection=fields_for(names)) as file,
+    ):
+        if near := records_near(path, file.header, _places_of(tile.source, reading), names, size):
+            yield from _near(tile.source, names, *near)
+            return
+        if begin:
+            file.seek(begin)
+        while begin < tile.end and not short:
+            expected = min(size, tile.end - begin)
+            record: Any = file.read_points(expected)
+            short = len(record) < expected
+            begin += len(record)
+            yield tile.source.said_of(take(record, names))
     if short:
         check_count(path, tile.source.points, begin)
 

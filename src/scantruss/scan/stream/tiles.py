@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import FormatError
 from ..formats.columns import COLUMN_NAMES, find_attributes
-from ..formats.kinds import kind_of, read_head, unreadable, wrong_kind
+from ..formats.kinds import kind_of, read_head, reading_as, wrong_kind
 from ..formats.las_header import LASZIP, check_header
 from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
 from ..formats.packed import unpacked
@@ -105,7 +105,7 @@ def _las(path: Path, head: bytes) -> Source:
         raise wrong_kind(path, head, "a LAS or LAZ file")
     import laspy
 
-    try:
+    with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
         with laspy.open(path) as file:
             header = file.header
@@ -121,10 +121,6 @@ def _las(path: Path, head: bytes) -> Source:
                 in_one=_has_uneven_chunks(header),
                 notes=notes,
             )
-    except (KeyboardInterrupt, FormatError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
 
 
 def _has_uneven_chunks(header: Any) -> bool:
