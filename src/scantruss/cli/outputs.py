@@ -53,14 +53,11 @@ def outs_of(values: Namespace) -> list[Path]:
     """
     from .options import UsageError
 
-    outs = [Path(out) for out in (*_as_list(getattr(values, "outs", [])), *values.more_outs)]
+    given = getattr(values, "outs", None) or []
+    outs = [Path(out) for out in (*([given] if isinstance(given, str) else given), *values.more_outs)]
     if not outs:
         raise UsageError("missing OUT, the file of the result; write it last or as -o OUT")
     return outs
-
-
-def _as_list(given: str | list[str] | None) -> list[str]:
-    return given if isinstance(given, list) else [given] if given else []
 
 
 def cloud_output(path: str | Path) -> Path:

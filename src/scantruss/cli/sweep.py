@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +76,8 @@ def sweep(values: Namespace) -> None:
         fitting = thin_to_fit(values.scan, shortest, values.memory)
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
-            trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
+            thin = {"thin_spacing": fitting.thin_spacing}
+            trials = [replace(trial, settings=trial.settings.replace(**thin)) for trial in trials]
         said = note_compiling(bars)
         with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
@@ -112,12 +114,6 @@ def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
         raise FormatError(
             f"{folder} holds grids of another sweep, {others[0]}{more}; name another folder, or remove these first"
         )
-
-
-def _thinned(trial: Trial, spacing: float) -> Trial:
-    from dataclasses import replace
-
-    return replace(trial, settings=trial.settings.replace(thin_spacing=spacing))
 
 
 def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:

@@ -93,7 +93,8 @@ def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
     if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
     apart, looked = [], 0
-    for sample in _spread_evenly(len(surface.mean)):
+    # samples with near numbers lie near each other, so these are from all over the scan
+    for sample in np.unique(np.linspace(0, len(surface.mean) - 1, PLACES_LOOKED_AT).astype(np.int64)):
         points = _points_near(surface, surface.mean[sample], LAYER_REACH * surface.length) - surface.mean[sample]
         if len(points) < 20:
             continue
@@ -122,8 +123,3 @@ def _of_most_points(surface: Surface) -> np.ndarray:
     """Return the numbers of the samples of some points from everywhere: outliers have few points, though many samples."""
     points = np.linspace(0, surface.start[-1] - 1, PLACES_LOOKED_AT).astype(np.int64)
     return np.unique(np.searchsorted(surface.start, points, side="right") - 1)
-
-
-def _spread_evenly(count: int) -> np.ndarray:
-    """Return the numbers of samples from all over the scan; samples with near numbers lie near each other."""
-    return np.unique(np.linspace(0, count - 1, PLACES_LOOKED_AT).astype(np.int64))

@@ -153,7 +153,10 @@ def write_las(path: Path, cloud: Cloud) -> None:
 def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarray | None) -> None:
     import laspy
 
-    with path.open("wb") as file, laspy.open(file, "w", header=header, do_compress=_is_laz(path), closefd=False) as out:
+    with (
+        path.open("wb") as file,
+        laspy.open(file, "w", header=header, do_compress=path.suffix.lower() == ".laz", closefd=False) as out,
+    ):
         for begin in range(0, len(points), POINTS_PER_CHUNK):
             part = slice(begin, begin + POINTS_PER_CHUNK)
             record = laspy.ScaleAwarePointRecord.zeros(len(points[part]), header=header)
@@ -176,10 +179,6 @@ def las_scale(points: np.ndarray) -> float:
             f"LAS cannot hold points {wanted / LOST_OF_SPACING:.3g} apart in a box of {extent:.3g}; write PLY, or crop or thin the scan"
         )
     return wanted
-
-
-def _is_laz(path: Path) -> bool:
-    return path.suffix.lower() == ".laz"
 
 
 def _unit_records(unit: str) -> list[Any]:

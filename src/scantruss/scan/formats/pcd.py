@@ -65,7 +65,8 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
         notes.append(f"the viewpoint of {path.name} is where the scanner stood; the points are not moved by it")
     if len(table) > header.points:
         notes.append(surplus_note(path.name, len(table), header.points))
-    if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
+    more = path.stat().st_size - header.start - header.points * header.row.itemsize
+    if header.data == "binary" and more >= header.row.itemsize:
         notes.append(f"{path.name} goes on for {more:,} bytes after the points that it promises; they are ignored")
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
@@ -121,10 +122,6 @@ def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarra
     if len(table) < header.points:
         raise _ends_early(path, header, f"{len(table):,}")
     return table
-
-
-def _bytes_behind(path: Path, header: Header) -> int:
-    return path.stat().st_size - header.start - header.points * header.row.itemsize
 
 
 def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:

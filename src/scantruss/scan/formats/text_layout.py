@@ -68,7 +68,9 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     kind = kind_of(head)
     if not is_text(head) or kind in _REFUSED or kind.startswith("a raster"):
         raise wrong_kind(path, head, "a text file of points")
-    encoding = _encoding(head)
+    encoding = "utf-8-sig" if head.startswith(BOM) else "latin-1"
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
     start, middle = _parts(path, encoding)
     start, middle = start[:LINES_EXAMINED], middle[:LINES_EXAMINED]
     rows = [row for row in start + middle if split_line(row, ANY_SEPARATOR)]
@@ -105,12 +107,6 @@ def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequ
     attributes = tuple(max(found, key=len, default={}).items())
     stripped = tuple(line.strip() for line in header)
     return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=stripped)
-
-
-def _encoding(head: bytes) -> str:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    return "utf-8-sig" if head.startswith(BOM) else "latin-1"
 
 
 def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +28,6 @@ from .graph import (
 )
 from .merge import merge_scans
 from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
-from .pose_file import poses_for
 from .poses import invert, make_pose
 from .scans import Scan, prepare_scans
 
@@ -109,13 +109,17 @@ def splice_scans(
         Fewer than two scans, or most of them fit nowhere.
     """
     names = _checked_names(clouds, names)
-    given = poses_for(names, dict(poses or {}))
+    poses = poses or {}
+    given = [poses.get(name, poses.get(Path(name).name)) for name in names]  # a pose is found by the last part too
     if use_poses and any(pose is None for pose in given):
         missing = ", ".join(name for name, pose in zip(names, given, strict=True) if pose is None)
         raise InputError(f"no pose is given for {missing}; a pose for every scan is needed to use them as they are")
     order = sorted(range(len(clouds)), key=lambda k: _digest(clouds[k]))
     scans = prepare_scans([clouds[k] for k in order], [names[k] for k in order], progress)
-    local = [_into_local(given[k], clouds[k]) for k in order]
+    own = [
+        pose if pose is None else pose @ make_pose(np.eye(3), c.origin) for pose, c in zip(given, clouds, strict=True)
+    ]
+    local = [own[k] for k in order]  # for points that count from the origin of their cloud
     doubtful: tuple[str, ...] = ()
     if use_poses:
         group = _as_given(scans, [pose for pose in local if pose is not None])
@@ -142,11 +146,6 @@ def _checked_names(clouds: Sequence[PointCloud], names: Sequence[str]) -> list[s
 def _digest(cloud: PointCloud) -> bytes:
     """Return the key by which scans are sorted, so that the order in which they are given does not matter."""
     return hashlib.sha256(cloud.points.tobytes() + cloud.origin.tobytes()).digest()
-
-
-def _into_local(pose: np.ndarray | None, cloud: PointCloud) -> np.ndarray | None:
-    """Return a pose for points that count from the origin of their cloud."""
-    return None if pose is None else pose @ make_pose(np.eye(3), cloud.origin)
 
 
 def _put_together(
@@ -249,7 +248,8 @@ def _result(
         poses[scans[i].name] = make_pose(np.eye(3), origin) @ group.poses[i] @ local
     if not as_given:
         poses[scans[first].name] = np.eye(4)
-    scans = _judged_as_they_lie(scans, group)
+    scans = with_strictness(scans, [])  # from how the group agrees now: the same for poses found and given
+    scans = with_strictness(scans, pairs_as_they_lie(scans, group))
     links = {pair: fine_fit_of(scans, group, *pair) for pair in links_of(scans, group, against=as_given)}
     points, kept = merge_scans(scans, group, progress)
     whole = PointCloud.from_array(points, unit=scans[first].cloud.unit)
@@ -265,12 +265,6 @@ def _result(
         spacing=float(np.median([scan.cloud.spacing for scan in scans])),
         unit=scans[first].cloud.unit,
     )
-
-
-def _judged_as_they_lie(scans: list[Scan], group: Group) -> list[Scan]:
-    """Return the scans with a strictness from the agreement of a group: the same for poses found and given."""
-    scans = with_strictness(scans, [])
-    return with_strictness(scans, pairs_as_they_lie(scans, group))
 
 
 def _pair_fit(scans: list[Scan], names: list[str], pair: tuple[int, int], fit: Fit) -> PairFit:
