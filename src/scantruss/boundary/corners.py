@@ -11,9 +11,9 @@ from ..settings import Settings
 CURVE_STEP = 0.05  # distance between the points of a boundary curve [member lengths]
 # points nearer to a corner than this are rounded off and do not help to locate it [member lengths]
 ROUNDED_OFF = 0.15
-CUT_OFF = 0.4  # the same distance where the disc has cut off a sharp re-entrant corner [member lengths]
+CUT_OFF = 0.4  # points nearer to a corner than this do not help where the disc has cut off a sharp re-entrant corner [member lengths]
 CORNER_REACH = 2.0  # length of the curve on each side from which the place of a corner is found [member lengths]
-SHORTEST_SIDE = 0.6  # shortest such length, where another corner is near [member lengths]
+SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another corner is near [member lengths]
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT_ALONG_CURVE = (0.1, 0.8)
 CORNER_SPACING = 0.5  # corners closer together than this are one [member lengths]

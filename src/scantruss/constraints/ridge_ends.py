@@ -8,13 +8,13 @@ import numpy as np
 
 BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
-ROUND = 0.8  # the same cosine where the ends of one ridge make it a ring
+ROUND = 0.8  # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
 TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED = 1  # places at an end that are left out, because the third side disturbs them
 AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
 STEADY = 0.998  # least cosine of the angle between both directions of a straight ridge
 WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
-REACH_BACK = 0.5  # the same way back, where an end has gone too far [member lengths]
+REACH_BACK = 0.5  # longest way back to a corner or another ridge, where an end has gone too far [member lengths]
 MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
 LEAST_FREE_RIDGE = 2.5  # least length of a ridge of which an end is free [member lengths]
 LEAST_RIDGE = 0.6  # least length of any other [member lengths]

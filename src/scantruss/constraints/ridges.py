@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 END_BESIDE_RIDGE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
 NEARLY = 0.9  # share of the ridge angle that counts as full: noise takes some away
-SHARE = 0.55  # least share of a ridge that has the full angle ...
-LONG_FULL = 2.5  # ... unless it has it over this length [member lengths]
+SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
+LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
 FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]

@@ -47,7 +47,7 @@ from .orientation_field import nodes_at
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no room waits for the next, more tolerant one
 LARGEST_GAP = 60  # most segments of a gap that is filled; larger gaps stay open
 FRONT_CLEARANCE = 0.6  # least distance of a candidate node from the initial front [member lengths]
-FIXED_CLEARANCE = 0.33  # the same distance for the position of a fixed node [member lengths]
+FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial front [member lengths]
 SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 NODE_BOX = 2.4

@@ -14,7 +14,7 @@ from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
 
 ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
 FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
-CLOUD_REACH = 2.5  # ... if the points around it form no surface
+CLOUD_REACH = 2.5  # reach, over the upper quartile of all, above which a point is an outlier if the points around it form no surface
 MOST_OF_CLOUDS = 0.1  # share of points without a surface above which they are no cloud of outliers but the scan itself
 CLOUD_SHARE = 0.18  # share of the spread across the plane above which points are a cloud and no crease
 CLOUD_STEPS = 3  # steps from neighbour to neighbour by which a cloud extends beyond its interior
@@ -23,7 +23,7 @@ DOUBT_DISTANCE = 2.0  # distance from the plane of its neighbours, in their thic
 FARTHEST_APART = 1.1  # reach above which points are too far apart for a grid [member lengths]
 # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 LONE_DISTANCE = 0.5
-DENSEST_AROUND = 4  # ... with the reach of the fifth densest point around it
+DENSEST_AROUND = 4  # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
 POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
 LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface

@@ -23,7 +23,7 @@ from .views import boxes_of, make_view
 AS_GOOD = 0.03  # difference in agreement up to which another place is as good
 AS_CLOSE = 1.25  # largest residual there, over the present one
 AS_MUCH = 0.2  # least share of the places that agree now which must agree there
-LEAST_OF_ALL = 0.08  # ... and of all places of the scan
+LEAST_OF_ALL = 0.08  # least share of all places of the scan which must agree there
 OTHER_PLACE_DISTANCE = 1.5  # distance beyond which a place is another one [coarse spacings]
 FEWEST_SCANS = 3  # fewest scans that can decide between several ways
 PUSH = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]

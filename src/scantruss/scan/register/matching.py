@@ -19,7 +19,7 @@ from .views import View
 ALIKE_PLACES = 3  # most similar places of the other scan for each place
 MOST_PAIRS = 800  # most pairs of similar places
 DISTANCE_TOLERANCE = 1.2  # largest difference of distances of two agreeing pairs, in spacings
-COSINE_TOLERANCE = 0.30  # the same for the cosines of the normals
+COSINE_TOLERANCE = 0.30  # largest difference of the cosines between normals of two agreeing pairs
 PAIR_DISTANCE = 3.0  # least distance between the places of two agreeing pairs, in spacings
 GROUPS_KEPT = 60  # groups that become candidates
 PAIRS_IN_GROUP = 24  # pairs in a group

@@ -16,20 +16,20 @@ from .scans import Scan
 from .views import View
 
 POSES_JUDGED = 40  # poses from the features that are judged without alignment
-POSES_ALIGNED = 10  # the best of them, which are aligned
-POSES_REFINED = 4  # the best of these, which are aligned closely
-LEAST_SCORE_SHARE = 0.2  # least score of those, as a share of the best
+POSES_ALIGNED = 10  # poses that are aligned, the best of those
+POSES_REFINED = 4  # poses that are aligned closely, the best of these
+LEAST_SCORE_SHARE = 0.2  # least score of a pose that is aligned closely, as a share of the best
 PLACES_FOR_ALIGNMENT = 800  # places of a scan that suffice to align it
 POSES_KEPT = 3  # poses of a pair that are handed on
 GOOD_AGREEMENT = 0.9  # agreement above which the other side of the normals is not tried
 SURE_SIDE = 0.6  # certainty that normals face outwards above which the other side is not tried
 LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
-LEAST_AGREEMENT = 0.6  # agreement below which it is not
+LEAST_AGREEMENT = 0.6  # agreement below which a pair is not considered
 NOISES_WITHIN = 3.0  # distance within which two scans agree, in the noise of both together
-LEAST_AGREEING_DISTANCE = 0.15  # least such distance, in spacings of the view; scanners distort slightly
-LARGEST_AGREEING_DISTANCE = 0.5  # the largest
+LEAST_AGREEING_DISTANCE = 0.15  # least distance within which two scans agree, in spacings of the view; scanners distort slightly
+LARGEST_AGREEING_DISTANCE = 0.5  # largest distance within which two scans agree, in spacings of the view
 RESIDUALS_WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
-LEAST_DISTANCE_SHARE = 0.35  # least share to which that reduces the distance
+LEAST_DISTANCE_SHARE = 0.35  # least share of their usual distance to which the residuals reduce it
 DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
 
 
