@@ -165,7 +165,7 @@ CODE = """
 import scantruss.kernels.geometry.vectors as v
 from scantruss.runtime import jit as c
 assert v.norm((3.0, 4.0, 0.0)) == 5.0
-print(c.FOLDER, any(c.FOLDER.rglob("vectors.norm-*.nbc")) if c.FOLDER else False)
+print(c.KERNEL_FOLDER, any(c.KERNEL_FOLDER.rglob("vectors.norm-*.nbc")) if c.KERNEL_FOLDER else False)
 """
 
 

@@ -196,7 +196,7 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(
 ) -> None:
     """One point in a hundred at (0, 0, 0), with others at a far place: no echo."""
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
-    monkeypatch.setattr(fit, "BULK", 3000)
+    monkeypatch.setattr(fit, "POINTS_OF_BULK", 3000)
     points = plate() + place_of_all
     np.save("clean.npy", points)
     points[::100] = -9999.0
