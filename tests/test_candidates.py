@@ -4,6 +4,7 @@ from collections.abc import Callable
 from itertools import pairwise, product
 from typing import Any, Never
 
+import naive_grid as naive
 import numpy as np
 import pytest
 from shapes import Shape, make
@@ -15,7 +16,6 @@ import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.candidates import LENGTHS, attempts
 from scantruss.errors import CertificateError, FrontError
-from scantruss.improve.equalize import grid_energy
 from scantruss.improve.optimize import improve_last
 
 
@@ -134,7 +134,7 @@ def test_more_effort_leaves_less_energy() -> None:
         for name, seed in product(("scallop", "l_plate", "two_holes"), range(4)):
             shape = make(name, 20_000, seed=seed)
             grid = grid_of(shape, effort)
-            shares.append(grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
+            shares.append(naive.grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
         energies.append(np.array(shares))
     for less, more in pairwise(energies):
         gained = less - more

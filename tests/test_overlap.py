@@ -17,11 +17,18 @@ from scantruss.kernels.scan import overlap as kernels
 from scantruss.scan.register.features import ANGLE_BINS, find_features, flip
 from scantruss.scan.register.fine import align, judge, solve
 from scantruss.scan.register.matching import fit_pose
-from scantruss.scan.register.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
+from scantruss.scan.register.poses import invert, move, quaternion_of, small_motion, turn_by
 from scantruss.scan.register.views import View, boxes_of, make_view
 
 pytestmark = pytest.mark.kernels
 SPACING = 0.12
+
+
+def angle_between(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the angle [degree] of the rotation between two poses."""
+    between = one[:3, :3].T @ other[:3, :3]
+    sine = np.linalg.norm(between - between.T) / np.sqrt(8.0)
+    return float(np.degrees(np.arctan2(sine, 0.5 * (np.trace(between) - 1.0))))
 
 
 @pytest.fixture(scope="module")

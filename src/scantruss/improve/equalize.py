@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..grid.grid import Grid
-from ..grid.quality import shape_qualities
 from ..kernels.mesh.equalize import RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
@@ -155,14 +153,6 @@ def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     """Return the terms for a whole grid as it is now."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
-
-
-def grid_energy(grid: Grid, length: float) -> float:
-    """Return the energy of a whole grid, without folded members."""
-    stretch = grid.stretches(length) - 1.0
-    shapes = shape_qualities(grid.nodes, grid.triangles)
-    price = MEAN_LENGTH_WEIGHT * len(grid.nodes) * float(stretch.mean()) ** 2
-    return LENGTH_WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
 
 
 def energy_of_node(mesh: WorkingMesh) -> float:

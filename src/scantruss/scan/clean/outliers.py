@@ -23,7 +23,9 @@ DOUBT_DISTANCE = 2.0  # distance from the plane of its neighbours, in their thic
 FARTHEST_APART = 1.1  # reach above which points are too far apart for a grid [member lengths]
 # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 LONE_DISTANCE = 0.5
-DENSEST_AROUND = 4  # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
+DENSEST_AROUND = (
+    4  # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
+)
 POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
 LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface
