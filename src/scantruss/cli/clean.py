@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .outputs import claim, cloud_output, inputs_of, outs_of
+from .outputs import claim, claim_clouds
 from .shared import cloud_file_notes, note_compiling, read_scan
 
 if TYPE_CHECKING:
@@ -101,11 +101,8 @@ def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..runtime.files import check_place
 
-    outs = [cloud_output(out) for out in outs_of(values)]
+    outs, taken = claim_clouds(values, "clean cloud")
     report = check_place(values.report, (".json",)) if values.report else None
-    taken = inputs_of(values)
-    for out in outs:
-        claim(out, "clean cloud", taken, force=values.force, kind="cloud")
     if report is not None:
         claim(report, "report", taken, force=values.force)
     return outs, report

@@ -60,11 +60,14 @@ def outs_of(values: Namespace) -> list[Path]:
     return outs
 
 
-def cloud_output(path: str | Path) -> Path:
-    """Return the path of a cloud to be written, if its format is known and a file can be written there."""
+def claim_clouds(values: Namespace, what: str) -> tuple[list[Path], Taken]:
+    """Return the clouds that a command line names as results, and all files it names, once it is known that they can be written."""
     from ..scan.formats.writing import check_cloud_output
 
-    return check_cloud_output(path)
+    outs, taken = [check_cloud_output(out) for out in outs_of(values)], inputs_of(values)
+    for out in outs:
+        claim(out, what, taken, force=values.force, kind="cloud")
+    return outs, taken
 
 
 def result_folder(path: str | Path) -> Path:
