@@ -579,7 +579,7 @@ def test_a_fault_of_ours_is_one_line_too(
     ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(grid, "make_grid", lambda *_, **__: 1 // 0)
+    monkeypatch.setattr(grid, "grid_with_notes", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 

@@ -24,7 +24,7 @@ def patch_at(surface: Surface, place: np.ndarray, strength: float = 1.0) -> tupl
     patches = np.zeros((2, PATCH_COLUMNS))
     sample = int(np.argmin(np.linalg.norm(surface.mean - place, axis=1)))
     fit_patch(surface, patches[0], sample, tuple(place))
-    folds.fit_fold(surface, patches[0], folds.PLANES_REACH, strength)
+    folds.add_fold(surface, patches[0], folds.PLANES_REACH, strength)
     patches[1] = patches[0]
     return patches, surface
 
@@ -62,7 +62,7 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise: float) -> None:
     assert abs(np.linspace(-0.4, 0.4, 81)[np.argmin(energies)]) < 0.15  # from 0.2
     beside = (0.1, 0.0, -0.1 * rise)
     fit_patch(surface, patches[0], int(patches[0, NEAREST_SAMPLE]), beside)
-    folds.fit_fold(surface, patches[0], 0.4, 1.0)
+    folds.add_fold(surface, patches[0], 0.4, 1.0)
     crest = folds.onto_crest(surface, patches[0], beside)
     assert np.hypot(crest[0], crest[2]) < np.hypot(beside[0], beside[2])
 

@@ -315,7 +315,7 @@ def test_a_part_of_a_kernel_is_no_machine_code_of_its_own() -> None:
         return part(x) + 1.0
 
     assert whole(1.0) == 3.0
-    assert not part.alone.signatures and isinstance(next(iter(part.overloads.values())).library, cache.Part)
+    assert not part.alone.signatures and isinstance(next(iter(part.overloads.values())).library, cache.KernelPart)
     assert part(2.0) == 4.0 and len(part.alone.signatures) == 1
 
 

@@ -18,7 +18,7 @@ from ..surface.samples import KEPT, narrow_surface, samples_with
 from .corners import CURVE_STEP
 from .curves import length_around
 from .holes import fill_holes
-from .polylines import POINTS_UNDER_LINE, divide, feet_on_scan, find_corners
+from .polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan
 
 if TYPE_CHECKING:
     from ..kernels.surface.local_surface import Surface
@@ -35,7 +35,7 @@ LEAST_SCANNED_SHARE = 0.05  # share of the samples beside a boundary below which
 INSIDE_SHARE = 0.9  # share of a boundary of the scan that must lie inside for it to be a hole there
 
 
-class Ring(NamedTuple):
+class GivenRing(NamedTuple):
     """A closed curve that bounds the grid."""
 
     points: np.ndarray  #: (M, 3) the surface to its left, relative to the cloud's origin
@@ -80,7 +80,7 @@ class Inside:
 
 def cut_along(
     samples: SurfaceSamples, scanned: Sequence[tuple[np.ndarray, int]], settings: Settings
-) -> tuple[SurfaceSamples, list[Ring]]:
+) -> tuple[SurfaceSamples, list[GivenRing]]:
     """Return the samples inside the boundary that the settings give, and that boundary.
 
     Parameters
@@ -107,7 +107,7 @@ def cut_along(
             points, corner_at = points[::-1], np.sort(len(points) - 1 - corner_at)
         nearest = int(((cut.surface.mean - points[0]) ** 2).sum(axis=1).argmin())
         external = bool(inside.external[number])
-        found.append(Ring(np.ascontiguousarray(points), corner_at, external, int(cut.piece[nearest])))
+        found.append(GivenRing(np.ascontiguousarray(points), corner_at, external, int(cut.piece[nearest])))
     return cut, found
 
 
@@ -145,7 +145,7 @@ def _curve(
         raise LengthError(
             f"boundary {number} is {around:.4g}{unit} long; three members, {SHORTEST_BOUNDARY * length:.4g}{unit}, are needed"
         )
-    points, vertices = divide(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
+    points, vertices = divide_polyline(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
     _, gaps = feet_on_scan(points, narrow_surface(samples, POINTS_UNDER_LINE))
     if (worst := float(gaps.max())) > BRIDGED * length:
         place = words_of_place(points[int(gaps.argmax())] + samples.origin)
@@ -153,7 +153,7 @@ def _curve(
             f"boundary {number} leaves the scan by up to {worst:.4g}{unit}, near ({place});"
             f" it must stay within half a member, {BRIDGED * length:.4g}{unit}, which the grid bridges"
         )
-    return points, _apart(points, find_corners(points, vertices, True, settings), CORNERS_APART * length)
+    return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)
 
 
 def _apart(points: np.ndarray, corners: Sequence[int], distance: float) -> np.ndarray:

@@ -45,7 +45,7 @@ def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
     return found
 
 
-def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
+def divide_polyline(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points (M, 3) at most a step apart along a polyline, its vertices among them, and which those are.
 
     The first point of a closed line, given again as its last, is not repeated.
@@ -60,7 +60,7 @@ def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray,
     return np.concatenate([*parts, vertices[-1:]]), np.array(at)
 
 
-def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
+def corners_of_polyline(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
     """Return which of the points (M, 3) of a line are corners, the sharpest first: where it turns by more than `corner_angle`."""
     places = points[vertices]
     whole = np.concatenate([places, places[:1]]) if closed else places

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..grid.certificate import Certificate, Fault, Place, place_of
+from ..errors import Place
+from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.topology import pinched_nodes
 from ..kernels.geometry.components import component_labels
 from .crossings import MOST_CROSSINGS

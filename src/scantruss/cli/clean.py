@@ -90,7 +90,7 @@ def clean(values: Namespace) -> None:
         for out in outs:
             write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
         if report is not None:
-            save.json(report, report_of(result, len(cloud.points)))
+            save.json(report, figures_of_cleaning(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [*map(str, outs), *([str(report)] if report else [])]
     said = [note for out in outs for note in cloud_file_notes(out)]
@@ -134,7 +134,7 @@ def _steps(values: Namespace) -> dict[str, Any]:
     return steps
 
 
-def report_of(result: CleanCloud, points: int) -> dict[str, Any]:
+def figures_of_cleaning(result: CleanCloud, points: int) -> dict[str, Any]:
     """Return all figures of a run, ready for JSON."""
     return {
         "points_read": points,

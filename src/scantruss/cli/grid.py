@@ -101,7 +101,7 @@ def grid(values: Namespace) -> None:
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)
         try:
-            result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+            result = grid_with_notes(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
         except FrontError as error:
             draw_refusal(error, cloud, outs, style, bars, force=values.force)
             raise
@@ -145,7 +145,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
         check_ours(settings_file, "result")
 
 
-def make_grid(
+def grid_with_notes(
     cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
 ) -> Grid:
     """Run the chain, with a note if kernels must be compiled."""

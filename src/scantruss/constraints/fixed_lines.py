@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..boundary.polylines import POINTS_UNDER_LINE, divide, feet_on_scan, find_corners, simplify
+from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
 from ..errors import InputError
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
@@ -38,10 +38,10 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
         _check_on_scan(given, line, number, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
         _check_length(given, closed, number, samples.unit, settings.length)
-        points, vertices = divide(
+        points, vertices = divide_polyline(
             simplify(given, ZIGZAG * settings.length, closed), closed, LINE_STEP * settings.length
         )
-        corners = find_corners(points, vertices, closed, settings)
+        corners = corners_of_polyline(points, vertices, closed, settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
             network.add(part, ring, own, name=name)

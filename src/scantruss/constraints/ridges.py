@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..boundary.polylines import divide
+from ..boundary.polylines import divide_polyline
 from ..kernels.surface.ridges import BEND
 from .fixed_lines import LINE_STEP
 from .fold_tracing import LEAST_FULL_LENGTH, STRIDE, Tracer
@@ -44,7 +44,7 @@ def add_ridges(network: Network, ridges: list[Ridge]) -> None:
     """Add ridges to a network of lines."""
     for number, ridge in enumerate(ridges, 1):
         places = np.concatenate([ridge.places, ridge.places[:1]]) if ridge.ring else ridge.places
-        points, _ = divide(places, ridge.ring, LINE_STEP * network.length)
+        points, _ = divide_polyline(places, ridge.ring, LINE_STEP * network.length)
         network.add(points, ridge.ring, [], name=f"ridge {number}", sharp=True)
 
 

@@ -61,7 +61,7 @@ class Flags(Options):  # type: ignore[misc, valid-type]
 OF_NAMES = hash(Options()) if HANDS_OVER else 0
 
 
-class Part(JITCodeLibrary):  # type: ignore[misc]
+class KernelPart(JITCodeLibrary):  # type: ignore[misc]
     """A compiled kernel on its way into another: neither optimized by itself nor machine code."""
 
     def _optimize_final_module(self) -> None:
@@ -150,7 +150,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             flags = Flags()
             self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
             flags.no_cpython_wrapper = flags.no_compile = True
-            part = Part(self.targetctx.codegen(), self.py_func.__qualname__)
+            part = KernelPart(self.targetctx.codegen(), self.py_func.__qualname__)
             details = {"dispatcher": self, "args": arguments, "return_type": None}
             with trigger_event("numba:compile", data=details):
                 result = compiler.compile_extra(

@@ -58,7 +58,7 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
     return np.stack([near.min(axis=0), near.max(axis=0)])
 
 
-def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def joint_extent(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the extent of both."""
     return np.stack([np.minimum(one[0], other[0]), np.maximum(one[1], other[1])])
 

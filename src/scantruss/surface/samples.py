@@ -38,7 +38,7 @@ from .linked_samples import (
 )
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
-from .shape import check_is_surface, find_layers
+from .shape import check_is_surface, layers_of_surface
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 from .supports import support_samples
@@ -109,7 +109,7 @@ class SurfaceSamples:
     @cached_property
     def layers(self) -> tuple[float, float]:
         """Distance between two layers closer than half a member, and the share of the scan that has them; 0, 0 for one layer."""
-        return find_layers(self)
+        return layers_of_surface(self)
 
     @property
     def density(self) -> float:

@@ -87,7 +87,7 @@ def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarr
     return np.concatenate([surface.points[surface.start[s] : surface.start[s + 1]] for s in near])
 
 
-def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
+def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
     """Return the distance between two layers closer than half a member, and the share of places with two; 0, 0 for one layer."""
     surface = samples.surface
     if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:

@@ -39,7 +39,7 @@ class Strokes:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class CameraView:
     """A surface as seen by a camera."""
 
     camera: Camera
@@ -59,7 +59,7 @@ class View:
 
 def look(
     nodes: np.ndarray, triangles: np.ndarray, camera: Camera, size: tuple[int, int], *, mapped: bool = True
-) -> View:
+) -> CameraView:
     """Return how a surface looks from a camera; the map of what is in front only if asked for."""
     flat, near = camera.project(nodes)
     corners, depth = flat[triangles], near[triangles]
@@ -75,7 +75,7 @@ def look(
     rows, columns = (size[1] // 2, size[0] // 2) if mapped else (0, 0)
     nearest, front = map_depth(corners / 2, depth, (rows, columns))
     span = (float(used.min()), float(used.max()))
-    return View(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
+    return CameraView(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
@@ -117,7 +117,7 @@ def _hazy(colour: np.ndarray, fade: np.ndarray, most: float) -> np.ndarray:
 
 
 def _surface_strokes(
-    view: View, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]
+    view: CameraView, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]
 ) -> Strokes:
     """Return the shaded triangles of a view."""
     colour = np.where(view.outside[:, None], _mix(outside, view.light), _mix(inside, view.light))
@@ -160,7 +160,7 @@ def framed(
     return camera.framed(everything, box)
 
 
-def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Strokes]:
+def grid_strokes(grid: Grid, scan: np.ndarray | None, view: CameraView) -> list[Strokes]:
     """Return shadow, triangles, members, fixed nodes and, if given, the points of the scan (N, 3)."""
     strokes = [
         shadow_strokes(grid.nodes, grid.triangles, view.camera),
@@ -174,7 +174,7 @@ def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Stroke
     return strokes
 
 
-def _member_strokes(grid: Grid, view: View) -> Strokes:
+def _member_strokes(grid: Grid, view: CameraView) -> Strokes:
     """Return the members as lines just in front of their triangles, those on a boundary or line bolder."""
     flat, near = view.camera.project(grid.nodes)
     ends = grid.edges
@@ -204,7 +204,7 @@ def some_of(points: np.ndarray, most: int) -> np.ndarray:
     return chosen
 
 
-def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) -> Strokes:
+def dot_strokes(points: np.ndarray, member: float, view: CameraView, *, over: bool) -> Strokes:
     """Return the points of the scan (N, 3) that are seen, as dots: over the triangles, or alone and shaded."""
     flat, near = view.camera.project(some_of(points, MOST_POINTS[over]))
     inside, triangle, nearest = _in_front(flat, view)
@@ -220,7 +220,7 @@ def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) ->
 
 
 def missed_strokes(
-    points: np.ndarray, colour: np.ndarray, view: View, box: tuple[float, float, float, float]
+    points: np.ndarray, colour: np.ndarray, view: CameraView, box: tuple[float, float, float, float]
 ) -> Strokes:
     """Return points that the grid leaves out (N, 3) in a colour (3,), as far as they lie in a box; faint where they lie behind the grid."""
     flat, near = view.camera.project(some_of(points, MOST_POINTS[True]))
@@ -234,7 +234,7 @@ def missed_strokes(
     )
 
 
-def _in_front(flat: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _in_front(flat: np.ndarray, view: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which places of a picture (N, 2) lie in it, and the triangle in front there and its nearness."""
     rows, columns = view.front.shape
     pixel = np.rint(flat / 2).astype(int)
@@ -278,7 +278,7 @@ def _dots(flat: np.ndarray) -> np.ndarray:
     return shape
 
 
-def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
+def _mark_strokes(grid: Grid, view: CameraView) -> list[Strokes]:
     """Return the marks of the fixed nodes: full where they are seen, faint behind the grid."""
     flat, near = view.camera.project(grid.nodes[grid.fixed])
     _, _, nearest = _in_front(flat, view)
@@ -293,7 +293,7 @@ def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
     return strokes
 
 
-def solid_strokes(view: View) -> Strokes:
+def solid_strokes(view: CameraView) -> Strokes:
     """Return the outside of a solid, shaded."""
     surface = _surface_strokes(view, PRINT, PRINT)
     keep = view.outside

@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
 from ..geometry.vectors import fill_row, norm, row, subtract
-from ..surface.folds import PLANES_REACH, fit_fold
+from ..surface.folds import PLANES_REACH, add_fold
 from ..surface.local_surface import IS_FITTED, NEAREST_SAMPLE, Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
@@ -95,7 +95,7 @@ def renew_patches(
             if patches[v, IS_FITTED] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, NEAREST_SAMPLE]), place)
-                fit_fold(surface, patches[v], PLANES_REACH, strength)
+                add_fold(surface, patches[v], PLANES_REACH, strength)
                 local = surface.length * net.desired[v]
                 if (
                     before[IS_FITTED] != 0.0

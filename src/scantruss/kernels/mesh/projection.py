@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.quadric import TERMS_OF_QUADRIC
 from ..geometry.vectors import Vector, along, dot, fill_row, norm, put_vector, row, subtract
-from ..surface.folds import fit_fold, onto_crest
+from ..surface.folds import add_fold, onto_crest
 from ..surface.local_surface import (
     CENTRE,
     MEAN_DISTANCE,
@@ -109,7 +109,7 @@ def project_nodes(
                 break
         if folds > 0.0 and net.kind[v] == INTERIOR and not fixed[v]:
             put_vector(patches[v], CENTRE, row(net.nodes, v))
-            fit_fold(broad, patches[v], CREST_REACH, 1.0)
+            add_fold(broad, patches[v], CREST_REACH, 1.0)
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))
         place = row(net.nodes, v)
         if not stayed:

@@ -193,7 +193,9 @@ def take_nearest(
 
 
 @kernel
-def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
+def choose_boundary_points(
+    table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int
+) -> int:
     """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the boundary that lie on its outer side.
 
     Returns their number. A box is at the boundary if the weighted centre of the points around it is far from its own mean. The

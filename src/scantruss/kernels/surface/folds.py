@@ -29,7 +29,7 @@ FACING_AWAY = -0.3  # samples that face farther away than this are another side'
 
 
 @kernel
-def fit_fold(surface: Surface, patch: np.ndarray, members: float, strength: float) -> None:
+def add_fold(surface: Surface, patch: np.ndarray, members: float, strength: float) -> None:
     """Fill in the quadric of a patch from the samples within some member lengths of its middle; strength 1 is usual."""
     place = (patch[0], patch[1], patch[2])
     sample = int(patch[15])

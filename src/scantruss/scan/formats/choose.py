@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...selection import Selection, parts_of
-from .copc import Place
+from .copc import WantedBox
 
 PLURALS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
 POINTS_PER_TEST = 1 << 17  # points tested against a polygon in one go
@@ -26,7 +26,7 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
         )
 
 
-def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
+def describe_points(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     """Return what could be selected from a file, in words; "" if all its points are NaN or infinite."""
     real = np.isfinite(points).all(axis=1)
     if not real.any():
@@ -67,7 +67,7 @@ def choose(
     return kept, left_out
 
 
-def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
+def places_in(crops: Sequence[str], scale: np.ndarray) -> list[WantedBox]:
     """Return the boxes around parts of space in the unit of a file, whose axes are `scale` (3,) units of the scan long."""
     places = []
     for crop in crops:
@@ -82,7 +82,7 @@ def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
         else:
             corners = np.concatenate([np.array(ring).reshape(-1, 2) for rings in polygons for ring in rings])
             lower[:2], upper[:2] = corners.min(axis=0), corners.max(axis=0)
-        places.append(Place(_outside(kind), lower / scale, upper / scale))
+        places.append(WantedBox(_outside(kind), lower / scale, upper / scale))
     return places
 
 

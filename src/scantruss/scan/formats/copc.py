@@ -24,7 +24,7 @@ DEEPEST_OCTREE_LEVEL = 30  # level of an octree
 OCTREE_TOLERANCE = 1e-9  # of the octree's side; coordinates are rounded
 
 
-class Place(NamedTuple):
+class WantedBox(NamedTuple):
     """The box around a part of space from which points are wanted, in the unit of a file."""
 
     words: str  #: for points outside it
@@ -118,7 +118,7 @@ def _begin_inside(path: Path, header: Any, boxes: Boxes) -> bool:
     return bool(((points >= boxes.lower) & (points <= boxes.upper)).all())
 
 
-def touching(boxes: Boxes, places: Sequence[Place]) -> tuple[np.ndarray, dict[str, int]]:
+def touching(boxes: Boxes, places: Sequence[WantedBox]) -> tuple[np.ndarray, dict[str, int]]:
     """Return the numbers of the boxes that touch all places, in order, and how many points lie in others, by the words of the places.
 
     The coarsest box is always included: it shows what the file holds.

@@ -16,7 +16,7 @@ from ...errors import FormatError, InputError
 from ...settings import UNITS
 from ..cloud import measure_spacing
 from .content import Cloud, Content
-from .copc import Place, find_boxes, read_boxes, touching
+from .copc import WantedBox, find_boxes, read_boxes, touching
 from .heights import MOST_HEIGHTS, look_like_feet
 from .kinds import read_head, reading_as, wrong_kind
 from .las_header import check_header
@@ -29,7 +29,7 @@ LARGEST_INT32 = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
 UNIT_CODES = {"m": 9001, "foot": 9002}  # EPSG
 WITHHELD = "marked as withheld"  # the format's term for deleted
 
-Places = Callable[[Content], list[Place]]  # by the units that a file states
+Places = Callable[[Content], list[WantedBox]]  # by the units that a file states
 
 
 def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
@@ -57,7 +57,7 @@ def fields_of(wanted: Sequence[str]) -> list[str]:
     return [name for name in dict.fromkeys(wanted) if name in FIELD_OF_ATTRIBUTE]
 
 
-def take(record: Any, names: Sequence[str]) -> Content:
+def content_of_records(record: Any, names: Sequence[str]) -> Content:
     """Return the points of some records of laspy with attributes, but for those that are marked as withheld."""
     points = np.empty((len(record), 3))
     for axis, name in enumerate("XYZ"):
@@ -82,7 +82,9 @@ def note_on_heights(path: Path) -> str:
     import laspy
 
     with reading_as(path, "LAS or LAZ"), laspy.open(path) as file:
-        content = take(file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"])
+        content = content_of_records(
+            file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"]
+        )
         return look_like_feet(content.points, content.attributes["return_count"])
 
 
@@ -95,7 +97,7 @@ def fields_for(names: Sequence[str]) -> Any:
 
 
 def records_near(
-    path: Path, header: Any, places: Sequence[Place], names: Sequence[str], most: int = POINTS_PER_CHUNK
+    path: Path, header: Any, places: Sequence[WantedBox], names: Sequence[str], most: int = POINTS_PER_CHUNK
 ) -> tuple[Iterator[Any], dict[str, int]] | None:
     """Return the records of a COPC file near all places, and how many others there are by the words of these; None of other files."""
     boxes = find_boxes(path, header) if places else None
@@ -115,7 +117,7 @@ def _read(path: Path, names: Sequence[str], places_of: Places | None) -> tuple[i
         said = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
         near = records_near(path, header, places_of(said), names) if places_of else None
         records, unread = near or (file.chunk_iterator(POINTS_PER_CHUNK), {})
-        chunks = [take(record, names) for record in records]
+        chunks = [content_of_records(record, names) for record in records]
     return header.point_count, replace(said, unread=unread), chunks
 
 

@@ -27,7 +27,7 @@ PCD_TYPES = {("F", s): f"<f{s}" for s in (2, 4, 8)} | {(t, s): f"<{t.lower()}{s}
 
 
 @dataclass(frozen=True)
-class Header:
+class PcdHeader:
     """What the header of a PCD file says."""
 
     names: tuple[str, ...]
@@ -71,7 +71,7 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
 
-def read_pcd_header(path: Path) -> Header:
+def read_pcd_header(path: Path) -> PcdHeader:
     """Return the header of a PCD file; FormatError if it is none."""
     with path.open("rb") as file:
         raw = file.read(LONGEST_PCD_HEADER)
@@ -103,14 +103,14 @@ def read_pcd_header(path: Path) -> Header:
     unit = re.search(rf"#\s*{PATTERN}", text, re.IGNORECASE)
     metres = metres_of(unit[1]) if unit else None
     moved = len(place) == 7 and place != [0, 0, 0, 1, 0, 0, 0]
-    return Header(tuple(names), tuple(types), tuple(counts), points, data, end.end(), metres, moved)
+    return PcdHeader(tuple(names), tuple(types), tuple(counts), points, data, end.end(), metres, moved)
 
 
-def _ends_early(path: Path, header: Header, got: str) -> FormatError:
+def _ends_early(path: Path, header: PcdHeader, got: str) -> FormatError:
     return FormatError(f"{path} ends early: its header promises {header.points:,} points, got {got}; copy it again")
 
 
-def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_ascii(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     place = np.concatenate([[0], np.cumsum(header.counts)])
     if header.points > path.stat().st_size:
         raise _ends_early(path, header, f"{path.stat().st_size:,} bytes")
@@ -124,7 +124,7 @@ def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarra
     return table
 
 
-def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_binary(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     held = (path.stat().st_size - header.start) // max(header.row.itemsize, 1)
     if held < header.points:
         raise _ends_early(path, header, f"{held:,}")
@@ -135,7 +135,7 @@ def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarr
     return table
 
 
-def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_compressed(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     """Unpack a file that is stored field by field."""
     with path.open("rb") as file:
         file.seek(header.start)

@@ -18,7 +18,7 @@ from ..units import metres_of
 from .columns import find_attributes
 from .content import Cloud, Content
 from .kinds import read_head, wrong_kind
-from .ply_header import PLY, Element, Header, ends_early, read_header
+from .ply_header import PLY, Element, PlyHeader, ends_early, read_header
 
 LONGEST_LIST = 1 << 26  # entries
 MOST_RUNS = 20_000  # changes of list length walked through behind the points
@@ -50,7 +50,7 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=metres_of(header.unit))
 
 
-def _read_binary(path: Path, header: Header, vertex: Element, columns: Sequence[str]) -> np.ndarray:
+def _read_binary(path: Path, header: PlyHeader, vertex: Element, columns: Sequence[str]) -> np.ndarray:
     data = np.memmap(path, dtype=np.uint8, mode="r")
     offset = header.start
     table = np.empty((0, len(columns)))
@@ -144,7 +144,7 @@ def row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.vo
     return np.dtype(fields)
 
 
-def _read_ascii(path: Path, header: Header, vertex: Element, names: Sequence[str]) -> np.ndarray:
+def _read_ascii(path: Path, header: PlyHeader, vertex: Element, names: Sequence[str]) -> np.ndarray:
     """Return the named properties of all points of an ascii PLY file, (N, len(names)) float64.
 
     The usual layout, a row a line, is read by numpy; any other word by word, which takes longer.
@@ -163,7 +163,7 @@ def _read_ascii(path: Path, header: Header, vertex: Element, names: Sequence[str
     return _read_words(path, header, vertex, names, words)
 
 
-def _open_data(path: Path, header: Header) -> TextIOWrapper:
+def _open_data(path: Path, header: PlyHeader) -> TextIOWrapper:
     file = path.open("rb")
     file.seek(header.start)
     return TextIOWrapper(file, encoding="latin-1")
@@ -192,7 +192,7 @@ def _columns(vertex: Element, wanted: Sequence[str]) -> list[int]:
     return [names.index(name) for name in wanted]
 
 
-def _read_words(path: Path, header: Header, vertex: Element, wanted: Sequence[str], words: list[str]) -> np.ndarray:
+def _read_words(path: Path, header: PlyHeader, vertex: Element, wanted: Sequence[str], words: list[str]) -> np.ndarray:
     """Return the wanted properties of a file whose rows do not keep to lines."""
     place, chosen = 0, np.empty((0, len(wanted)), dtype=np.int64)
     for element in header.elements:

@@ -43,7 +43,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Header:
+class PlyHeader:
     """The content of the header, and where the data starts."""
 
     order: str  #: "" for ascii, "<" or ">" for binary
@@ -52,7 +52,7 @@ class Header:
     unit: str = ""  #: unit, if a comment names it
 
 
-def read_header(path: Path) -> Header:
+def read_header(path: Path) -> PlyHeader:
     """Return the header of a PLY file; FormatError where it cannot be understood."""
     with path.open("rb") as file:
         raw = file.read(LONGEST_PLY_HEADER)
@@ -85,7 +85,7 @@ def read_header(path: Path) -> Header:
     unit = re.search(
         rf"(?:^|[\r\n])(?:comment|obj_info)\s[^\r\n]*?\b{PATTERN}", raw[: end.start()].decode("latin-1"), re.I
     )
-    return Header(
+    return PlyHeader(
         order, tuple(Element(name, count, tuple(p)) for name, count, p in elements), start, unit[1] if unit else ""
     )
 

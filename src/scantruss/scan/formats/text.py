@@ -33,7 +33,7 @@ NAME_IT = "a first line that names the columns (time x y z ...) settles it"
 _WORDS_IN_COMMENT = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
 
 
-class Rows(NamedTuple):
+class TextRows(NamedTuple):
     """The content of lines of text."""
 
     rows: np.ndarray  #: (N, columns) float64
@@ -98,7 +98,7 @@ def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
             begin += len(block)
 
 
-def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Rows:
+def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> TextRows:
     """Return the columns of whole lines after the header.
 
     Parameters
@@ -121,11 +121,11 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
     """
     if is_plain(block, layout):
         if len(block) > BYTES_FOR_PYARROW and (rows := _read_by_pyarrow(block, layout, columns)) is not None:
-            return Rows(rows, 0, 0)
+            return TextRows(rows, 0, 0)
         lines = block.replace(b",", b".") if layout.comma else block
         try:
             rows = np.loadtxt(BytesIO(lines), delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2)
-            return Rows(rows, 0, 0)
+            return TextRows(rows, 0, 0)
         except ValueError:
             pass
     encoding = "latin-1" if layout.encoding == "latin-1" else "utf-8"
@@ -200,7 +200,7 @@ def _lines_before(path: Path, layout: Layout, end: int) -> int:
 
 def read_ragged(
     path: Path, lines: Sequence[str], layout: Layout, columns: Sequence[int], count_before: Callable[[], int]
-) -> Rows:
+) -> TextRows:
     """Return the columns of lines that no faster reader can handle; see `read_lines`."""
     values, promised, empty = array("d"), 0, 0
     names: _Names | None = None
@@ -228,7 +228,7 @@ def read_ragged(
             empty += 1
     if names and not names.in_comment:  # its points are in the next block
         _check_names(path, names, names.names, layout, count_before)
-    return Rows(np.array(values).reshape(-1, len(columns)), promised, empty)
+    return TextRows(np.array(values).reshape(-1, len(columns)), promised, empty)
 
 
 def _no_point(path: Path, layout: Layout, number: int, row: Sequence[str]) -> FormatError:

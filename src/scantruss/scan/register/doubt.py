@@ -18,7 +18,7 @@ from .graph import Group, apart, links_of
 from .pairs import Pair, find_pair, judge_views, settled_from
 from .poses import move, small_motion, turn_by
 from .scans import Scan
-from .views import boxes_of, make_view
+from .views import boxes_around, make_view
 
 AS_GOOD = 0.03  # difference in agreement up to which another place is as good
 AS_CLOSE = 1.25  # largest residual there, over the present one
@@ -103,7 +103,7 @@ def _all_but(scans: list[Scan], group: Group, i: int) -> Scan:
     coarse = np.concatenate([move(group.poses[j], scans[j].coarse.points) for j in members])
     normals = np.concatenate([group.turns[j] * turn_by(group.poses[j], scans[j].coarse.normals) for j in members])
     spacing = scans[i].coarse.spacing
-    facing = replace(scans[i].coarse, points=coarse, normals=normals, boxes=boxes_of(coarse, 1.5 * spacing))
+    facing = replace(scans[i].coarse, points=coarse, normals=normals, boxes=boxes_around(coarse, 1.5 * spacing))
     points = np.concatenate([move(group.poses[j], scans[j].fine.points) for j in members])
     wide = make_view(points, spacing, facing)
     middle = replace(make_view(points, scans[i].middle.spacing, facing), strict=scans[i].middle.strict)

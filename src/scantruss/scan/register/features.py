@@ -27,7 +27,7 @@ def find_features(views: Sequence[View]) -> list[np.ndarray]:
     return [_histograms(view, edges) for view in views]
 
 
-def flip(features: np.ndarray) -> np.ndarray:
+def features_from_behind(features: np.ndarray) -> np.ndarray:
     """Return what the features would be if the normals faced the other side: two of the three angles change sign."""
     parts = features.reshape(len(features), 2, 3, ANGLE_BINS).copy()
     parts[:, :, 1:] = parts[:, :, 1:, ::-1]

@@ -70,7 +70,7 @@ def align(
             count = add_pairs(sums, first, second, pose, np.eye(4), turn, reach, centre, every)
             if count < 6:
                 return pose
-            step = solve(sums[:6, :6], sums[:6, 6], 0.5 * size)
+            step = solve_step(sums[:6, :6], sums[:6, 6], 0.5 * size)
             pose = small_motion(step[:3], step[3:], centre[0]) @ pose
             if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < LAST_STEP * first.spacing:
                 break
@@ -107,7 +107,7 @@ def add_pairs(
     return count
 
 
-def solve(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
+def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
     """Return the step (6 K,) that removes the residual, rotations [radian] before translations; what slides freely stays.
 
     arm : length that makes rotations comparable to translations [scan unit]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fine import Fit, add_pairs, judge, solve
+from .fine import Fit, add_pairs, judge, solve_step
 from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
 from .scans import Scan
@@ -132,7 +132,7 @@ def _join(scans: list[Scan], one: Group, other: Group, pair: Pair) -> tuple[Fit,
     whole = Group(sorted(one.members + other.members), poses, turns)
     if _fit_between(scans, whole, one, other, loose=True) is None:
         return None
-    settle(scans, whole, [scan.middle for scan in scans], (2.0, 1.0), steps=4)
+    settle_poses(scans, whole, [scan.middle for scan in scans], (2.0, 1.0), steps=4)
     fit = _fit_between(scans, whole, one, other, loose=False)
     return None if fit is None else (fit, whole)
 
@@ -193,7 +193,7 @@ def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:
     return found
 
 
-def settle(
+def settle_poses(
     scans: list[Scan],
     group: Group,
     views: list[View],
@@ -260,5 +260,5 @@ def _step(
         load[q] -= sums[:6, 6]
     moves = np.zeros((count, 6))
     if count > 1:
-        moves[1:] = solve(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)
+        moves[1:] = solve_step(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)
     return moves

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .features import flip
+from .features import features_from_behind
 from .poses import make_pose, move, turn_by
 from .views import View
 
@@ -27,7 +27,7 @@ FEWEST_PAIRS = 5  # fewest pairs of a group that count
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class LikelyPose:
     """A pose that may bring a scan onto another."""
 
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
@@ -37,14 +37,14 @@ class Candidate:
 
 def find_candidates(
     first: View, second: View, first_features: np.ndarray, second_features: np.ndarray, turn: float, most: int
-) -> list[Candidate]:
+) -> list[LikelyPose]:
     """Return up to `most` different candidates, those with most support first.
 
     Parameters
     ----------
     turn : 1, or -1 if the normals of the two views are taken to face opposite sides
     """
-    features = first_features if turn > 0 else flip(first_features)
+    features = first_features if turn > 0 else features_from_behind(first_features)
     pairs = _alike(features, second_features)
     if len(pairs) < FEWEST_PAIRS:
         return []
@@ -78,14 +78,14 @@ def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return kept
 
 
-def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> list[Candidate]:
+def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> list[LikelyPose]:
     """Return the candidates that groups of agreeing pairs give."""
     p, n = first.points[pairs[:, 0]], turn * first.normals[pairs[:, 0]]
     q, m = second.points[pairs[:, 1]], second.normals[pairs[:, 1]]
     agree = _agree(p, n, q, m, first.spacing)
     shared = agree * (agree @ agree)
     weight = shared.sum(axis=1)
-    found: list[Candidate] = []
+    found: list[LikelyPose] = []
     free = np.ones(len(pairs), bool)
     for seed in np.argsort(-weight, kind="stable"):
         if len(found) >= GROUPS_KEPT or weight[seed] <= 0.0:
@@ -106,7 +106,7 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
                 break
             group = np.flatnonzero(inside)
         if inside.sum() >= FEWEST_PAIRS:
-            found.append(Candidate(pose, turn, int(inside.sum())))
+            found.append(LikelyPose(pose, turn, int(inside.sum())))
             free[inside] = False
         free[seed] = False
     return found
@@ -151,10 +151,10 @@ def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a[:, :, None] * b[:, None, :]).sum(axis=0)
 
 
-def _different(found: list[Candidate], view: View, most: int) -> list[Candidate]:
+def _different(found: list[LikelyPose], view: View, most: int) -> list[LikelyPose]:
     """Return the first `most` candidates with different poses."""
     corners = _corners(view.points)
-    kept: list[Candidate] = []
+    kept: list[LikelyPose] = []
     places: list[np.ndarray] = []
     for candidate in found:
         place = move(candidate.pose, corners)

@@ -15,7 +15,7 @@ from ...kernels.scan import blend as kernels
 from .graph import Group
 from .poses import invert, move
 from .scans import Scan
-from .views import View, boxes_of
+from .views import View, boxes_around
 
 DEEPEST_INSIDE = 20.0  # depth inside a scan beyond which it makes no difference, in spacings
 FULL_DEPTH = 6.0  # depth beyond which a layer has its full weight
@@ -42,7 +42,7 @@ def _depth(view: View) -> np.ndarray:
     boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.full(len(view.points), most)
     if len(boundary_points):
-        kernels.depths(view.points, boundary_points, boxes_of(boundary_points, 0.5 * most), most, depth)
+        kernels.depths(view.points, boundary_points, boxes_around(boundary_points, 0.5 * most), most, depth)
     return depth
 
 

@@ -24,7 +24,7 @@ from .graph import (
     fit_of,
     links_of,
     pairs_as_they_lie,
-    settle,
+    settle_poses,
 )
 from .merge import merge_scans
 from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
@@ -168,8 +168,8 @@ def _put_together(
     doubtful |= elsewhere
     if 2 * len(group.members) <= len(scans):
         raise InputError(_why_not(scans, names, groups, doubtful))
-    settle(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
-    settle(
+    settle_poses(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
+    settle_poses(
         scans, group, [scan.fine for scan in scans], (2.0, 1.0, 1.0), steps=8, few=6000,
         progress=lambda share: progress("align", share),
     )  # fmt: skip

@@ -48,12 +48,12 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     View
         Without the places that have too few neighbours to lie on a surface.
     """
-    places = thin(points, spacing)
-    neighbors = link(places, spacing)
+    places = thin_to_places(points, spacing)
+    neighbors = link_places(places, spacing)
     sound = neighbors[:, FEWEST_NEIGHBORS - 1] >= 0
     if not sound.all():
         places = np.ascontiguousarray(places[sound])
-        neighbors = link(places, spacing)
+        neighbors = link_places(places, spacing)
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
     normal_kernels.sample_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
@@ -68,14 +68,14 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
         places,
         normals_around,
         aside > BOUNDARY_OFFSET,
-        boxes_of(places, 1.5 * spacing),
+        boxes_around(places, 1.5 * spacing),
         spacing,
         noise,
         abs(_bulge(places, normals_around)),
     )
 
 
-def thin(points: np.ndarray, spacing: float) -> np.ndarray:
+def thin_to_places(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return places (S, 3) about one spacing apart: means of the points around the first of each neighbourhood."""
     owner, chosen, samples, boxes = samples_of_points(points, spacing)
     kernels_of_overlap.first_places(points, boxes, samples, spacing, owner)
@@ -86,7 +86,7 @@ def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     return mean
 
 
-def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
+def boxes_around(points: np.ndarray, size: float) -> SearchBoxes:
     """Return search boxes that hold all points (N, 3)."""
     count = len(points)
     lower, upper = (points.min(axis=0), points.max(axis=0)) if count else (np.zeros(3), np.ones(3))
@@ -95,10 +95,10 @@ def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
     return boxes
 
 
-def link(points: np.ndarray, spacing: float) -> np.ndarray:
+def link_places(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return the nearest neighbours (N, NEIGHBORS_FOR_NORMAL) of each point within a few spacings, -1 where there are fewer."""
     neighbors = np.full((len(points), NEIGHBORS_FOR_NORMAL), -1, np.int64)
-    boxes = boxes_of(points, 2.2 * spacing)
+    boxes = boxes_around(points, 2.2 * spacing)
     in_parts(
         len(points),
         3000,

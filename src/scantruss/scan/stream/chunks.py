@@ -13,9 +13,9 @@ from ...errors import FormatError
 from ...selection import Selection
 from ..formats.columns import find_attributes
 from ..formats.content import Content
-from ..formats.copc import Place
+from ..formats.copc import WantedBox
 from ..formats.kinds import reading_as
-from ..formats.las import POINTS_PER_CHUNK, check_count, fields_for, fields_of, records_near, take
+from ..formats.las import POINTS_PER_CHUNK, check_count, content_of_records, fields_for, fields_of, records_near
 from ..formats.reading import places_in_file, read_content, select
 from ..formats.text import EMPTY_LINES, NAME_IT, is_number_of_point, read_lines
 
@@ -124,18 +124,18 @@ def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Conte
             record: Any = file.read_points(expected)
             short = len(record) < expected
             begin += len(record)
-            yield tile.source.said_of(take(record, names))
+            yield tile.source.said_of(content_of_records(record, names))
     if short:
         check_count(path, tile.source.points, begin)
 
 
 def _near(source: Source, names: Sequence[str], records: Iterator[Any], unread: dict[str, int]) -> Iterator[Content]:
     for record in records:
-        yield replace(source.said_of(take(record, names)), unread=unread)
+        yield replace(source.said_of(content_of_records(record, names)), unread=unread)
         unread = {}
 
 
-def _places_of(source: Source, reading: Reading) -> list[Place]:
+def _places_of(source: Source, reading: Reading) -> list[WantedBox]:
     """Return the boxes around what is cropped in the unit of a file that may be COPC; none of others."""
     if not (source.in_one and reading.selection.crop):
         return []

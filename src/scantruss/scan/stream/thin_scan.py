@@ -12,15 +12,23 @@ from ...errors import FormatError, InputError
 from ...runtime.cluster import Workers
 from ...runtime.progress import Progress
 from ...selection import Selection
-from ..checks import extent_note, extent_of, joined
+from ..checks import extent_note, extent_of, joint_extent
 from ..formats.content import surplus_note
-from ..formats.paths import Source as Names
-from ..formats.paths import name_of_files
+from ..formats.paths import FileNames, name_of_files
 from ..formats.reading import add_counts, left_out_note
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
 from .source import Source, Tile
-from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
+from .thinning import (
+    BoxRows,
+    Nearest,
+    Thinning,
+    check_spacing,
+    means_of,
+    nearest_in,
+    nearest_of_parts,
+    points_at_boundary,
+)
 from .tiles import POINTS_PER_TILE, tiles_of
 
 KEEP_CHOICES = ("mean", "nearest")
@@ -58,7 +66,7 @@ def check_enough(thinned: Thinned, spacing: float, option: str) -> None:
 
 
 def thin_scan(
-    names: Names,
+    names: FileNames,
     spacing: float,
     *,
     keep: str = "mean",
@@ -115,11 +123,11 @@ def thin_open_scan(
         raise InputError(f"keep must be one of {' '.join(KEEP_CHOICES)}, got {keep!r}")
     workers = workers or Workers()
     sources, reading, notes = scan
-    rows, summary = _all_rows(sources, reading, spacing, boundary, workers, Share(progress, "read", sources))
+    rows, summary = _all_rows(sources, reading, spacing, boundary, workers, ShareDone(progress, "read", sources))
     if rows.points == rows.dropped:
         raise _nothing(sources, rows, summary)
     if keep == "nearest":
-        chosen = _all_nearest(sources, reading, rows, spacing, workers, Share(progress, "read again", sources))
+        chosen = _all_nearest(sources, reading, rows, spacing, workers, ShareDone(progress, "read again", sources))
     else:
         chosen = means_of(rows.rows, spacing)
     added = points_at_boundary(rows, spacing) if boundary else chosen[:0]
@@ -128,7 +136,7 @@ def thin_open_scan(
     return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
 
 
-class Share:
+class ShareDone:
     """Report the share of points that are done."""
 
     def __init__(self, progress: Progress | None, stage: str, sources: Sequence[Source]) -> None:
@@ -161,13 +169,13 @@ class ReadSummary:
         self.left_out = add_counts([self.left_out, other.left_out])
         self.notes = (*self.notes, *other.notes)
         self.promised += other.promised
-        self.extent = joined(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
+        self.extent = joint_extent(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
         self.held = self.held or other.held
 
 
 def _all_rows(
-    sources: Sequence[Source], reading: Reading, spacing: float, boundary: bool, workers: Workers, report: Share
-) -> tuple[Rows, ReadSummary]:
+    sources: Sequence[Source], reading: Reading, spacing: float, boundary: bool, workers: Workers, report: ShareDone
+) -> tuple[BoxRows, ReadSummary]:
     """Return the boxes of all points that are taken."""
     thinning = Thinning(spacing, boundary=boundary)
     summary = {source.path.absolute(): ReadSummary() for source in sources}
@@ -225,7 +233,7 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     return _Tiles(there, min(max(total // (TILES_PER_WORKER * workers.count), FEWEST_POINTS_OF_TILE), POINTS_PER_TILE))
 
 
-def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, ReadSummary]:
+def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[BoxRows, ReadSummary]:
     """Return the boxes of a tile and what its chunks tell: the work of a worker."""
     reading, spacing, boundary = shared
     thinning, summary = Thinning(spacing, boundary=boundary), ReadSummary()
@@ -236,7 +244,7 @@ def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Rea
 
 
 def _all_nearest(
-    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: Share
+    sources: Sequence[Source], reading: Reading, rows: BoxRows, spacing: float, workers: Workers, report: ShareDone
 ) -> np.ndarray:
     """Return the points nearest to the means of all boxes."""
     if workers.alone:
@@ -247,7 +255,7 @@ def _all_nearest(
                     report(chunk.read)
                     yield chunk.points
 
-        return nearest_points(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
+        return nearest_of_parts(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
     tiles = _tiles_for(sources, workers)
 
     def parts() -> Iterator[Nearest]:
@@ -255,7 +263,7 @@ def _all_nearest(
             report(tiles.taken[number].points)
             yield part
 
-    return nearest_points(len(rows.rows), parts())
+    return nearest_of_parts(len(rows.rows), parts())
 
 
 def _nearest_of(tile: Tile, shared: tuple[Reading, np.ndarray, float]) -> Nearest:
@@ -272,7 +280,7 @@ def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
     return read_chunks(tile, reading, alone=False)
 
 
-def _nothing(sources: Sequence[Source], rows: Rows, summary: ReadSummary) -> Exception:
+def _nothing(sources: Sequence[Source], rows: BoxRows, summary: ReadSummary) -> Exception:
     """Return why there is no point to keep."""
     where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
     if rows.points or not summary.read:
