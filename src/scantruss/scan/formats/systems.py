@@ -13,7 +13,7 @@ METRES_OF_CODE = {
     9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937, 9005: 0.3047972654, 9036: 1000.0, 9096: 0.9144,
     1025: 0.001, 1033: 0.01, 9070: 0.3048, 9095: 0.3048007491, 9080: 0.3047995102,
 }  # fmt: skip
-PLANE, DEGREES = 1, 2  # GTModelTypeGeoKey
+DEGREES = 2  # GTModelTypeGeoKey of longitude and latitude
 USER_DEFINED = 32767  # "user defined"
 DEEPEST_BRACKET = 60  # brackets in brackets
 _TOKEN = re.compile(r'"(?:[^"]|"")*"|[A-Za-z_][\w.]*|[-+.\d][\w.+-]*|[\[\](),]')
