@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
-from ..runtime.parallel import in_parts, processors
+from ..runtime.parallel import in_parts, processors, run_in_parts
 from .checks import (
     CAUSE,
     check_sensible,
@@ -210,11 +210,7 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     blocks = -(-len(points) // POINTS_PER_BLOCK)
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
-    in_parts(
-        blocks,
-        COORDINATES_PER_THREAD // POINTS_PER_BLOCK,
-        lambda _, begin, end: move_points(points, origin, moved, sums, begin, end),
-    )
+    run_in_parts(blocks, COORDINATES_PER_THREAD // POINTS_PER_BLOCK, move_points, points, origin, moved, sums)
     return moved, sums.sum(axis=0)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
-from ..runtime.parallel import in_parts
+from ..runtime.parallel import run_in_parts
 from ..scan.cloud import Bounds, bounds_of
 from ..scan.normals import NORMALS_PER_THREAD
 from .streamline import is_dense, streamlined
@@ -77,11 +77,7 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
         return False
     marks, least = np.empty(len(found.mean), np.bool_), float(np.cos(np.radians(uneven)))
     linked = found.mean, found.normals, found.neighbors
-    in_parts(
-        len(marks),
-        NORMALS_PER_THREAD,
-        lambda _, begin, end: normal_kernels.mark_uneven(*linked, least, marks, begin, end),
-    )
+    run_in_parts(len(marks), NORMALS_PER_THREAD, normal_kernels.mark_uneven, *linked, least, marks)
     return bool(marks.sum() <= SAMPLES_WITHOUT_ROOM_FOR_RIDGE)
 
 
@@ -145,11 +141,7 @@ def _settled(
     """Return the nearest sample of each point, the point and position of each sample, the samples by box, and their neighbours."""
     owner, chosen, places, boxes = samples_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
-    in_parts(
-        len(points),
-        LINKED_POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end),
-    )
+    run_in_parts(len(points), LINKED_POINTS_PER_THREAD, kernels.settle_points, points, places, neighbors, owner)
     return owner, chosen, places, boxes, neighbors
 
 
@@ -158,11 +150,7 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
     neighbors = np.full((len(places), LINKS_OF_A_SAMPLE), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
-    in_parts(
-        len(places),
-        NORMALS_PER_THREAD,
-        lambda _, begin, end: kernels.nearest_samples(places, boxes, near, far, neighbors, begin, end),
-    )
+    run_in_parts(len(places), NORMALS_PER_THREAD, kernels.nearest_samples, places, boxes, near, far, neighbors)
     kernels.link_back(places, neighbors)
     return neighbors
 
@@ -170,11 +158,7 @@ def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: fl
 def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal of each sample, not yet oriented, and the thickness there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
-    in_parts(
-        len(mean),
-        NORMALS_PER_THREAD,
-        lambda _, begin, end: normal_kernels.sample_normals(mean, neighbors, normals, thickness, begin, end),
-    )
+    run_in_parts(len(mean), NORMALS_PER_THREAD, normal_kernels.sample_normals, mean, neighbors, normals, thickness)
     return normals, thickness
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.geometry import kd_tree as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import in_parts, run_in_parts
 
 NEIGHBORS_OF_A_POINT = 16  # neighbours of each point
 REACH_TO = 8  # a point's reach is the distance to this one of them
@@ -30,11 +30,7 @@ class Nearby:
             np.empty((len(points), NEIGHBORS_OF_A_POINT), np.int64),
             np.empty((len(points), NEIGHBORS_OF_A_POINT)),
         )
-        in_parts(
-            len(points),
-            SEARCHES_PER_THREAD,
-            lambda _, begin, end: kernels.nearest_others(tree, neighbors, squares, begin, end),
-        )
+        run_in_parts(len(points), SEARCHES_PER_THREAD, kernels.nearest_others, tree, neighbors, squares)
         return cls(tree, neighbors, squares)
 
     @property

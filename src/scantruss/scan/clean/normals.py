@@ -8,7 +8,7 @@ import numpy as np
 
 from ...kernels.scan.normals import turn_like_beside
 from ...kernels.surface import normals as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ..normals import HEAD_ON, cut_steep_links, face_one_side, face_outside
 from .nearby import REACH_TO, SEARCHES_PER_THREAD, Nearby, build_kd_tree
 from .thinning import thin_to
@@ -52,9 +52,5 @@ def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) ->
     turned = normals.copy()
     tree = build_kd_tree(place)
     settled = np.ascontiguousarray(own[tree.ids])
-    in_parts(
-        len(points),
-        SEARCHES_PER_THREAD,
-        lambda _, begin, end: turn_like_beside(tree, settled, points, turned, NEIGHBORS_ASKED, begin, end),
-    )
+    run_in_parts(len(points), SEARCHES_PER_THREAD, turn_like_beside, tree, settled, points, turned, NEIGHBORS_ASKED)
     return OrientedNormals(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...kernels.geometry.components import component_labels
 from ...kernels.scan import outliers as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import in_parts, run_in_parts
 from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
 
 ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
@@ -128,11 +128,7 @@ def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
     if not 0 < len(thick) < MOST_OF_CLOUDS * len(which):
         return cloud
     found = np.empty(len(thick))
-    in_parts(
-        len(thick),
-        SEARCHES_PER_THREAD,
-        lambda _, begin, end: kernels.measure_bulk(near.tree, alive, thick, found, begin, end),
-    )
+    run_in_parts(len(thick), SEARCHES_PER_THREAD, kernels.measure_bulk, near.tree, alive, thick, found)
     bulk[thick] = found
     around = near.neighbors[thick]
     cloud[thick] = np.where(around >= 0, bulk[around], 0.0).mean(axis=1) > CLOUD_SHARE
@@ -159,10 +155,8 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the thickness of the points nearest to each, in radii, and its distance from their plane, in that thickness."""
     thick, aside = np.empty((2, len(which)))
-    in_parts(
-        len(which),
-        SEARCHES_PER_THREAD,
-        lambda _, begin, end: kernels.measure_planes(near.tree, which, near.neighbors, thick, aside, begin, end),
+    run_in_parts(
+        len(which), SEARCHES_PER_THREAD, kernels.measure_planes, near.tree, which, near.neighbors, thick, aside
     )
     return thick, aside
 
@@ -171,11 +165,7 @@ def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: f
     """One round of `find_outliers`, by distances."""
     neighbors = near.neighbors[which]
     low, middle = np.empty((2, len(which)))
-    in_parts(
-        len(which),
-        SEARCHES_PER_THREAD,
-        lambda _, begin, end: kernels.usual_reaches(neighbors, reach, DENSEST_AROUND, low, middle, begin, end),
-    )
+    run_in_parts(len(which), SEARCHES_PER_THREAD, kernels.usual_reaches, neighbors, reach, DENSEST_AROUND, low, middle)
     third = np.sqrt(near.squares[which, 2])
     own = reach[which]
     return (own > distance * middle) | (own > limit) | (third > LONE_DISTANCE * distance * low)

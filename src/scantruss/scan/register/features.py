@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...kernels.scan import features as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from .views import View
 
 ANGLE_BINS = 11
@@ -56,17 +56,7 @@ def _histograms(view: View, edges: np.ndarray) -> np.ndarray:
     reach, count = FEATURE_REACH * view.spacing, len(view.points)
     plain = np.zeros((count, 6 * ANGLE_BINS))
     mixed = np.zeros_like(plain)
-    in_parts(
-        count,
-        300,
-        lambda _, begin, end: kernels.point_histograms(
-            view.points, view.normals, view.boxes, reach, edges, plain, begin, end
-        ),
-    )
-    in_parts(
-        count,
-        300,
-        lambda _, begin, end: kernels.mix_histograms(view.points, view.boxes, reach, plain, mixed, begin, end),
-    )
+    run_in_parts(count, 300, kernels.point_histograms, view.points, view.normals, view.boxes, reach, edges, plain)
+    run_in_parts(count, 300, kernels.mix_histograms, view.points, view.boxes, reach, plain, mixed)
     # roots weigh rare values as much as frequent ones; whole numbers up to FEATURE_STEPS can be multiplied and added exactly in float32
     return np.round(FEATURE_STEPS * np.sqrt(mixed)).astype(np.float32)

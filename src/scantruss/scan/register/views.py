@@ -10,7 +10,7 @@ from ...kernels.geometry.boxes import SearchBoxes, new_boxes
 from ...kernels.scan import overlap as kernels_of_overlap
 from ...kernels.surface import normals as normal_kernels
 from ...kernels.surface import samples as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ...surface.linked_samples import samples_of_points
 from ..normals import face_one_side, mean_normals
 
@@ -99,13 +99,7 @@ def link_places(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return the nearest neighbours (N, NEIGHBORS_FOR_NORMAL) of each point within a few spacings, -1 where there are fewer."""
     neighbors = np.full((len(points), NEIGHBORS_FOR_NORMAL), -1, np.int64)
     boxes = boxes_around(points, 2.2 * spacing)
-    in_parts(
-        len(points),
-        3000,
-        lambda _, begin, end: kernels.nearest_samples(
-            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, begin, end
-        ),
-    )
+    run_in_parts(len(points), 3000, kernels.nearest_samples, points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors)
     far = 3.3 * spacing  # the kernel searches farther if there are few; here those are outliers
     off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
     neighbors[off] = -1

@@ -25,7 +25,7 @@ from ...kernels.scan.thinning import (
     middles,
     take_nearest,
 )
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ..checks import CAUSE
 
 FIRST_ROWS = 4096  # rows of a new table
@@ -173,11 +173,7 @@ def points_at_boundary(rows: BoxRows, spacing: float) -> np.ndarray:
     counters = np.array([len(rows.rows), 0, 0])
     table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counters)
     means = means_of(rows.rows, spacing)
-    in_parts(
-        len(kept),
-        BOXES_PER_THREAD,
-        lambda _, begin, end: choose_boundary_points(table, means, spacing, kept, begin, end),
-    )
+    run_in_parts(len(kept), BOXES_PER_THREAD, choose_boundary_points, table, means, spacing, kept)
     several = rows.rows[:, 3] > 1  # a single point is its own mean
     return np.unique(rows.extremes.reshape(-1, 6, 3)[kept.astype(bool) & several[:, None]], axis=0)
 
