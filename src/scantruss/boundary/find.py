@@ -141,11 +141,8 @@ def find_boundary(
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
-        kept = _KEPT[samples] = (
-            settings,
-            filled if filled is not samples else None,
-            boundary,
-        )  # the value must not keep its key alive
+        # the value must not keep its key alive
+        kept = _KEPT[samples] = (settings, filled if filled is not samples else None, boundary)
     if progress:
         progress("boundary", 1.0)
     return kept[1] or samples, kept[2]

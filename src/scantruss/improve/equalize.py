@@ -26,11 +26,8 @@ from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
 LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
-LAST_LENGTH_WEIGHT = {
-    "balance": 3.0,
-    "lengths": 8.0,
-    "shapes": 0.5,
-}  # the same in the last sweeps, for each value of `prefer`
+# the same in the last sweeps, for each value of `prefer`
+LAST_LENGTH_WEIGHT = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
 LAST_SWEEPS = (12, 6)  # most sweeps in each of the last rounds; patches are fitted again before each round
 LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
 MEAN_LENGTH_WEIGHT = 24.0  # energy per node of a mean length off the desired one, per square of its relative error

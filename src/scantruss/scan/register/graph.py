@@ -46,9 +46,8 @@ def assemble(
     """
     group_of = {i: Group([i], {i: np.eye(4)}, {i: 1.0}) for i in range(len(scans))}
     waiting = sorted(pairs, key=lambda pair: (-pair.fit.score, pair.first, pair.second))
-    tried: dict[
-        tuple[int, ...], bool
-    ] = {}  # pairs of groups that could not be joined, and whether because of too many ways
+    # pairs of groups that could not be joined, and whether because of too many ways
+    tried: dict[tuple[int, ...], bool] = {}
     at = 0
     while at < len(waiting):
         progress("assemble", 1.0 - len({id(group) for group in group_of.values()}) / len(scans))

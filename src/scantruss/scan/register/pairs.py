@@ -88,9 +88,8 @@ def find_pair(
     """
     one, other = scans[first], scans[second]
     found: list[Pair] = []
-    sure = (
-        not thorough and min(one.coarse.bulge, other.coarse.bulge) > SURE_SIDE
-    )  # then the normals of both face outside
+    # then the normals of both face outside
+    sure = not thorough and min(one.coarse.bulge, other.coarse.bulge) > SURE_SIDE
     for turn in (1.0,) if sure else (1.0, -1.0):
         candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, POSES_JUDGED)
         poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:POSES_ALIGNED]
