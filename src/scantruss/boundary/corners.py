@@ -34,10 +34,8 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     Parameters
     ----------
     curve : (M, 3) closed curve of steps `CURVE_STEP * length`
-    settings : Settings
-        `corner_angle`, `length`.
-    coarser : float
-        Factor on the lengths of curve that are examined; larger where points are sparse.
+    settings : `corner_angle`, `length`
+    coarser : factor on the lengths of curve that are examined; larger where points are sparse
 
     Returns
     -------

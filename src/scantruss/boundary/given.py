@@ -88,8 +88,7 @@ def cut_along(
     samples : SurfaceSamples
     scanned : sequence of ((M, 3), int)
         The boundary loops of the scan and their pieces, the longest of each piece first. Those inside that are not given are closed.
-    settings : Settings
-        `boundary`, `length`, `corner_angle`.
+    settings : `boundary`, `length`, `corner_angle`
 
     Raises
     ------

@@ -90,10 +90,8 @@ def put_on_lattice(solid: Solid, rounds: int = ROUNDS_OF_MOVING) -> tuple[np.nda
 
     Parameters
     ----------
-    solid : Solid
-        What to write.
-    rounds : int
-        How often those that coincide are moved apart.
+    solid : what to write
+    rounds : how often those that coincide are moved apart
 
     Returns
     -------

@@ -62,10 +62,8 @@ def open_workers(count: int | None = None, scheduler: str = "") -> Workers:
 
     Parameters
     ----------
-    count : int, optional
-        Processes on this machine; the number of processors by default.
-    scheduler : str
-        Address of the scheduler of a running Dask cluster, for example ``tcp://10.0.0.5:8786``.
+    count : processes on this machine; the number of processors by default; optional
+    scheduler : address of the scheduler of a running Dask cluster, for example ``tcp://10.0.0.5:8786``
 
     Raises
     ------

@@ -111,8 +111,7 @@ def kernel(function: F) -> F:
 
     Parameters
     ----------
-    function : callable
-        A loop over arrays, numbers and NamedTuples of arrays.
+    function : a loop over arrays, numbers and NamedTuples of arrays
 
     Returns
     -------

@@ -101,8 +101,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     points : (N, 3) float64 array
         Finite.
     lower, upper : their smallest and largest coordinates
-    said : str
-        Start of the message.
+    said : start of the message
 
     Raises
     ------

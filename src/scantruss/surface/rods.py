@@ -25,12 +25,9 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
 
     Parameters
     ----------
-    found : Linked
-        The samples of the points.
-    points : int
-        How many points there are.
-    length : float
-        Desired member length [scan unit].
+    found : the samples of the points
+    points : how many points there are
+    length : desired member length [scan unit]
     supports : (S,) bool, optional
         Samples that are known for supports, though they are no thinner than a member.
     """

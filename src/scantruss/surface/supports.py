@@ -22,10 +22,8 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
 
     Parameters
     ----------
-    found : Linked
-        The samples, z upwards.
-    length : float
-        Desired member length [scan unit].
+    found : the samples, z upwards
+    length : desired member length [scan unit]
     """
     mean, none = found.mean, np.zeros(len(found.mean), np.bool_)
     under = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length

@@ -79,8 +79,7 @@ def project_nodes(
 
     Parameters
     ----------
-    fine, middle, broad : Surface
-        The same scan with narrow patches, which follow it, and with wider ones, which average out its noise.
+    fine, middle, broad : the same scan with narrow patches, which follow it, and with wider ones, which average out its noise
     patches : (C, PATCH_COLUMNS) patches of the nodes, replaced
     fixed : (C,) bool, nodes that are not moved
     deviation : (C,), filled with the distance of each node from a narrow patch fitted at its place or close by [scan unit]

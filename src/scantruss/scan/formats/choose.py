@@ -52,10 +52,8 @@ def choose(
     ----------
     points : (N, 3) array
         In the scan's own frame.
-    attributes : mapping
-        (N,) arrays, all that `Selection.needs` names.
-    selection : Selection
-        What to take.
+    attributes : (N,) arrays, all that `Selection.needs` names
+    selection : what to take
     """
     kept = np.ones(len(points), dtype=bool)
     left_out: dict[str, int] = {}

@@ -60,12 +60,9 @@ def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[
 
     Parameters
     ----------
-    names : sequence of str
-        Words of a header line.
-    width : int
-        Fields of a row.
-    has_row_names : bool
-        Whether the first field of the rows is a label or a running number, which a header may leave out.
+    names : words of a header line
+    width : fields of a row
+    has_row_names : whether the first field of the rows is a label or a running number, which a header may leave out
     """
     if len(names) > width:
         return find_columns(names[-width:])  # "columns: x y z"

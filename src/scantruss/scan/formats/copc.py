@@ -143,8 +143,7 @@ def read_boxes(path: Path, header: Any, boxes: Boxes, rows: np.ndarray, most: in
         A COPC file.
     rows : (R,) int64 array
         Numbers of boxes; the points come in their order.
-    most : int
-        Most points in memory at once; at least one box.
+    most : most points in memory at once; at least one box
     fields
         What is unpacked, as lazrs says it.
 

@@ -103,16 +103,11 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
 
     Parameters
     ----------
-    path : Path
-        For messages.
-    block : bytes
-        Whole lines, UTF-8 where the file is UTF-16.
-    layout : Layout
-        Separator and decimal sign.
-    columns : sequence of int
-        Wanted fields, those of the attributes last.
-    begin : int
-        Byte of the file at which they begin.
+    path : for messages
+    block : whole lines, UTF-8 where the file is UTF-16
+    layout : separator and decimal sign
+    columns : wanted fields, those of the attributes last
+    begin : byte of the file at which they begin
 
     Raises
     ------

@@ -87,16 +87,12 @@ def splice_scans(
 
     Parameters
     ----------
-    clouds : sequence of PointCloud
-        Scans in frames of their own, in one unit, in any order.
-    names : sequence of str, optional
-        Their names, all different; by default those of the clouds.
+    clouds : scans in frames of their own, in one unit, in any order
+    names : their names, all different; by default those of the clouds; optional
     poses : mapping of str to (4, 4) array, optional
         Poses by name to start from, for all scans or some.
-    use_poses : bool
-        Take these poses as they are; all scans need one then.
-    progress : callable
-        Called with the stage and its share done, 0 to 1.
+    use_poses : take these poses as they are; all scans need one then
+    progress : called with the stage and its share done, 0 to 1
 
     Returns
     -------

@@ -56,14 +56,10 @@ def read_chunks(
 
     Parameters
     ----------
-    tile : Tile
-        A part of a file.
-    reading : Reading, optional
-        Unit and selection; all points in the file's own unit by default.
-    size : int
-        Most points of a chunk, where the file can be read in chunks.
-    alone : bool
-        No other tile is read at the same time, so that a reader may use all processors.
+    tile : a part of a file
+    reading : unit and selection; all points in the file's own unit by default; optional
+    size : most points of a chunk, where the file can be read in chunks
+    alone : no other tile is read at the same time, so that a reader may use all processors
 
     Raises
     ------

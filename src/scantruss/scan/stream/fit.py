@@ -41,12 +41,9 @@ def spacing_to_fit(names: FileNames, settings: Settings, memory: float | None = 
 
     Parameters
     ----------
-    names : str, Path or several of them
-        Files or patterns.
-    settings : Settings
-        The desired length, and the spacing if one was chosen.
-    memory : float, optional
-        Bytes that the scan may take; half of what is available by default.
+    names : files or patterns
+    settings : the desired length, and the spacing if one was chosen
+    memory : bytes that the scan may take; half of what is available by default; optional
     """
     if settings.thin_spacing is not None:
         return float(settings.thin_spacing)

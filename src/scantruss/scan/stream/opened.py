@@ -31,12 +31,9 @@ def open_scan(names: FileNames, unit: str = "", selection: Selection | None = No
 
     Parameters
     ----------
-    names : str, Path or several of them
-        Files or patterns.
-    unit : str
-        The unit given by the user.
-    selection : Selection, optional
-        Which points are taken; all by default.
+    names : files or patterns
+    unit : the unit given by the user
+    selection : which points are taken; all by default; optional
     """
     check_unit(unit)
     selection = selection or Selection()

@@ -82,20 +82,14 @@ def thin_scan(
 
     Parameters
     ----------
-    names : str, Path or several of them
-        Files, or patterns as ``tiles/*.laz``; all in one frame.
-    spacing : float
-        Side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame.
-    keep : str
-        "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
-    boundary : bool
-        Also keep the outermost points of boxes at the boundary.
+    names : files, or patterns as ``tiles/*.laz``; all in one frame
+    spacing : side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame
+    keep : "mean" of the points in a box, or the one "nearest" to it (the scan is read twice)
+    boundary : also keep the outermost points of boxes at the boundary
     unit, selection
         As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
-    workers : Workers, optional
-        The workers to use; this process by default.
-    progress : callable, optional
-        ``progress(stage, share)``.
+    workers : the workers to use; this process by default; optional
+    progress : ``progress(stage, share)``; optional
 
     Raises
     ------

@@ -133,12 +133,9 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", bound
     ----------
     points : (N, 3) array [scan unit]
         In the frame whose zero is a corner of the boxes.
-    spacing : float
-        Side of a box [scan unit].
-    keep : str
-        "mean" of the points in a box, or the one "nearest" to it.
-    boundary : bool
-        Also keep the outermost points of boxes at the boundary.
+    spacing : side of a box [scan unit]
+    keep : "mean" of the points in a box, or the one "nearest" to it
+    boundary : also keep the outermost points of boxes at the boundary
     """
     thinning = Thinning(spacing, boundary=boundary)
     thinning.add(points)
@@ -187,8 +184,7 @@ def nearest_in(chunks: Iterable[np.ndarray], rows: np.ndarray, spacing: float) -
         The part.
     rows : (C, 7) int64 array
         All boxes of the whole scan.
-    spacing : float
-        Side of a box [scan unit].
+    spacing : side of a box [scan unit]
     """
     best = np.full((len(rows), 4), np.inf)
     slots, means = _filled_slots(rows), means_of(rows, spacing)
