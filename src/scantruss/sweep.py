@@ -1,4 +1,4 @@
-"""Grids of one scan by many settings, for choosing a design: made side by side, told in a table and in pictures."""
+"""Grids of one scan by many settings, for choosing a design: made side by side, shown in a table and in pictures."""
 
 from __future__ import annotations
 

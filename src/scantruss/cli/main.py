@@ -100,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 sys.stdout.flush()
             except BaseException as error:
                 return end(error)
-    except KeyboardInterrupt as error:  # while another end was told of
+    except KeyboardInterrupt as error:  # while another end was reported
         return end(error)
     return 0
 

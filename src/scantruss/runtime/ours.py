@@ -1,4 +1,4 @@
-"""Whether a file was written by ScanTruss, told by its content: only such a file is written over without being asked for."""
+"""Whether a file was written by ScanTruss, judged by its content: only such a file is written over without being asked for."""
 
 from __future__ import annotations
 

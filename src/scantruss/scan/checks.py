@@ -14,11 +14,11 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from .cloud import PointCloud
 
-POINTS_OF_EXTENT = 10_000  # points from which the place of a file is told
-POINTS_OF_BULK = 100_000  # points from which the place of most of a scan is told
+POINTS_OF_EXTENT = 10_000  # points from which the extent of a file is measured
+POINTS_OF_BULK = 100_000  # points from which the bulk of a scan is measured
 FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is an outlier
 BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which the bulk lies
-POINTS_OF_MIDDLE = 2_000  # points from which the place of the middle half is told
+POINTS_OF_MIDDLE = 2_000  # points from which the middle half of a scan is measured
 FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
 RASTER_COLUMNS = 4.0  # most different x of a raster, in square roots of its number of points

@@ -62,7 +62,7 @@ class PointCloud:
 
     @property
     def z_is_up(self) -> bool:
-        """Whether z certainly points upwards: in surveys of buildings and terrain, told by their unit or file."""
+        """Whether z certainly points upwards: in surveys of buildings and terrain, judged by their unit or file."""
         return self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES)
 
     @property

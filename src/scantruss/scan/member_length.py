@@ -9,7 +9,7 @@ from ..errors import InputError, LengthError
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud, measure_gap
 
-LEAST_SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be told from a gap
+LEAST_SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be distinguished from a gap
 RANDOM_GAPS = (
     1.75  # a member needs this many distances to the sixth neighbour, which for random points is more than the spacings
 )

@@ -1,4 +1,4 @@
-"""Supports: columns and legs as thick as a member between a shell and a level floor, told by where they stand."""
+"""Supports: columns and legs as thick as a member between a shell and a level floor, recognized by where they stand."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ Places = Callable[[Content], list[WantedBox]]  # by the units that a file states
 
 
 def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
-    """Return the points of a LAS or LAZ file and the wanted attributes; of a COPC file those near some places, where they are told."""
+    """Return the points of a LAS or LAZ file and the wanted attributes; of a COPC file those near some places, where they are given."""
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")

@@ -1,4 +1,4 @@
-"""Fine alignment: generalized ICP of one scan onto another, and how a right pose is told from a wrong one."""
+"""Fine alignment: generalized ICP of one scan onto another, and how a right pose differs from a wrong one."""
 
 from __future__ import annotations
 
