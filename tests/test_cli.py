@@ -68,7 +68,7 @@ def ready(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same, with a finished grid in place of the long work."""
     for command in (grid, demo):
         monkeypatch.setattr(command, "read_scan", lambda *_: PointCloud.from_array(plate()))
-        monkeypatch.setattr(command, "make_grid", lambda *_, **__: hexagon())
+        monkeypatch.setattr(command, "grid_with_notes", lambda *_, **__: hexagon())
     return place
 
 
