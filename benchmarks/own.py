@@ -27,7 +27,7 @@ JOBS = (  # cloud, efforts, rounds
 TOLERANCE = 0.25  #: a time may grow by this share; two runs of the same code differed by up to 15 % on a shared machine
 WORSE = {  # figure: by how much it may get worse, and its sign when more is better
     "shape_mean": (0.0005, 1), "shape_std": (0.001, -1), "cv": (0.001, -1), "angle_min": (3.0, 1), "valence6": (0.01, 1),
-    "deviation": (0.0005, -1), "deviation_max": (0.01, -1), "rim": (0.02, -1), "uncovered": (0.001, -1), "right": (0.0, 1),
+    "deviation": (0.0005, -1), "deviation_max": (0.01, -1), "boundary": (0.02, -1), "uncovered": (0.001, -1), "right": (0.0, 1),
 }  # fmt: skip
 
 

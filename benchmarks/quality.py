@@ -50,7 +50,7 @@ class Example:
         f = self.found
         return (
             f"| {self.name} | {self.method} | {f.shape_mean:.3f} | {f.shape_std:.3f} | {f.cv:.3f} | {f.length:.3f} |"
-            f" {f.valence6:.2f} | {f.rim:.2f} | {f.distance:.2f} | {f.nodes} |"
+            f" {f.valence6:.2f} | {f.boundary:.2f} | {f.distance:.2f} | {f.nodes} |"
         )
 
 

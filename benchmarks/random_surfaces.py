@@ -104,15 +104,15 @@ def row(name: str, outcomes: list[Outcome]) -> str:
     start = f"| {name} | {len(outcomes)} | {count['right']} | {count['wrong']} | {count['refused']} |"
     if not found:
         return start + " |" * 8
-    shape, cv, length, rim = (
-        np.array([getattr(f, key) for f in found]) for key in ("shape_mean", "cv", "length", "rim")
+    shape, cv, length, boundary = (
+        np.array([getattr(f, key) for f in found]) for key in ("shape_mean", "cv", "length", "boundary")
     )
     noisy = np.array([f.distance for f in found if f.distance_in == "noise"] or [np.nan])
     return (
         f"{start} {shape.mean():.4f}, {shape.min():.4f} | {min(f.shape_min for f in found):.2f} |"
         f" {cv.mean():.4f}, {cv.max():.4f} | {min(f.angle_min for f in found):.0f}-{max(f.angle_max for f in found):.0f} |"
         f" {np.mean([f.valence6 for f in found]):.2f} | {length.min():.3f}-{length.max():.3f} |"
-        f" {noisy.mean():.2f}, {noisy.max():.2f} | {rim.mean():.2f}, {rim.max():.2f} |"
+        f" {noisy.mean():.2f}, {noisy.max():.2f} | {boundary.mean():.2f}, {boundary.max():.2f} |"
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from shapes import Shape, make
 
 import scantruss as st
-from scantruss.runtime.jit import INSTALLED
+from scantruss.runtime.jit import INSTALLED_FOLDER
 
 from .page import Section
 from .peers.child import neighbour_search
@@ -140,7 +140,9 @@ def first_runs(rounds: int) -> list[Ratio]:
                 aim=8.0,
             )
 
-        found = "installed with its machine code" if INSTALLED else "installed without machine code of these kernels"
+        found = (
+            "installed with its machine code" if INSTALLED_FOLDER else "installed without machine code of these kernels"
+        )
         return [
             against_warm(f"the first run ever of `scantruss grid`, {found}", True),
             against_warm("the first run of `scantruss grid` that compiles all", False),

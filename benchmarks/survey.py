@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 import scantruss as st
-from scantruss.check.limits import NOISE
+from scantruss.check.limits import NOISES_OFF
 from scantruss.cli.main import main as scantruss_main
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 
@@ -116,7 +116,7 @@ def objections(row: dict[str, Any]) -> list[str]:
         return [f"not checked: {other.get('error', '')}"] if other else []
     off = min(other["node_dev_max"], other["node_off_least"])
     room = (
-        FARTHEST * length + NOISE * found["noise"] + other["spacing"]
+        FARTHEST * length + NOISES_OFF * found["noise"] + other["spacing"]
     )  # at an edge no plane fits, and points stand apart
     said_out = sum(part["share"] for part in found["left_out"] if part["kind"] != "far")  # outliers, a floor, no data
     limits = (

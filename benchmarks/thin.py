@@ -34,12 +34,12 @@ from scantruss.scan.stream.thinning import thin_points
 from scantruss.runtime.cluster import open_workers
 import numpy as np
 if __name__ == "__main__":
-    name, spacing, workers, keep, rim = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5] == "rim"
+    name, spacing, workers, keep, boundary = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5] == "boundary"
     for way in ("mean", "nearest"):
         thin_points(np.eye(3), 1.0, keep=way, boundary=True)  # compiled beforehand
     with open_workers(workers) as crew:
         begun = time.perf_counter()
-        found = thin_scan([name], spacing, keep=keep, boundary=rim, workers=crew)
+        found = thin_scan([name], spacing, keep=keep, boundary=boundary, workers=crew)
         spent = time.perf_counter() - begun
     np.save(sys.argv[6], found.points)
     print(found.read, len(found.points), spent, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
@@ -101,7 +101,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "scantruss-thin")
     parser.add_argument("--suffix", nargs="+", default=[".laz", ".ply"])
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--keep", nargs="+", default=["mean", "nearest", "rim"])
+    parser.add_argument("--keep", nargs="+", default=["mean", "nearest", "boundary"])
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     print("file | way | spacing | workers | seconds | M points/s | boxes | MB | digest")
@@ -117,7 +117,7 @@ def main() -> None:
             for keep in options.keep:
                 for workers in options.workers:
                     out = options.folder / "thinned.npy"
-                    way = ("mean", "rim") if keep == "rim" else (keep, "")
+                    way = ("mean", "boundary") if keep == "boundary" else (keep, "")
                     count, boxes, spent, memory = run(THIN, path, spacing, workers, *way, out)
                     digest = hashlib.sha256(out.read_bytes()).hexdigest()[:8]
                     print(

@@ -14,8 +14,8 @@ def main(folder: Path = Path()) -> st.Grid:
     np.savetxt(scan, make("stadium", 60_000).points, fmt="%.4f")
     cloud = st.read_points(scan, unit="mm")
     grid = st.grid_from_scan(scan, st.Settings(length=3.9, unit="mm"))
-    rims = [len(loop) for loop in grid.boundary_loops]
-    print(f"{len(grid.nodes)} nodes, rims of {rims} members, {grid.quality}")
+    loops = [len(loop) for loop in grid.boundary_loops]
+    print(f"{len(grid.nodes)} nodes, boundaries of {loops} members, {grid.quality}")
     st.write(grid, folder / "stadium.png", cloud=cloud)
     return grid
 

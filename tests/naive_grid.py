@@ -8,6 +8,8 @@ from itertools import combinations
 import numpy as np
 
 from scantruss import Grid
+from scantruss.grid.quality import shape_qualities
+from scantruss.improve.equalize import LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT
 
 
 def shape(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
@@ -83,3 +85,11 @@ def nearest_on_polyline(points: np.ndarray, place: np.ndarray, samples: int = 20
     t = np.linspace(0, 1, samples)[:, None]
     nxt = np.roll(points, -1, axis=0)
     return min(np.linalg.norm(a + t * (b - a) - place, axis=1).min() for a, b in zip(points, nxt, strict=True))
+
+
+def grid_energy(grid: Grid, length: float) -> float:
+    """Return the energy of a whole grid, without folded members."""
+    stretch = grid.stretches(length) - 1.0
+    shapes = shape_qualities(grid.nodes, grid.triangles)
+    price = MEAN_LENGTH_WEIGHT * len(grid.nodes) * float(stretch.mean()) ** 2
+    return LENGTH_WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price

@@ -9,7 +9,7 @@ from scantruss import PointCloud, Settings
 from scantruss.front.advance import new_front
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.fits import near_nodes
-from scantruss.kernels.surface.local_surface import PATCH
+from scantruss.kernels.surface.local_surface import PATCH_COLUMNS
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 
@@ -105,7 +105,7 @@ class HandFront:
         self.surface = self.samples.surface
         self.front = new_front(self.samples, self.settings)
         self.rules = rules_of(self.settings, self.samples.spacing)
-        self.found, self.patch = np.empty(lists.MOST_NEAR_NODES, np.int64), np.zeros(PATCH)
+        self.found, self.patch = np.empty(lists.MOST_NEAR_NODES, np.int64), np.zeros(PATCH_COLUMNS)
         self.segments = []
         for i, loop in enumerate(loops):
             ids = [self.add_node(*place, boundary=True) for place in loop]

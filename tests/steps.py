@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from textwrap import dedent
 from typing import Any, NamedTuple
 
 from typed import known
@@ -30,6 +32,12 @@ class Steps(NamedTuple):
     samples: SurfaceSamples
     boundary: Boundary
     constraints: Constraints
+
+
+def lines_of_readme() -> str:
+    """Return the lines of Python that the README shows, step by step."""
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    return dedent(readme.partition("in Python, step by step:\n")[2].partition("\nor in one call:")[0])
 
 
 def steps_of(cloud: PointCloud, settings: Settings) -> Steps:

@@ -54,7 +54,7 @@ def row(way: str, seconds: float = 1.0, right: bool = True, cloud: Cloud = CLOUD
         "done",
         "",
         {"seconds": seconds, "search": 1.0},
-        {**known, "shape_mean": 0.99, "cv": 0.05, "rim": 0.1, **found},
+        {**known, "shape_mean": 0.99, "cv": 0.05, "boundary": 0.1, **found},
     )
 
 
@@ -70,7 +70,7 @@ def test_a_net_of_right_triangles_has_the_figures_known_by_hand() -> None:
     assert found.cv == pytest.approx(spread / mean)
     assert (
         found.deviation == pytest.approx(0, abs=1e-12)
-        and found.rim == pytest.approx(0, abs=1 / 200)
+        and found.boundary == pytest.approx(0, abs=1 / 200)
         and found.uncovered == 0
     )
 
@@ -80,7 +80,7 @@ def test_a_net_that_lies_off_is_seen_in_deviation_rim_and_cover() -> None:
     nodes, triangles = plate_net(20, 20, ((-30.0, -20.0), (10.0, 20.0)))  # ends 20 before the rim of x = 30
     found = figures.figures(shape, nodes + [0, 0, 0.5], triangles)
     assert found.deviation == pytest.approx(0.25) and found.deviation_max == pytest.approx(0.25)
-    assert found.rim == pytest.approx(np.hypot(20, 0.5) / 2, rel=1e-3)
+    assert found.boundary == pytest.approx(np.hypot(20, 0.5) / 2, rel=1e-3)
     assert found.uncovered == pytest.approx((20 - np.sqrt(1 - 0.25)) / 60, abs=0.01)
 
 
@@ -192,7 +192,7 @@ def test_losses_name_the_way_that_is_better_and_only_where_it_is_right() -> None
     rows = [
         row("ScanTruss quick", 1.0),
         row("ScanTruss normal", 2.0),
-        row("fast", 0.5, rim=0.6),
+        row("fast", 0.5, boundary=0.6),
         row("wrong", 0.1, right=False),
     ]
     lost = tables.losses(rows)

@@ -2,21 +2,23 @@
 
 from collections.abc import Callable
 from itertools import pairwise, product
+from pathlib import Path
 from typing import Any, Never
 
+import naive_grid as naive
 import numpy as np
 import pytest
 from shapes import Shape, make
 from small_clouds import cap, sheet
-from steps import steps_of
+from steps import lines_of_readme, steps_of
 from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.candidates import LENGTHS, attempts
 from scantruss.errors import CertificateError, FrontError
-from scantruss.improve.equalize import grid_energy
 from scantruss.improve.optimize import improve_last
+from scantruss.scan.formats.writing import write_points
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +136,7 @@ def test_more_effort_leaves_less_energy() -> None:
         for name, seed in product(("scallop", "l_plate", "two_holes"), range(4)):
             shape = make(name, 20_000, seed=seed)
             grid = grid_of(shape, effort)
-            shares.append(grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
+            shares.append(naive.grid_energy(grid, 1.4 * shape.length) / len(grid.nodes))
         energies.append(np.array(shares))
     for less, more in pairwise(energies):
         gained = less - more
@@ -177,18 +179,17 @@ def test_progress_grows_to_the_end(shape: Shape) -> None:
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal", "best"])
-def test_the_steps_taken_one_by_one_give_the_grid_of_the_one_call(shape: Shape, effort: str) -> None:
-    """As the README shows them: the same bytes, the certificate included."""
-    place = tuple(shape.points[7])
-    cloud = st.PointCloud.from_array(shape.points)
-    settings = st.Settings(length=1.4 * shape.length, effort=effort, fixed=(place,))
-    surface = st.sample_surface(cloud, settings)
-    surface, boundary = st.find_boundary(surface, settings)
-    boundary, constraints = st.find_constraints(surface, boundary, settings)
-    fields = st.orientation_fields(surface, boundary, settings)
-    fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
-    grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)
-    whole = st.grid_from_points(shape.points, settings)
+def test_the_steps_that_the_readme_shows_give_the_grid_of_the_one_call(
+    shape: Shape, effort: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same bytes, the certificate included."""
+    monkeypatch.chdir(tmp_path)
+    write_points("shell.ply", shape.points, unit="mm")
+    own = {"length": 1.4 * shape.length, "effort": effort, "fixed": [tuple(shape.points[7])], "unit": "mm"}
+    names: dict[str, Any] = {"own": own}
+    exec(lines_of_readme().replace("length=4.7, fixed=[(0, 0, 12)]", "**own"), names)
+    grid, whole = names["grid"], st.grid_from_points(shape.points, names["settings"])
+    assert len(names["constraints"].positions) == 1 and len(Path("grid.obj").read_bytes()) > 10_000
     assert grid.nodes.tobytes() == whole.nodes.tobytes() and grid.triangles.tobytes() == whole.triangles.tobytes()
     assert grid.certificate == whole.certificate and known(grid.certificate).passed
 

@@ -68,7 +68,7 @@ def ready(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The same, with a finished grid in place of the long work."""
     for command in (grid, demo):
         monkeypatch.setattr(command, "read_scan", lambda *_: PointCloud.from_array(plate()))
-        monkeypatch.setattr(command, "make_grid", lambda *_, **__: hexagon())
+        monkeypatch.setattr(command, "grid_with_notes", lambda *_, **__: hexagon())
     return place
 
 
@@ -579,7 +579,7 @@ def test_a_fault_of_ours_is_one_line_too(
     ready: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("SCANTRUSS_TRACEBACK")
-    monkeypatch.setattr(grid, "make_grid", lambda *_, **__: 1 // 0)
+    monkeypatch.setattr(grid, "grid_with_notes", lambda *_, **__: 1 // 0)
     assert "ZeroDivisionError" in refused(capsys, "grid", "scan.xyz", "a.obj", "--length", LENGTH, status=1)
 
 

@@ -21,7 +21,7 @@ from jobs import Deadly, add, die, leave_once, refuse
 
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.runtime import cluster as module
-from scantruss.runtime.cluster import AHEAD, Cluster, Processes, Workers, open_workers
+from scantruss.runtime.cluster import JOBS_PER_WORKER, Cluster, Processes, Workers, open_workers
 from scantruss.scan.stream import thin_scan
 
 
@@ -89,7 +89,7 @@ def test_at_most_two_jobs_a_process_are_asked_for_ahead_of_their_results() -> No
 
     with Processes(2) as crew:
         for done, _ in enumerate(crew.run(add, jobs(), 1), 1):
-            assert len(taken) < done + AHEAD * crew.count
+            assert len(taken) < done + JOBS_PER_WORKER * crew.count
     assert taken == list(range(20))
 
 
@@ -116,7 +116,7 @@ def test_a_cluster_of_another_version_is_refused(address: str, monkeypatch: pyte
 @pytest.mark.parametrize("scheduler", ["tcp://127.0.0.1:1", "nonsense://"])
 def test_a_scheduler_that_does_not_answer_is_refused(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(module, "PATIENCE", 0.3)
+    monkeypatch.setattr(module, "SECONDS_TO_ANSWER", 0.3)
     with pytest.raises(InputError, match="no scheduler answers"):
         Cluster(scheduler)
 
@@ -237,7 +237,7 @@ def test_more_workers_than_a_machine_can_feed_are_refused_before_one_starts() ->
 def test_the_thinned_scan_is_the_same_to_the_byte_on_a_cluster(
     keep: str, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(thin_scan, "SMALLEST", 70)
+    monkeypatch.setattr(thin_scan, "FEWEST_POINTS_OF_TILE", 70)
     points = np.random.default_rng(4).uniform(0, 9, (1000, 3))
     np.save(tmp_path / "one.npy", points[:600])
     np.savetxt(tmp_path / "two.xyz", points[600:])

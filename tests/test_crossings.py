@@ -149,7 +149,7 @@ def test_many_cuts_stop_the_count() -> None:
 def test_more_pairs_than_there_is_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = jittered(dome(7), 1, 0.5)
     many = find_crossings(grid.nodes, grid.triangles)
-    monkeypatch.setattr(crossings, "ROOM", 1)
+    monkeypatch.setattr(crossings, "ROOM_FOR_PAIRS", 1)
     assert len(many) > 3 and np.array_equal(find_crossings(grid.nodes, grid.triangles), many)
 
 

@@ -1,6 +1,7 @@
 """The documentation: what it names exists, and its commands are understood."""
 
 import importlib
+import inspect
 import re
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,37 @@ def test_what_a_page_names_exists(page: str) -> None:
     assert [name for name in sorted(names) if not exists(name)] == []
     for path in re.findall(r"`((?:\w+/)+\w+\.py)`", text):
         assert (SOURCE / path).exists() or (DOCS.parent / path).exists(), path
+
+
+def test_what_computes_an_equation_says_its_number() -> None:
+    """For each equation, case of Table 1, stop and for Fig. 4 one of the names in its row has the number in its source."""
+    page = (DOCS / "paper-to-code.md").read_text(encoding="utf-8")
+    said: dict[str, set[str]] = {}
+    for _, paper, code, *_ in (row.split("|") for row in page.splitlines() if row.startswith("| ")):
+        names = [name for name in re.findall(r"`([a-z][\w.]+)`", code) if exists(name)]
+        numbers = set().union(*(numbers_in(source_of(name)) for name in names))
+        said |= {number: said.get(number, set()) | numbers for number in numbers_in(paper)}
+    wanted = [f"eq {n}" for n in range(1, 11)] + [f"case {n}" for n in range(1, 7)] + [f"stop {n}" for n in "abc"]
+    assert [number for number in [*wanted, "fig 4"] if number not in said.get(number, ())] == []
+
+
+def numbers_in(text: str) -> set[str]:
+    """Return all that a text mentions as "Eqs. 5-7", "cases 1, 2" or "Stop (a)", one by one: "eq 5", "eq 6" and so on."""
+    found = set()
+    for kind, numbers in re.findall(r"\b(eq|case|stop|fig)s?\.? ([\d(][\d()a-d, n-]*)", text.lower()):
+        found |= {f"{kind} {n}" for n in re.findall(r"\d+|(?<=\()[a-c]", numbers)}
+        for first, last in re.findall(r"(\d+)-(\d+)", numbers):
+            found |= {f"{kind} {n}" for n in range(int(first), int(last) + 1)}
+    return found
+
+
+def source_of(name: str) -> str:
+    """Return the source of a dotted name of the package, none of a constant."""
+    found: Any = importlib.import_module("scantruss")
+    for part in name.split("."):
+        found = getattr(found, part, None) or importlib.import_module(f"{found.__name__}.{part}")
+    found = getattr(found, "py_func", found)
+    return inspect.getsource(found) if callable(found) or inspect.ismodule(found) else ""
 
 
 @pytest.mark.parametrize("page", sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md")))

@@ -14,10 +14,9 @@ from typed import known, xyz
 from scantruss.improve.equalize import (
     LAST_RELAXATION,
     LENGTH_WEIGHT,
-    PRICE,
+    MEAN_LENGTH_WEIGHT,
     equalize,
     finish,
-    grid_energy,
     new_scratch,
     search_once,
     settle,
@@ -26,7 +25,7 @@ from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.kernels.boundary import curves
 from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search
-from scantruss.kernels.mesh.grid import INTERIOR, REST, may_collapse, may_flip, may_split
+from scantruss.kernels.mesh.grid import AT_REST, INTERIOR, may_collapse, may_flip, may_split
 from scantruss.kernels.mesh.trial import Scratch, total_energy
 from scantruss.kernels.surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 
@@ -80,14 +79,14 @@ def test_a_fold_counts(rough: Rough) -> None:
 def test_settling_never_raises_the_energy(rough: Rough) -> None:
     mesh = rough.mesh()
     scratch, length = new_scratch(mesh), rough.settings.length
-    at_rest = mesh.net.nodes[mesh.net.kind >= REST].copy()
+    at_rest = mesh.net.nodes[mesh.net.kind >= AT_REST].copy()
     before = total_energy(mesh.net, mesh.patches, scratch, length, LENGTH_WEIGHT)[0]
     for _ in range(4):
         settle(mesh, LENGTH_WEIGHT, 0.0, 3)
         after = total_energy(mesh.net, mesh.patches, scratch, length, LENGTH_WEIGHT)[0]
         assert after <= before + 1e-9
         before = after
-    assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= REST])
+    assert np.array_equal(at_rest, mesh.net.nodes[mesh.net.kind >= AT_REST])
 
 
 def test_a_move_that_does_not_pay_leaves_no_trace(rough: Rough) -> None:
@@ -121,7 +120,7 @@ def test_a_move_that_does_not_pay_leaves_no_trace(rough: Rough) -> None:
 def stated_energy(mesh: WorkingMesh, scratch: Scratch) -> float:
     """The energy that the search lowers, but for the share of each node."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
-    return energy + PRICE * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
+    return energy + MEAN_LENGTH_WEIGHT * count * (mean / mesh.length - 1) ** 2 - 0.1 * count
 
 
 def test_the_search_lowers_the_energy_and_keeps_the_topology(rough: Rough) -> None:
@@ -278,10 +277,10 @@ def test_the_energy_of_a_grid_is_that_of_plain_loops_and_the_price_of_its_mean_l
         stretch = np.mean(
             [np.linalg.norm(np.subtract(*rough.grid.nodes[list(edge)])) for edge in naive.wings(rough.grid)]
         )
-        price = PRICE * len(rough.grid.nodes) * (stretch / length - 1) ** 2
+        price = MEAN_LENGTH_WEIGHT * len(rough.grid.nodes) * (stretch / length - 1) ** 2
         unfolded = naive.energy(rough.grid, length, LENGTH_WEIGHT) - naive.energy(rough.grid, length, 0.0)
         shapes = sum(1 - naive.shape(*rough.grid.nodes[t]) for t in rough.grid.triangles)
-        assert grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
+        assert naive.grid_energy(rough.grid, length) == pytest.approx(unfolded + shapes + price)
 
 
 @pytest.mark.parametrize(("away", "moves"), [(0.0, True), (kernels.PATCH_REACH - 0.01, False)])

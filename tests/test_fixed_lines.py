@@ -17,8 +17,8 @@ from rough import rough_disc
 from typed import known
 
 from scantruss import Grid, InputError, Settings, grid_from_points, write
-from scantruss.boundary.polylines import divide, find_corners, simplify
-from scantruss.cli.positions import read_lines
+from scantruss.boundary.polylines import corners_of_polyline, divide_polyline, simplify
+from scantruss.cli.positions import read_polylines
 from scantruss.constraints.network import Network, curves_of
 from scantruss.errors import FormatError
 from scantruss.export.json import encode_json, read_grid
@@ -48,7 +48,7 @@ def plate(count: int = 9000, seed: int = 0) -> np.ndarray:
 
 def over(*corners: tuple[float, float], step: float = 0.2) -> tuple[tuple[float, float, float], ...]:
     """A polyline on the plate through places (x, y)."""
-    xy, _ = divide(np.array([(*c, 0.0) for c in corners], float), False, step)
+    xy, _ = divide_polyline(np.array([(*c, 0.0) for c in corners], float), False, step)
     return tuple(zip(xy[:, 0].tolist(), xy[:, 1].tolist(), height(xy[:, 0], xy[:, 1]).tolist(), strict=True))
 
 
@@ -65,7 +65,7 @@ def degrees(grid: Grid) -> Counter[int]:
 
 def far_from(places: np.ndarray, polylines: Sequence[ArrayLike]) -> float:
     """Largest distance of places from polylines, by sampling these densely."""
-    dense = np.concatenate([divide(np.array(line), False, 0.01)[0] for line in polylines])
+    dense = np.concatenate([divide_polyline(np.array(line), False, 0.01)[0] for line in polylines])
     return max(float(np.linalg.norm(dense - place, axis=1).min()) for place in places)
 
 
@@ -76,7 +76,7 @@ def check_chains(grid: Grid, polylines: Sequence[ArrayLike], noise: float = 0.05
     nodes = grid.nodes + grid.origin
     assert far_from(nodes[np.unique(grid.lines)], polylines) < noise
     members = [tuple(map(tuple, nodes[pair].tolist())) for pair in grid.lines]
-    assert far_from(np.concatenate([divide(np.array(p), False, 0.05)[0] for p in polylines]), members) < chord
+    assert far_from(np.concatenate([divide_polyline(np.array(p), False, 0.05)[0] for p in polylines]), members) < chord
     lengths = np.linalg.norm(nodes[grid.lines[:, 0]] - nodes[grid.lines[:, 1]], axis=1)
     assert lengths.min() / known(grid.settings).length > 0.5 and lengths.max() / known(grid.settings).length < 1.5
 
@@ -254,20 +254,20 @@ def test_lines_that_cannot_be_are_refused(line: list[tuple[float, float, float]]
 def test_a_file_may_hold_several_polylines(tmp_path: Path) -> None:
     file = tmp_path / "lines.csv"
     file.write_text("x,y,z\n0,0,0\n1,0,0\n# a note\n2,0,0\n\n\n0;1;0\n1;1;0\n")
-    assert read_lines(file) == [
+    assert read_polylines(file) == [
         ("lines-1", [(0, 0, 0), (1, 0, 0), (2, 0, 0)]),
         ("lines-2", [(0, 1, 0), (1, 1, 0)]),
     ]
     file.write_text("name,x,y,z\nring beam,0,0,0\nring beam,1,0,0\ntie,0,1,0\ntie,1,1,0\n")
-    assert read_lines(file) == [("ring beam", [(0, 0, 0), (1, 0, 0)]), ("tie", [(0, 1, 0), (1, 1, 0)])]
+    assert read_polylines(file) == [("ring beam", [(0, 0, 0), (1, 0, 0)]), ("tie", [(0, 1, 0), (1, 1, 0)])]
     file.write_text("0 0 0\n1 0 0\n")
-    assert read_lines(file) == [("lines", [(0, 0, 0), (1, 0, 0)])]
+    assert read_polylines(file) == [("lines", [(0, 0, 0), (1, 0, 0)])]
     for text, words in (("0 0 0\n\n1 0 0\n", "polyline 1 of .* has 1 point"), ("a b c\n", "holds no fixed lines")):
         file.write_text(text)
         with pytest.raises(FormatError, match=words):
-            read_lines(file)
+            read_polylines(file)
     with pytest.raises(FormatError, match="cannot read fixed lines"):
-        read_lines(tmp_path / "none.csv")
+        read_polylines(tmp_path / "none.csv")
 
 
 def test_a_saved_grid_knows_its_lines(tmp_path: Path) -> None:
@@ -358,7 +358,7 @@ def test_a_simplified_polyline_keeps_within_the_tolerance(seed: int, closed: boo
         points = np.concatenate([points, points[:1]])
     kept = simplify(points, 0.8, closed)
     assert set(map(tuple, kept)) <= set(map(tuple, points))
-    dense = divide(kept, False, 0.02)[0]
+    dense = divide_polyline(kept, False, 0.02)[0]
     assert max(np.linalg.norm(dense - p, axis=1).min() for p in points) < 0.83
 
 
@@ -366,25 +366,25 @@ def test_corners_are_found_however_finely_a_line_is_drawn() -> None:
     settings = Settings(length=1.0)
     square = np.array([(0, 0, 0), (3, 0, 0), (3, 3, 0), (0, 3, 0), (0, 0, 0)], float)
     for step in (3.0, 0.21, 0.013):
-        drawn, _ = divide(square, False, step)
-        points, at = divide(simplify(drawn, 0.005, True), True, 0.05)
-        corners = find_corners(points, at, True, settings)
+        drawn, _ = divide_polyline(square, False, step)
+        points, at = divide_polyline(simplify(drawn, 0.005, True), True, 0.05)
+        corners = corners_of_polyline(points, at, True, settings)
         assert sorted(map(tuple, points[corners])) == sorted(map(tuple, square[:4]))
     angle = np.linspace(0, 2 * np.pi, 200)
     circle = 1.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     circle[-1] = circle[0]
-    points, at = divide(simplify(circle, 0.005, True), True, 0.05)
-    assert find_corners(points, at, True, settings) == []
+    points, at = divide_polyline(simplify(circle, 0.005, True), True, 0.05)
+    assert corners_of_polyline(points, at, True, settings) == []
 
 
 def test_the_network_cuts_lines_where_they_meet() -> None:
     """A cross, a touch, a stub over a meeting, and a second line along the first."""
     side = np.array([(0, 0, 0), (10, 0, 0), (10, 10, 0), (0, 10, 0), (0, 0, 0)], float)
-    loop, corners = divide(side, True, 0.05)
+    loop, corners = divide_polyline(side, True, 0.05)
     network = Network([(loop, corners)], 1.0)
 
     def add(*places: tuple[float, float]) -> None:
-        network.add(divide(np.array([(*p, 0.0) for p in places], float), False, 0.05)[0], False, [])
+        network.add(divide_polyline(np.array([(*p, 0.0) for p in places], float), False, 0.05)[0], False, [])
 
     add((0, 5), (10, 5))
     add((5, 2), (5, 8))

@@ -154,7 +154,7 @@ def test_same_cloud_same_bytes(method: str) -> None:
 @pytest.mark.parametrize("budget", [1, 7, 1_000_000])
 def test_the_step_budget_makes_no_difference(budget: int, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     grid, _, points = example("annulus", method)
-    monkeypatch.setattr(driver, "BUDGET", budget)
+    monkeypatch.setattr(driver, "SEGMENTS_PER_REPORT", budget)
     again, _ = advanced(points, method=method)
     assert again.nodes.tobytes() == grid.nodes.tobytes() and again.triangles.tobytes() == grid.triangles.tobytes()
 

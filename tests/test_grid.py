@@ -178,6 +178,6 @@ def test_corners_and_fixed_nodes_are_never_drawn_in() -> None:
     net, _ = open_net(grid)
     assert not any(
         kernels.may_collapse(net, u, v)
-        for v in np.flatnonzero(net.kind == kernels.REST).tolist()
+        for v in np.flatnonzero(net.kind == kernels.AT_REST).tolist()
         for u in net.ring[v, : net.degree[v]].tolist()
     )

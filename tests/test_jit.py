@@ -141,7 +141,7 @@ def test_no_home_is_no_error(tmp_path: Path, no_home: None, monkeypatch: pytest.
 
 
 def test_kernels_compile_in_memory_where_there_is_no_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiling, "FOLDER", None)
+    monkeypatch.setattr(compiling, "KERNEL_FOLDER", None)
 
     @compiling.kernel
     def twice(x: float) -> float:
@@ -165,7 +165,7 @@ CODE = """
 import scantruss.kernels.geometry.vectors as v
 from scantruss.runtime import jit as c
 assert v.norm((3.0, 4.0, 0.0)) == 5.0
-print(c.FOLDER, any(c.FOLDER.rglob("vectors.norm-*.nbc")) if c.FOLDER else False)
+print(c.KERNEL_FOLDER, any(c.KERNEL_FOLDER.rglob("vectors.norm-*.nbc")) if c.KERNEL_FOLDER else False)
 """
 
 
@@ -315,7 +315,7 @@ def test_a_part_of_a_kernel_is_no_machine_code_of_its_own() -> None:
         return part(x) + 1.0
 
     assert whole(1.0) == 3.0
-    assert not part.alone.signatures and isinstance(next(iter(part.overloads.values())).library, cache.Part)
+    assert not part.alone.signatures and isinstance(next(iter(part.overloads.values())).library, cache.KernelPart)
     assert part(2.0) == 4.0 and len(part.alone.signatures) == 1
 
 

@@ -1,6 +1,9 @@
-"""Imports go one way, in the order of the tree, and nowhere in a circle."""
+"""Imports go one way, in the order of the tree, and nowhere in a circle; a name stands for one thing, and for something used."""
 
 import ast
+import re
+from collections import Counter
+from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -96,3 +99,42 @@ def test_no_packages_import_each_other_in_a_circle_for_types_neither() -> None:
 
 def test_few_modules_lie_on_the_root() -> None:
     assert len(list(SOURCE.glob("*.py"))) <= ROOT
+
+
+def defined_in(name: str) -> Iterator[tuple[str, ast.stmt]]:
+    """Yield what a module defines: functions, types and constants, with the statement."""
+    for node in ast.parse(MODULES[name].read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name, node
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                yield from ((inner.id, node) for inner in ast.walk(target) if isinstance(inner, ast.Name))
+
+
+def test_constants_and_types_of_two_modules_have_different_names() -> None:
+    found = Counter(
+        word
+        for name in MODULES
+        for word, node in defined_in(name)
+        if word[0].isupper() and "TypeVar" not in ast.dump(node)
+    )
+    assert [word for word, count in found.items() if count > 1] == []
+
+
+def test_what_is_defined_is_used_outside_the_tests() -> None:
+    """By the package, benchmarks and scripts, or it is named in the documentation."""
+    root = SOURCE.parents[1]
+    texts = [
+        *MODULES.values(),
+        *root.glob("*.*"),
+        *(p for name in ("benchmarks", "scripts", "docs") for p in (root / name).rglob("*.*")),
+    ]
+    words = Counter(
+        word
+        for path in texts
+        if path.suffix in (".py", ".md", ".toml")
+        for word in re.findall(r"\w+", path.read_text(encoding="utf-8"))
+    )
+    assert [
+        word for name in MODULES for word, _ in defined_in(name) if words[word] < 2 and not word.startswith("__")
+    ] == []

@@ -173,7 +173,7 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance() -> N
     assert len(levels) == len(owners) > 2
     places = surface.mean
     for level, (posts, owner) in enumerate(zip(levels, owners, strict=True)):
-        radius = laying.LEVEL_SPACING * shape.length * laying.COARSER**level
+        radius = laying.LEVEL_SPACING * shape.length * laying.LEVEL_RATIO**level
         assert set(owner.tolist()) == set(range(len(posts.mean)))
         first = places[np.unique(owner, return_index=True)[1]]
         assert np.linalg.norm(places - first[owner], axis=1).max() < radius

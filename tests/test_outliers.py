@@ -190,7 +190,7 @@ def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(s
     alive, which = rng.random(150) < 0.7, np.arange(0, 150, 7)
     bulk = np.empty(len(which))
     kernels_of_outliers.measure_bulk(near.tree, alive, which, bulk, 0, len(which))
-    most = kernels_of_outliers.BULK
+    most = kernels_of_outliers.POINTS_OF_CLOUD
     for row, p in enumerate(which):
         order = np.argsort(((near.tree.points - near.tree.points[p]) ** 2).sum(axis=1), kind="stable")[: 2 * most]
         around = near.tree.points[order[alive[order]][:most]]

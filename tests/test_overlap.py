@@ -14,14 +14,21 @@ from scantruss.kernels.geometry.boxes import nearest
 from scantruss.kernels.scan import blend as blending
 from scantruss.kernels.scan import features as feature_kernels
 from scantruss.kernels.scan import overlap as kernels
-from scantruss.scan.register.features import BINS, find_features, flip
-from scantruss.scan.register.fine import align, judge, solve
+from scantruss.scan.register.features import ANGLE_BINS, features_from_behind, find_features
+from scantruss.scan.register.fine import align, judge, solve_step
 from scantruss.scan.register.matching import fit_pose
-from scantruss.scan.register.poses import angle_between, invert, move, quaternion_of, small_motion, turn_by
-from scantruss.scan.register.views import View, boxes_of, make_view
+from scantruss.scan.register.poses import invert, move, quaternion_of, small_motion, turn_by
+from scantruss.scan.register.views import View, boxes_around, make_view
 
 pytestmark = pytest.mark.kernels
 SPACING = 0.12
+
+
+def angle_between(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the angle [degree] of the rotation between two poses."""
+    between = one[:3, :3].T @ other[:3, :3]
+    sine = np.linalg.norm(between - between.T) / np.sqrt(8.0)
+    return float(np.degrees(np.arctan2(sine, 0.5 * (np.trace(between) - 1.0))))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +43,7 @@ def views() -> tuple[View, View, np.ndarray]:
 def test_the_nearest_place_is_the_nearest(seed: int) -> None:
     rng = np.random.default_rng(seed)
     places = rng.random((40, 3))
-    boxes, reach = boxes_of(places, 0.2), rng.uniform(0.05, 0.5)
+    boxes, reach = boxes_around(places, 0.2), rng.uniform(0.05, 0.5)
     for x in rng.uniform(-0.3, 1.3, (20, 3)):
         away, at = cKDTree(places).query(x)
         assert nearest(boxes, places, *xyz(x), reach) == (at if away <= reach else -1)
@@ -46,7 +53,7 @@ def test_the_first_place_within_reach_is_the_first() -> None:
     rng = np.random.default_rng(1)
     points, places = rng.random((200, 3)), rng.random((40, 3))
     owner = np.empty(200, np.int64)
-    kernels.first_places(points, boxes_of(places, 0.2), places, 0.25, owner)
+    kernels.first_places(points, boxes_around(places, 0.2), places, 0.25, owner)
     near = np.linalg.norm(points[:, None] - places, axis=2) <= 0.25
     assert np.array_equal(owner, np.where(near.any(axis=1), near.argmax(axis=1), -1))
 
@@ -87,12 +94,12 @@ def test_features_do_not_change_when_a_scan_is_moved(views: tuple[View, View, np
     view = views[0]
     pose = random_pose(np.random.default_rng(8))
     points, normals = move(pose, view.points), turn_by(pose, view.normals)
-    moved = replace(view, points=points, normals=normals, boxes=boxes_of(points, 1.5 * SPACING))
+    moved = replace(view, points=points, normals=normals, boxes=boxes_around(points, 1.5 * SPACING))
     turned = replace(view, normals=-view.normals)
     plain, other, opposite = find_features([view, moved, turned])
     assert (np.abs(plain - other) > 20).mean() < 0.01  # a value on the edge of a bin may change sides
-    assert (np.abs(flip(plain) - opposite) > 20).mean() < 0.01
-    assert plain.shape == (len(view.points), 6 * BINS) and np.array_equal(plain, np.round(plain))
+    assert (np.abs(features_from_behind(plain) - opposite) > 20).mean() < 0.01
+    assert plain.shape == (len(view.points), 6 * ANGLE_BINS) and np.array_equal(plain, np.round(plain))
 
 
 def slow_sums(
@@ -195,14 +202,14 @@ def test_poses(seed: int) -> None:
 def test_a_step_is_the_solution(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, load = rng.normal(size=(12, 20)), rng.normal(size=12)
-    assert np.allclose(solve(a @ a.T, load, 1.0), -np.linalg.solve(a @ a.T, load), atol=1e-2)
+    assert np.allclose(solve_step(a @ a.T, load, 1.0), -np.linalg.solve(a @ a.T, load), atol=1e-2)
 
 
 def test_depth_is_the_distance_from_the_rim(views: tuple[View, View, np.ndarray]) -> None:
     view = views[0]
     boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.empty(len(view.points))
-    blending.depths(view.points, boundary_points, boxes_of(boundary_points, 0.3), 0.5, depth)
+    blending.depths(view.points, boundary_points, boxes_around(boundary_points, 0.3), 0.5, depth)
     assert np.allclose(depth, np.minimum(cKDTree(boundary_points).query(view.points)[0], 0.5))
 
 
@@ -216,7 +223,7 @@ def test_a_second_layer_moves_points_to_the_mean_and_takes_what_it_sees_better()
         own, deep = np.arange(144), np.full(144, 3.0)
         shift, weight, kept = np.zeros((144, 3)), np.full(144, 1.0), np.ones(144, np.int64)
         blending.add_layer(
-            low, own, up, deep, high, up, boxes_of(high, 2.0), np.full(144, 2.0 + 2.0 * deeper), np.eye(4), 1.0, 0,
+            low, own, up, deep, high, up, boxes_around(high, 2.0), np.full(144, 2.0 + 2.0 * deeper), np.eye(4), 1.0, 0,
             1.5, 0.5, 1.0, shift, weight, kept,
         )  # fmt: skip
         assert np.allclose(shift / weight[:, None], [0.0, 0.0, 0.05])

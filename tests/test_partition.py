@@ -10,7 +10,7 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 from scantruss.improve import equalize, perturbation
 from scantruss.improve.partition import Partition
 from scantruss.kernels.mesh.grid import Net
-from scantruss.kernels.mesh.partition import BETWEEN
+from scantruss.kernels.mesh.partition import BETWEEN_HALVES
 from scantruss.runtime import parallel
 
 MAKERS: dict[str, Callable[[int], Rough]] = {
@@ -44,7 +44,7 @@ def test_two_rings_of_nodes_lie_between_the_halves(make: Callable[..., Rough], s
     away = ways(net, first.tolist())
     assert min(away[v] for v in np.flatnonzero(live & (partition.label == 1)).tolist()) >= 3
     counts = [int((live & (partition.label == side)).sum()) for side in (0, 1)]
-    assert min(counts) > 0.3 * live.sum() and (live & (partition.label == BETWEEN)).sum() < 0.3 * live.sum()
+    assert min(counts) > 0.3 * live.sum() and (live & (partition.label == BETWEEN_HALVES)).sum() < 0.3 * live.sum()
 
 
 @pytest.mark.kernels
@@ -63,7 +63,7 @@ def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make: Callable[
 def test_a_grid_without_work_has_no_halves(make: Callable[..., Rough]) -> None:
     net = make(0).mesh().net
     partition = Partition(net, np.zeros(len(net.arc), bool))
-    assert (partition.label[net.degree > 0] == BETWEEN).all()
+    assert (partition.label[net.degree > 0] == BETWEEN_HALVES).all()
 
 
 def in_independent_sets(make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch, seed: int = 1) -> Rough:
@@ -131,7 +131,7 @@ def test_what_lies_between_is_searched_after_the_halves(
         return net.nodes, net.ring, net.degree, net.kind, net.curve, net.ideal, net.line
 
     def look(partition: Partition, work: Any) -> None:
-        between = (partition.label == BETWEEN) & (net.degree > 0)
+        between = (partition.label == BETWEEN_HALVES) & (net.degree > 0)
         old = [array[between].copy() for array in of_net()]
         run(partition, work)
         seen.append([np.array_equal(array[between], was) for array, was in zip(of_net(), old, strict=True)])
@@ -175,7 +175,7 @@ def test_what_lies_between_stays_while_the_halves_are_kicked(
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 
     def look(partition: Partition, work: Any) -> None:
-        parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN, 0, 1)]
+        parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN_HALVES, 0, 1)]
         old = {name: getattr(net, name).copy() for name in names}
         run(partition, work)
         seen.append([any((getattr(net, name)[part] != old[name][part]).any() for name in names) for part in parts])

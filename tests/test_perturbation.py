@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rough import Rough, rough_disc, rough_sphere, same_topology
 
-from scantruss.improve.equalize import LENGTH_WEIGHT, PRICE, energy_of_node, new_scratch, settle
+from scantruss.improve.equalize import LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT, energy_of_node, new_scratch, settle
 from scantruss.improve.perturbation import new_area, search_widely
 from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.kernels.mesh import perturbation as kernels
@@ -144,7 +144,8 @@ def test_the_energy_of_a_node_is_that_of_the_slow_twin(settled: tuple[Rough, Wor
     grid = mesh.to_grid(rough.grid)
     mean = np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean()
     slow = (
-        naive_grid.energy(grid, mesh.length, LENGTH_WEIGHT) / len(grid.nodes) + PRICE * (mean / mesh.length - 1.0) ** 2
+        naive_grid.energy(grid, mesh.length, LENGTH_WEIGHT) / len(grid.nodes)
+        + MEAN_LENGTH_WEIGHT * (mean / mesh.length - 1.0) ** 2
     )
     assert energy_of_node(mesh) == pytest.approx(slow, rel=1e-9)
 

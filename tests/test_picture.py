@@ -18,8 +18,8 @@ import scantruss as st
 from scantruss.export.drawing.camera import choose_camera, facing_of, likely_upward, map_depth
 from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
 from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
-from scantruss.export.drawing.picture import PANELS, SIZE, draw_panels, encode_picture, known_upward
-from scantruss.export.drawing.strokes import MARK, PAPER
+from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture, known_upward
+from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
 from scantruss.grid.certificate import Certificate, Fault
@@ -39,7 +39,7 @@ def has_colour(picture: np.ndarray, colour: ArrayLike) -> int:
 def test_picture_is_full_and_framed(make: Callable[[], st.Grid]) -> None:
     grid = make()
     picture = pixels(encode_picture(grid, cloud_over(grid)))
-    assert picture.shape == (SIZE[1], SIZE[0], 3)
+    assert picture.shape == (PICTURE_SIZE[1], PICTURE_SIZE[0], 3)
     ink = np.abs(picture - np.round(PAPER * 255)).max(axis=2) > 40
     assert ink.mean() > 0.05
     assert not ink[:, :60].any() and not ink[:, -60:].any() and not ink[:50].any()
@@ -61,8 +61,8 @@ def test_picture_says_that_it_is_ours_and_nothing_of_when_it_was_made() -> None:
 
 
 def test_fixed_nodes_are_marked() -> None:
-    assert has_colour(pixels(encode_picture(dome())), MARK) == 0
-    assert has_colour(pixels(encode_picture(dome(fixed=(70,)))), MARK) > 50
+    assert has_colour(pixels(encode_picture(dome())), FIXED_NODE_COLOUR) == 0
+    assert has_colour(pixels(encode_picture(dome(fixed=(70,)))), FIXED_NODE_COLOUR) > 50
 
 
 def test_the_scan_is_seen_where_the_grid_is_not() -> None:
@@ -135,7 +135,7 @@ def test_panels_show_scan_grid_and_solid(tmp_path: Path) -> None:
         draw_panels(cloud_over(grid), grid, solid.vertices, solid.triangles, tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     picture = pixels((tmp_path / "a.png").read_bytes())
-    assert picture.shape == (PANELS[1], PANELS[0], 3)
+    assert picture.shape == (PANELS_SIZE[1], PANELS_SIZE[0], 3)
     for panel in np.split(picture, 3, axis=1):
         assert (np.abs(panel - np.round(PAPER * 255)).max(axis=2) > 40).mean() > 0.01
 
@@ -242,7 +242,7 @@ def test_size_and_number_of_views_are_as_asked() -> None:
     grid = dome()
     assert pixels(encode_picture(grid, style=PictureStyle(size=(500, 300)))).shape == (300, 500, 3)
     both = pixels(encode_picture(grid, style=PictureStyle(views=("top", "front"))))
-    assert both.shape == (PANELS[1], PANELS[0], 3)
+    assert both.shape == (PANELS_SIZE[1], PANELS_SIZE[0], 3)
     for half in np.split(both, 2, axis=1):
         assert (np.abs(half - np.round(PAPER * 255)).max(axis=2) > 40).mean() > 0.03
     for bad in ({"views": ("sideways",)}, {"views": ("10,95",)}, {"views": ()}, {"size": (10, 5000)}):

@@ -6,22 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from steps import lines_of_readme
 
 import scantruss as st
 
 ROOT = Path(__file__).resolve().parents[1]
-STEPS = """
-import scantruss as st
-
-cloud = st.read_points("shell.ply", unit="mm")
-settings = st.Settings(length=4.7, fixed=[(0, 0, 12)])
-surface = st.sample_surface(cloud, settings)
-surface, boundary = st.find_boundary(surface, settings)
-boundary, constraints = st.find_constraints(surface, boundary, settings)
-fields = st.orientation_fields(surface, boundary, settings)
-fronts = st.advance_fronts(surface, boundary, constraints, fields, settings)
-grid = st.optimize_fronts(fronts, surface, boundary, constraints, settings)
-st.write(grid, "grid.obj")
+STEPS = f"""{lines_of_readme()}
 reveal_type(st.Settings)
 reveal_type(grid)
 reveal_type(grid.quality.length_mean)

@@ -46,7 +46,7 @@ def every_way(path: Path, rows: list[str]) -> list[Any]:
     told: list[Any] = []
     for large in (1 << 23, 0):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(text, "LARGE", large)
+            patch.setattr(text, "BYTES_FOR_PYARROW", large)
             for read in (in_memory, in_tiles):
                 try:
                     told.append(read(path))

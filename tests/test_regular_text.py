@@ -79,8 +79,8 @@ def test_all_ways_of_reading_give_the_same_points(
     path = tmp_path / "a.txt"
     path.write_bytes((head + "".join(" ".join(map(repr, row)) + "\n" for row in points.tolist())).encode())
     slow = read_points(path)
-    monkeypatch.setattr(text, "BYTES_PER_BLOCK", block)
-    monkeypatch.setattr(text, "LARGE", 0)
+    monkeypatch.setattr(text, "TEXT_BYTES_PER_BLOCK", block)
+    monkeypatch.setattr(text, "BYTES_FOR_PYARROW", 0)
     monkeypatch.setattr(np, "loadtxt", lambda *_, **__: pytest.fail("numpy was asked"))
     fast = read_points(path)
     assert np.array_equal(slow.points, fast.points) and np.array_equal(fast.points + fast.origin, points)

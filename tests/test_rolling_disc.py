@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from naive import reachable
 from small_clouds import samples_of, sheet
 
-from scantruss.kernels.boundary.loops import DIRECTIONS, free_directions, has_gap
+from scantruss.kernels.boundary.loops import DISC_DIRECTIONS, free_directions, has_gap
 from scantruss.kernels.geometry.vectors import across
 from scantruss.kernels.surface.local_surface import Surface
 
@@ -36,17 +36,17 @@ def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(
 def widest_free(surface: Surface, sample: int, radius: float) -> tuple[Any, float, int]:
     """Middle of the widest run of directions in which a disc that touches a site holds no other one, 9 where there is none."""
     mean, u = surface.mean, np.array(across(tuple(surface.normals[sample])))
-    turns = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    turns = 2 * np.pi * np.arange(DISC_DIRECTIONS) / DISC_DIRECTIONS
     out = np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * np.cross(surface.normals[sample], u)
     others = sorted(reachable(surface.neighbors, mean, sample, mean[sample], 2 * radius) - {sample})
     away = np.linalg.norm(mean[others] - (mean[sample] + radius * out)[:, None], axis=2)
     assume(np.abs(away - radius).min(initial=radius) > 1e-9)
     free, runs = (away > radius).all(axis=1), []
-    for first in range(DIRECTIONS):
-        length = next((i for i in range(DIRECTIONS) if not free[(first + i) % DIRECTIONS]), DIRECTIONS)
+    for first in range(DISC_DIRECTIONS):
+        length = next((i for i in range(DISC_DIRECTIONS) if not free[(first + i) % DISC_DIRECTIONS]), DISC_DIRECTIONS)
         runs.append((length, first))
     length, first = max(runs)
-    middle = turns[first] + 0.5 * (length - 1) * 2 * np.pi / DIRECTIONS
+    middle = turns[first] + 0.5 * (length - 1) * 2 * np.pi / DISC_DIRECTIONS
     return (middle, length, sum(longest == length for longest, _ in runs)) if length else (9.0, 0, 1)
 
 

@@ -196,7 +196,7 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(
 ) -> None:
     """One point in a hundred at (0, 0, 0), with others at a far place: no echo."""
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
-    monkeypatch.setattr(fit, "BULK", 3000)
+    monkeypatch.setattr(fit, "POINTS_OF_BULK", 3000)
     points = plate() + place_of_all
     np.save("clean.npy", points)
     points[::100] = -9999.0
@@ -205,7 +205,7 @@ def test_a_first_look_does_not_heed_points_that_stand_for_none(
     looks = [
         fit.spacing_to_look(name, settings, lambda *told: shares.append(told)) for name in ("clean.npy", "holes.npy")
     ]
-    assert looks[0] == pytest.approx(np.linalg.norm(np.ptp(plate(), axis=0)) / fit.LOOK, rel=0.02)
+    assert looks[0] == pytest.approx(np.linalg.norm(np.ptp(plate(), axis=0)) / fit.BOXES_OF_FIRST_LOOK, rel=0.02)
     assert looks[1] == pytest.approx(looks[0], rel=0.02)
     assert shares[-1] == ("look", 1.0)
     assert main(["info", "holes.npy", "--memory", "1MB"]) == 0
@@ -218,7 +218,7 @@ def test_a_first_look_sees_thin_far_ends(place: Path) -> None:
     points = np.concatenate([rng.uniform(-1, 1, (20_000, 3)), rng.uniform(-3, 3, (100, 3))])
     np.save("far.npy", points)
     found = fit.spacing_to_look("far.npy", st.Settings(length=1.0))
-    assert found == pytest.approx(np.linalg.norm(np.ptp(points, axis=0)) / fit.LOOK, rel=0.01)
+    assert found == pytest.approx(np.linalg.norm(np.ptp(points, axis=0)) / fit.BOXES_OF_FIRST_LOOK, rel=0.01)
 
 
 def test_what_fits_into_memory_is_taken_as_it_is(place: Path) -> None:

@@ -128,3 +128,10 @@ def test_a_file_without_fixed_nodes_is_refused(tmp_path: Path, text: str) -> Non
     (tmp_path / "fixed.csv").write_text(text)
     with pytest.raises(FormatError, match=r"fixed\.csv"):
         read_positions(tmp_path / "fixed.csv")
+
+
+def test_a_file_that_is_nested_too_deeply_is_no_settings_file(tmp_path: Path) -> None:
+    path = tmp_path / "deep.json"
+    path.write_text("[" * 200_000)
+    with pytest.raises(InputError, match="not a settings file"):
+        Settings.read(path)

@@ -17,7 +17,7 @@ from scantruss.improve.smoothing import (
     smooth,
 )
 from scantruss.kernels.mesh import smoothing as kernels
-from scantruss.kernels.mesh.grid import ON_CURVE, REST
+from scantruss.kernels.mesh.grid import AT_REST, ON_CURVE
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_step_agrees_with_its_twin(disc: Rough) -> None:
     kernels.move_to_middle(net, 0.4, spare)
     for v, around in naive.neighbors(disc.grid).items():
         expected = before[v]
-        if net.kind[v] < REST:
+        if net.kind[v] < AT_REST:
             there = net.ring[v, [0, net.degree[v] - 1]].tolist() if net.kind[v] == ON_CURVE else sorted(around)
             expected = naive.middle(before, there, v, 0.4)
         assert net.nodes[v] == pytest.approx(expected, abs=1e-12)

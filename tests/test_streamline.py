@@ -36,7 +36,7 @@ def test_the_first_point_of_each_box_stays(seed: int, size: float) -> None:
 @pytest.mark.parametrize("room", [1, 64, 1 << 16])
 def test_the_same_points_stay_for_any_processors_and_room(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
     points = np.random.default_rng(7).uniform(0, 1, (3000, 3))
-    monkeypatch.setattr(streamline, "POINTS_PER_THREAD", 500)
+    monkeypatch.setattr(streamline, "CHOSEN_POINTS_PER_THREAD", 500)
     monkeypatch.setattr(streamline, "LEAST_ROOM", room)
     monkeypatch.setattr(streamline, "MOST_ROOM", room)
     found = []

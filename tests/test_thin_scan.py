@@ -54,7 +54,7 @@ class Others(Workers):
 @pytest.fixture(autouse=True)
 def small_tiles(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Tiles so small that a file has several."""
-    monkeypatch.setattr(streaming, "SMALLEST", 70)
+    monkeypatch.setattr(streaming, "FEWEST_POINTS_OF_TILE", 70)
     monkeypatch.setenv("SCANTRUSS_TRACEBACK", "1")
     monkeypatch.chdir(tmp_path)
 
@@ -181,7 +181,7 @@ def test_blocks_of_text_are_read_the_same_by_the_compiled_loop(monkeypatch: pyte
     columns = (*layout.columns, layout.attributes[0][1])
     block = FILES["a.csv"].split(b"\n", 1)[1]
     wanted = read_lines(path, block, layout, columns, 0).rows
-    monkeypatch.setattr(text_format, "LARGE", 100)
+    monkeypatch.setattr(text_format, "BYTES_FOR_PYARROW", 100)
     monkeypatch.setattr(np, "loadtxt", None)
     found = read_lines(path, block, layout, columns, 0).rows
     assert found.tobytes() == wanted.tobytes() and np.array_equal(found[:, 3], CLASS)

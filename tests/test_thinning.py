@@ -10,7 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from scantruss.errors import InputError
-from scantruss.scan.stream.thinning import Rows, Thinning, nearest_in, nearest_points, points_at_boundary, thin_points
+from scantruss.scan.stream.thinning import (
+    BoxRows,
+    Thinning,
+    nearest_in,
+    nearest_of_parts,
+    points_at_boundary,
+    thin_points,
+)
 
 pytestmark = pytest.mark.kernels
 
@@ -28,7 +35,7 @@ def scans(draw: some.DrawFn) -> tuple[np.ndarray, float]:
 
 def in_parts(
     points: np.ndarray, spacing: float, cuts: Sequence[int] | np.ndarray, *, merged: bool, boundary: bool = False
-) -> Rows:
+) -> BoxRows:
     """Rows of points that are added in parts, or thinned part by part and then put together."""
     whole = Thinning(spacing, boundary=boundary)
     for part in np.split(points, cuts):
@@ -41,7 +48,7 @@ def in_parts(
     return whole.take_rows()
 
 
-def same_rows(one: Rows, other: Rows) -> bool:
+def same_rows(one: BoxRows, other: BoxRows) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(one[:2], other[:2], strict=True)) and one[2:] == other[2:]
 
 
@@ -77,7 +84,7 @@ def test_any_order_and_any_parts_give_the_same_bytes(scan: tuple[np.ndarray, flo
     parts = [nearest_in([part], wanted.rows, spacing) for part in np.split(mixed, cuts)]
     whole = nearest_in([points], wanted.rows, spacing)
     count = len(wanted.rows)
-    assert nearest_points(count, parts).tobytes() == nearest_points(count, [whole]).tobytes()
+    assert nearest_of_parts(count, parts).tobytes() == nearest_of_parts(count, [whole]).tobytes()
 
 
 @given(scans())
@@ -123,7 +130,7 @@ def test_a_spacing_too_small_for_the_coordinates_is_refused() -> None:
 def test_a_scan_that_has_changed_between_two_readings_is_refused() -> None:
     rows = in_parts(np.array([[0.5, 0.5, 0.5], [3.5, 0.5, 0.5]]), 1.0, [], merged=False)
     with pytest.raises(InputError, match="changed while it was read"):
-        nearest_points(2, [nearest_in([np.array([[0.5, 0.5, 0.5]])], rows.rows, 1.0)])
+        nearest_of_parts(2, [nearest_in([np.array([[0.5, 0.5, 0.5]])], rows.rows, 1.0)])
 
 
 def plate(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:

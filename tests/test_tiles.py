@@ -114,7 +114,7 @@ def test_tiles_and_chunks_of_any_size_hold_the_points_of_the_file(
     write(path, cloud())
     wanted = np.asarray(READERS[path.suffix](path, ()).points, float)
     for tile, chunk, alone in ((10**9, 10**9, True), (97, 50, False), (250, 64, True), (10, 3, False)):
-        monkeypatch.setattr(chunks, "TEXT_BYTES_PER_BLOCK", 24 * chunk)
+        monkeypatch.setattr(chunks, "CHUNK_BYTES", 24 * chunk)
         tiles = list(tiles_of([find_source(path)], tile))
         found = [one.points for part in tiles for one in read_ahead(read_chunks(part, None, chunk, alone=alone))]
         both = np.concatenate(found)

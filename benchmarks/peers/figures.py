@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from shapes import Shape
 
 NEAR = 0.5  #: the scan is covered where a triangle is nearer than this [members]
-RIM_STEP = 1 / 200  #: rims are compared at positions this far apart [members]
+BOUNDARY_STEP = 1 / 200  #: boundaries are compared at positions this far apart [members]
 SURFACE_STEP = 1 / 6  #: triangles are looked at through positions this far apart [members]
 SEEN = 100_000  #: at most so many points of the scan are asked whether they are covered
 
@@ -41,7 +41,9 @@ class Figures:
     valence6: float
     deviation: float  #: mean distance of the nodes from the true surface
     deviation_max: float
-    rim: float | None  #: largest distance between the net's rim and the true one, either way; None: neither has a rim
+    boundary: (
+        float | None
+    )  #: largest distance between the net's boundary and the true one, either way; None: neither has a boundary
     uncovered: float  #: share of the scan with no triangle within half a member
 
     def to_dict(self) -> dict[str, Any]:
@@ -69,15 +71,15 @@ def along(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
     return np.asarray(start[which] + share[:, None] * (end - start)[which])
 
 
-def rim_distance(grid: Grid, loops: list[np.ndarray], length: float) -> float | None:
-    """Return the largest distance between the rim of a net and the true loops (K, 3), either way [members]."""
+def boundary_distance(grid: Grid, loops: list[np.ndarray], length: float) -> float | None:
+    """Return the largest distance between the boundary of a net and the true loops (K, 3), either way [members]."""
     from scipy.spatial import cKDTree
 
     ends = grid.nodes[grid.edges[grid.edge_uses == 1]]
     if not len(ends) or not loops:
         return None if not len(ends) and not loops else float("inf")
-    ours = along(ends[:, 0], ends[:, 1], RIM_STEP * length)
-    truth = np.concatenate([along(loop, np.roll(loop, -1, axis=0), RIM_STEP * length) for loop in loops])
+    ours = along(ends[:, 0], ends[:, 1], BOUNDARY_STEP * length)
+    truth = np.concatenate([along(loop, np.roll(loop, -1, axis=0), BOUNDARY_STEP * length) for loop in loops])
     there, back = cKDTree(truth).query(ours)[0].max(), cKDTree(ours).query(truth)[0].max()
     return float(max(there, back)) / length
 
@@ -129,6 +131,6 @@ def figures(shape: Shape, nodes: np.ndarray, triangles: np.ndarray) -> Figures:
         valence6=quality.valence6,
         deviation=float(distance.mean()),
         deviation_max=float(distance.max()),
-        rim=rim_distance(grid, shape.loops, shape.length),
+        boundary=boundary_distance(grid, shape.loops, shape.length),
         uncovered=uncovered(grid, shape.points, shape.length),
     )

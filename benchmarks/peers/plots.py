@@ -67,6 +67,9 @@ def draw(rows: Sequence[Row], folder: Path) -> list[str]:
     """Draw both plots and return their names."""
     scatter(rows, ("seconds", "seconds"), ("cv", "CV of the member lengths"), folder / "peers-time.svg")
     scatter(
-        rows, ("rim", "rim off the true one [members]"), ("cv", "CV of the member lengths"), folder / "peers-rim.svg"
+        rows,
+        ("boundary", "boundary off the true one [members]"),
+        ("cv", "CV of the member lengths"),
+        folder / "peers-boundary.svg",
     )
-    return ["peers-time.svg", "peers-rim.svg"]
+    return ["peers-time.svg", "peers-boundary.svg"]

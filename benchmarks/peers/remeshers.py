@@ -47,7 +47,7 @@ def acvd(mesh: Mesh, scan: Scan) -> Mesh:
 
 
 def gmsh_frontal(mesh: Mesh, scan: Scan) -> Mesh:
-    """Frontal-Delaunay of gmsh on the reparametrized mesh, its rim cut at corners of 45 degrees."""
+    """Frontal-Delaunay of gmsh on the reparametrized mesh, its boundary cut at corners of 45 degrees."""
     import gmsh
 
     gmsh.initialize()
@@ -75,7 +75,7 @@ def gmsh_frontal(mesh: Mesh, scan: Scan) -> Mesh:
 
 
 def instant_on_mesh(mesh: Mesh, scan: Scan) -> Mesh:
-    """Instant Meshes, triangles, aligned to the rim."""
+    """Instant Meshes, triangles, aligned to the boundary."""
     import pyinstantmeshes
 
     nodes, triangles = mesh.nodes.astype(np.float32), mesh.triangles.astype(np.int32)

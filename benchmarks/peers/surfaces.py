@@ -14,7 +14,7 @@ import numpy as np
 
 NEIGHBOURS = 24  #: of a normal
 RADII = (1.5, 2.5, 4.0)  #: of the balls, in mean distances of neighbours
-SMALL_HOLE = 30  #: rims with at most so many edges are closed
+SMALL_HOLE = 30  #: boundaries with at most so many edges are closed
 TRIM = 1.5  #: nodes of the Poisson surface farther from the thinned cloud than this are cut off [cells]
 
 

@@ -42,7 +42,7 @@ MEASURES = (
     Measure("angle_min", "smallest angle", NORMAL, True, ".0f", 1.0),
     Measure("valence6", "share of inner nodes with six members", NORMAL, True, ".2f", 1e-2),
     Measure("deviation", "mean distance of the nodes from the true surface, members", NORMAL, False, ".4f", 1e-4),
-    Measure("rim", "boundary off the true one, members", NORMAL, False, ".2f", 1e-2),
+    Measure("boundary", "boundary off the true one, members", NORMAL, False, ".2f", 1e-2),
     Measure("uncovered", "share of the scan not covered", NORMAL, False, ".4f", 1e-4),
 )
 
@@ -91,36 +91,36 @@ def _all(groups: list[list[Row]], test: Callable[[list[Row]], bool | None]) -> t
 
 
 def _quick_first(group: list[Row]) -> bool | None:
-    """Whether quick is no slower than the fastest right peer, at better CV, G and rim."""
+    """Whether quick is no slower than the fastest right peer, at better CV, G and boundary."""
     ours, peers = row_of(group, QUICK), [row for row in group if row.way not in OURS and row.right]
     if ours is None or not peers:
         return None
     fastest = min(peers, key=lambda row: row.value("searches"))
-    rim = not ours.value("rim") > fastest.value("rim")  # neither has one on a closed surface
+    boundary = not ours.value("boundary") > fastest.value("boundary")  # neither has one on a closed surface
     better = ours.value("cv") <= fastest.value("cv") and ours.value("shape_mean") >= fastest.value("shape_mean")
-    return ours.right and ours.value("searches") <= fastest.value("searches") and better and rim
+    return ours.right and ours.value("searches") <= fastest.value("searches") and better and boundary
 
 
 def _half_of_instant(group: list[Row]) -> bool | None:
-    """Whether normal takes at most half the time of Instant Meshes on the points, its rim a tenth as far off."""
+    """Whether normal takes at most half the time of Instant Meshes on the points, its boundary a tenth as far off."""
     ours, other = row_of(group, NORMAL), row_of(group, POINTS_WAY)
     if ours is None or other is None or not other.done:
         return None
     return (
         ours.right
         and ours.value("searches") <= other.value("searches") / 2
-        and not ours.value("rim") > other.value("rim") / 10
+        and not ours.value("boundary") > other.value("boundary") / 10
     )
 
 
 def _five_times(group: list[Row]) -> bool | None:
-    """Whether normal is five times faster than every peer that keeps the rim and reaches our G."""
+    """Whether normal is five times faster than every peer that keeps the boundary and reaches our G."""
     ours = row_of(group, NORMAL)
     if ours is None or not ours.done:
         return None
     peers = [
         row for row in group
-        if row.way not in OURS and row.right and row.value("shape_mean") >= ours.value("shape_mean") and not row.value("rim") > 0.1
+        if row.way not in OURS and row.right and row.value("shape_mean") >= ours.value("shape_mean") and not row.value("boundary") > 0.1
     ]  # fmt: skip
     return all(5 * ours.value("searches") <= row.value("searches") for row in peers) if peers else None
 
@@ -195,7 +195,7 @@ COLUMNS = (
     ("angle_min", "angle", ".0f"),
     ("valence6", "six", ".2f"),
     ("deviation", "off", ".4f"),
-    ("rim", "boundary", ".2f"),
+    ("boundary", "boundary", ".2f"),
     ("uncovered", "bare", ".4f"),
 )
 

@@ -35,21 +35,19 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
-MISSING, DISTANCE = 4.0, 0.1  # energy a node of the share of the scan that is missed, of its distance at 95 % [members]
+# energy a node of the share of the scan that is missed, of its distance at 95 % [members]
+MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
-POOR = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
-BATCHES = 2  # times that finalists are tried
-LENGTHS = (
-    1.0,
-    0.97,
-    1.04,
-)  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
-COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
+FINALIST_BATCHES = 2  # times that finalists are tried
+# lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
+LENGTHS = (1.0, 0.97, 1.04)
+COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
-MOST_FAULTS = 6  # places at which ridges are given up, before they all are
+FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
-COARSEST = 0.5  # largest of them, in desired lengths
+COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,11 @@ class Attempt:
         places += [fault.where] if fault.where else []
         new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
-        return replace(self, faults=self.faults + new) if new and follows and len(self.faults) < MOST_FAULTS else None
+        return (
+            replace(self, faults=self.faults + new)
+            if new and follows and len(self.faults) < FAULTS_WITHOUT_RIDGES
+            else None
+        )
 
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
@@ -98,8 +100,8 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if settings.method == "default":
         if samples.smooth:
             yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
-        for size in (share * (settings.box_size or SAMPLE_SPACING) for share in COARSER):
-            if size <= COARSEST:
+        for size in (share * (settings.box_size or SAMPLE_SPACING) for share in COARSER_SAMPLES):
+            if size <= COARSEST_SAMPLES:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
 
@@ -179,12 +181,16 @@ class Candidate:
         found = self.grid.certificate if self.grid is not None else None
         if found is None or found.scan_distance is None:
             return self.energy
-        return self.energy + MISSING * found.missing + DISTANCE * found.scan_distance.p95 / self.settings.length
+        return (
+            self.energy
+            + MISSING_ENERGY * found.missing
+            + DISTANCE_ENERGY * found.scan_distance.p95 / self.settings.length
+        )
 
     @property
     def is_poor(self) -> bool:
         """Whether its worst triangle is a poor one."""
-        return self.grid is not None and self.grid.quality.shape_min < POOR
+        return self.grid is not None and self.grid.quality.shape_min < POOR_SHAPE
 
 
 def advance_fronts(
@@ -269,7 +275,7 @@ def best_that_passes(
 
     passed: list[Candidate] = []
     size = FULLY_IMPROVED[settings.effort]
-    for begin in range(0, min(len(candidates), BATCHES * size), size):
+    for begin in range(0, min(len(candidates), FINALIST_BATCHES * size), size):
         batch = candidates[begin : begin + size]
         _side_by_side(finish, batch, _part(progress, "optimize", 0.5, 1.0))
         passed += [candidate for candidate in batch if candidate.grid is not None]

@@ -45,6 +45,9 @@ class FrontError(ScanTrussError):
         self.where = where
 
 
+Place = tuple[float, float, float]  #: x, y, z in the frame of the scan [scan unit]
+
+
 def words_of_place(where: Iterable[float]) -> str:
     """Return the coordinates of a place for a message: national-grid ones too to a thousandth."""
     return ", ".join(f"{c:.6g}" if abs(c) < 1000.0 else f"{c:.3f}".rstrip("0").rstrip(".") for c in where)

@@ -19,7 +19,7 @@ RETURNS = ("all", "first", "last")
 FORMS = "box:X0,Y0,Z0,X1,Y1,Z1, box:X0,Y0,X1,Y1, sphere:X,Y,Z,RADIUS or a file of a polygon"
 LARGEST_FILE = 1 << 26  # bytes of a polygon
 
-Ring = list[tuple[float, float]]
+PolygonRing = list[tuple[float, float]]
 _WKT_BETWEEN = re.compile(r"POLYGON|(?<=\))\s*\)\s*,\s*\(\s*(?=\()", re.IGNORECASE)  # what stands between two polygons
 
 
@@ -127,17 +127,17 @@ def read_crop(text: str) -> str:
     return polygon_text(*read_polygons(path))
 
 
-def polygon_text(*polygons: Iterable[Ring]) -> str:
+def polygon_text(*polygons: Iterable[PolygonRing]) -> str:
     """Return polygons as one crop; a point is inside where, of any of them, an odd number of rings hold it."""
     return _check_part("polygon:" + "|".join(";".join(map(_ring_text, rings)) for rings in polygons))
 
 
-def _ring_text(ring: Ring) -> str:
+def _ring_text(ring: PolygonRing) -> str:
     corners = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
     return ",".join(f"{x!r},{y!r}" for x, y in corners)
 
 
-def read_polygons(path: Path) -> list[list[Ring]]:
+def read_polygons(path: Path) -> list[list[PolygonRing]]:
     """Return the rings of each polygon in plan: of a GeoJSON or WKT file, or a text file with x, y a line, which is one polygon.
 
     Raises
@@ -172,7 +172,7 @@ def _without_header(lines: list[str]) -> list[str]:
     return kept[first + 1 :] if kept and re.match(r"\s*\"?[A-Za-z]", kept[first]) else kept
 
 
-def _ring(path: Path, lines: Iterable[str]) -> Ring:
+def _ring(path: Path, lines: Iterable[str]) -> PolygonRing:
     ring = []
     for line in lines:
         words = [word for word in re.split(r"[,;\s]+", line.strip().strip('"')) if word]
@@ -184,9 +184,9 @@ def _ring(path: Path, lines: Iterable[str]) -> Ring:
     return ring
 
 
-def _geojson_polygons(path: Path, text: str) -> list[list[Ring]]:
+def _geojson_polygons(path: Path, text: str) -> list[list[PolygonRing]]:
     """Return the rings of each polygon in a GeoJSON file; a feature may have no place."""
-    found: list[list[Ring]] = []
+    found: list[list[PolygonRing]] = []
     try:
         stack = [json.loads(text)]
         while stack:

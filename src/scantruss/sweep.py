@@ -1,4 +1,4 @@
-"""Grids of one scan by many settings, for choosing a design: made side by side, told in a table and in pictures."""
+"""Grids of one scan by many settings, for choosing a design: made side by side, shown in a table and in pictures."""
 
 from __future__ import annotations
 
@@ -59,8 +59,7 @@ def trials_of(varied: Mapping[str, Sequence[str]], choose: Callable[[tuple[int, 
     ----------
     varied : mapping of str to sequence of str
         Name of each setting that has several values, and these in words.
-    choose : callable
-        Returns the settings for the number of one value of each.
+    choose : returns the settings for the number of one value of each
     """
     picks: list[tuple[int, ...]] = [()]
     for values in varied.values():

@@ -11,17 +11,17 @@ from ..settings import Settings
 CURVE_STEP = 0.05  # distance between the points of a boundary curve [member lengths]
 # points nearer to a corner than this are rounded off and do not help to locate it [member lengths]
 ROUNDED_OFF = 0.15
-CUT = 0.4  # the same distance where the disc has cut off a sharp re-entrant corner [member lengths]
+CUT_OFF = 0.4  # points nearer to a corner than this do not help where the disc has cut off a sharp re-entrant corner [member lengths]
 CORNER_REACH = 2.0  # length of the curve on each side from which the place of a corner is found [member lengths]
-SHORTEST = 0.6  # shortest such length, where another corner is near [member lengths]
+SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another corner is near [member lengths]
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
-SIGHT = (0.1, 0.8)
+SIGHT_ALONG_CURVE = (0.1, 0.8)
 CORNER_SPACING = 0.5  # corners closer together than this are one [member lengths]
-STRAIGHT = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
-BENT = 1.3  # largest ratio of the angle of a corner to the angle between quadratics fitted to its sides
-SHARPER = 1.7  # a corner turns at least this many times more than the median of its loop
-WOBBLY = 1.8  # a corner turns at least this many times more than the upper quartile of its loop
-SHARP = 70.0  # a turn this large is a corner in any case [degree]
+CURVED_FIT_RATIO = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
+MOST_ANGLE_RATIO = 1.3  # largest ratio of the angle of a corner to the angle between quadratics fitted to its sides
+MEDIAN_TURN_RATIO = 1.7  # a corner turns at least this many times more than the median of its loop
+QUARTILE_TURN_RATIO = 1.8  # a corner turns at least this many times more than the upper quartile of its loop
+CERTAIN_TURN = 70.0  # a turn this large is a corner in any case [degree]
 
 
 def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -34,10 +34,8 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     Parameters
     ----------
     curve : (M, 3) closed curve of steps `CURVE_STEP * length`
-    settings : Settings
-        `corner_angle`, `length`.
-    coarser : float
-        Factor on the lengths of curve that are examined; larger where points are sparse.
+    settings : `corner_angle`, `length`
+    coarser : factor on the lengths of curve that are examined; larger where points are sparse
 
     Returns
     -------
@@ -45,15 +43,15 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     places : (C, 3) the corners
     """
     step = CURVE_STEP / coarser
-    if len(curve) < 2 * round(SIGHT[1] / step) + 2:
+    if len(curve) < 2 * round(SIGHT_ALONG_CURVE[1] / step) + 2:
         return np.zeros(0, np.int64), np.zeros((0, 3))
     turn = _turns(curve, step)
-    usual = max(SHARPER * float(np.median(turn)), WOBBLY * float(np.quantile(turn, 0.75)))
-    enough = max(settings.corner_angle, min(usual, SHARP))
+    usual = max(MEDIAN_TURN_RATIO * float(np.median(turn)), QUARTILE_TURN_RATIO * float(np.quantile(turn, 0.75)))
+    enough = max(settings.corner_angle, min(usual, CERTAIN_TURN))
     found: list[tuple[float, int, np.ndarray]] = []
     peaks = _peaks(turn, enough)
     for i, reaches in zip(peaks.tolist(), _reaches(peaks, len(curve), step), strict=True):
-        for rounded in (ROUNDED_OFF, CUT) if turn[i] > SHARP else (ROUNDED_OFF,):
+        for rounded in (ROUNDED_OFF, CUT_OFF) if turn[i] > CERTAIN_TURN else (ROUNDED_OFF,):
             place, angle = _corner(curve, i, reaches, round(rounded / step))
             if angle > enough and np.linalg.norm(place - curve[i]) < CORNER_SPACING * settings.length:
                 found.append((angle, i, place))
@@ -82,7 +80,9 @@ def _reaches(peaks: np.ndarray, count: int, step: float) -> list[tuple[int, int]
 
 def _reach(room: int, count: int, step: float) -> int:
     """Steps to fit on one side, given the room to the next corner and the number of steps of the curve."""
-    return min(max(room - round(ROUNDED_OFF / step), round(SHORTEST / step)), round(CORNER_REACH / step), count // 2)
+    return min(
+        max(room - round(ROUNDED_OFF / step), round(SHORTEST_SIDE / step)), round(CORNER_REACH / step), count // 2
+    )
 
 
 def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +98,7 @@ def _apart(found: list[tuple[float, int, np.ndarray]], distance: float) -> tuple
 
 def _turns(curve: np.ndarray, step: float) -> np.ndarray:
     """Angle (M,) between lines fitted to the curve before and after each place [degree]."""
-    offsets = np.arange(round(SIGHT[0] / step), round(SIGHT[1] / step) + 1)
+    offsets = np.arange(round(SIGHT_ALONG_CURVE[0] / step), round(SIGHT_ALONG_CURVE[1] / step) + 1)
     slope = (offsets - offsets.mean()) / ((offsets - offsets.mean()) ** 2).sum()
     count, most = len(curve), int(offsets[-1])
     around = np.concatenate([curve[-most:], curve, curve[:most]])
@@ -112,7 +112,7 @@ def _turns(curve: np.ndarray, step: float) -> np.ndarray:
 def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) -> tuple[np.ndarray, float]:
     """Place where the two sides meet near a point of the curve, and the angle between them there [degree].
 
-    Straight sides are fitted by lines. The angle is at most `BENT` times that between quadratics, so that a bend is no corner.
+    Straight sides are fitted by lines. The angle is at most `MOST_ANGLE_RATIO` times that between quadratics, so that a bend is no corner.
     """
     half = round(CORNER_SPACING / CURVE_STEP)
     centre = at
@@ -130,7 +130,7 @@ def _corner(curve: np.ndarray, at: int, reaches: tuple[int, int], rounded: int) 
         centre = nearest
     cosines = [_cosine(sides[0][k][1], sides[1][k][1]) for k in (0, 1)]
     straight, bent = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).tolist()
-    return place, min(straight, BENT * bent)
+    return place, min(straight, MOST_ANGLE_RATIO * bent)
 
 
 def _cosine(a: np.ndarray, b: np.ndarray) -> float:
@@ -149,7 +149,7 @@ def _side(curve: np.ndarray, at: int, offsets: tuple[int, ...]) -> tuple[np.ndar
     places = curve[(at + steps) % len(curve)]
     quadratic, line = to_quadratic @ places, to_line @ places
     error, least = (float(((terms @ found - places) ** 2).sum()) for found in (line, quadratic))
-    straight = error < STRAIGHT * least + 1e-6 * float(((places[-1] - places[0]) ** 2).sum())
+    straight = error < CURVED_FIT_RATIO * least + 1e-6 * float(((places[-1] - places[0]) ** 2).sum())
     return line if straight else quadratic, quadratic
 
 

@@ -12,7 +12,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
 
-AHEAD = 4  # points on each side from which the direction of a curve is found
+POINTS_OF_DIRECTION = 4  # points on each side from which the direction of a curve is found
 
 
 def length_around(turns: np.ndarray) -> float:
@@ -42,7 +42,9 @@ def heights_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
 
 def outward(surface: Surface, curve: np.ndarray) -> np.ndarray:
     """Unit vectors (M, 3) along the surface, away from it, square to a closed curve of equal steps (M, 3), the surface to its left."""
-    return _outward(surface, curve, np.roll(curve, -AHEAD, axis=0) - np.roll(curve, AHEAD, axis=0))
+    return _outward(
+        surface, curve, np.roll(curve, -POINTS_OF_DIRECTION, axis=0) - np.roll(curve, POINTS_OF_DIRECTION, axis=0)
+    )
 
 
 def room_across(curve: np.ndarray, reach: float, step: float) -> np.ndarray:

@@ -29,10 +29,10 @@ from .rolling_disc import boundary_loops
 
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
 SPIKES = (0.6, 0.3, 0.16)
-OPEN = 0.6  # share of a loop that must have room for a disc outside
+LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
-BACK = 16  # a boundary point touched again within this many steps was never left
+STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
 PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 
@@ -141,11 +141,8 @@ def find_boundary(
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
-        kept = _KEPT[samples] = (
-            settings,
-            filled if filled is not samples else None,
-            boundary,
-        )  # the value must not keep its key alive
+        # the value must not keep its key alive
+        kept = _KEPT[samples] = (settings, filled if filled is not samples else None, boundary)
     if progress:
         progress("boundary", 1.0)
     return kept[1] or samples, kept[2]
@@ -191,7 +188,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     for points, (loop, piece) in zip(slid, loops, strict=True):
         if len(points) < 3:
             continue
-        if kernels.open_share(surface, samples.boxes, points, loop[0], radius) < OPEN:
+        if kernels.open_share(surface, samples.boxes, points, loop[0], radius) < LEAST_OPEN_SHARE:
             continue
         curve = resample(points, CURVE_STEP * length)
         for width in SPIKES:
@@ -295,7 +292,7 @@ def _onwards(touched: np.ndarray) -> list[int]:
     """Which touched points (M, 3) advance along the loop; where one is touched again soon after, those between do not."""
     ahead = np.zeros(len(touched), np.int64)
     x, y, z = touched.T.copy()
-    for k in range(1, BACK + 1):
+    for k in range(1, STEPS_BACK + 1):
         ahead[:-k][(x[:-k] == x[k:]) & (y[:-k] == y[k:]) & (z[:-k] == z[k:])] = k
     kept, at = [], 0
     while at < len(touched):

@@ -18,24 +18,24 @@ from ..surface.samples import KEPT, narrow_surface, samples_with
 from .corners import CURVE_STEP
 from .curves import length_around
 from .holes import fill_holes
-from .polylines import divide, feet_on_scan, find_corners
+from .polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan
 
 if TYPE_CHECKING:
     from ..kernels.surface.local_surface import Surface
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-OUTSIDE = "outside of the boundary that was given"
+OUTSIDE_BOUNDARY = "outside of the boundary that was given"
 BRIDGED = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
-SHORTEST = 3.0  # shortest boundary [member lengths]
+SHORTEST_BOUNDARY = 3.0  # shortest boundary [member lengths]
 CORNERS_APART = 0.5  # of two corners nearer along the boundary the sharper one is a node [member lengths]
-FIT = 120.0  # points of the scan that a patch under the boundary is fitted to
-AWAY = 1.0  # a boundary of the scan that comes no farther than this from that given is the same [member lengths]
-HARDLY = 0.05  # share of the samples beside a boundary below which there is no scan on that side
-INSIDE = 0.9  # share of a boundary of the scan that must lie inside for it to be a hole there
+# a boundary of the scan that comes no farther than this from that given is the same [member lengths]
+SAME_BOUNDARY_WITHIN = 1.0
+LEAST_SCANNED_SHARE = 0.05  # share of the samples beside a boundary below which there is no scan on that side
+INSIDE_SHARE = 0.9  # share of a boundary of the scan that must lie inside for it to be a hole there
 
 
-class Ring(NamedTuple):
+class GivenRing(NamedTuple):
     """A closed curve that bounds the grid."""
 
     points: np.ndarray  #: (M, 3) the surface to its left, relative to the cloud's origin
@@ -80,7 +80,7 @@ class Inside:
 
 def cut_along(
     samples: SurfaceSamples, scanned: Sequence[tuple[np.ndarray, int]], settings: Settings
-) -> tuple[SurfaceSamples, list[Ring]]:
+) -> tuple[SurfaceSamples, list[GivenRing]]:
     """Return the samples inside the boundary that the settings give, and that boundary.
 
     Parameters
@@ -88,8 +88,7 @@ def cut_along(
     samples : SurfaceSamples
     scanned : sequence of ((M, 3), int)
         The boundary loops of the scan and their pieces, the longest of each piece first. Those inside that are not given are closed.
-    settings : Settings
-        `boundary`, `length`, `corner_angle`.
+    settings : `boundary`, `length`, `corner_angle`
 
     Raises
     ------
@@ -107,7 +106,7 @@ def cut_along(
             points, corner_at = points[::-1], np.sort(len(points) - 1 - corner_at)
         nearest = int(((cut.surface.mean - points[0]) ** 2).sum(axis=1).argmin())
         external = bool(inside.external[number])
-        found.append(Ring(np.ascontiguousarray(points), corner_at, external, int(cut.piece[nearest])))
+        found.append(GivenRing(np.ascontiguousarray(points), corner_at, external, int(cut.piece[nearest])))
     return cut, found
 
 
@@ -119,7 +118,7 @@ def _samples_inside(samples: SurfaceSamples, added: np.ndarray, inside: Inside, 
     whole = samples.whole
     if whole is not None:
         whole = np.ascontiguousarray(whole[inside.holds(whole, owners_of(samples, whole))])
-    beyond = ((OUTSIDE, int((~kept).sum())),) if not kept.all() else ()
+    beyond = ((OUTSIDE_BOUNDARY, int((~kept).sum())),) if not kept.all() else ()
     return replace(
         cut,
         scan=np.ascontiguousarray(samples.scan[kept]),
@@ -141,19 +140,19 @@ def _curve(
     """
     length, unit = settings.length, f" {samples.unit}" if samples.unit else ""
     given = np.array(ring, float) - samples.origin
-    if (around := length_around(given)) < SHORTEST * length:
+    if (around := length_around(given)) < SHORTEST_BOUNDARY * length:
         raise LengthError(
-            f"boundary {number} is {around:.4g}{unit} long; three members, {SHORTEST * length:.4g}{unit}, are needed"
+            f"boundary {number} is {around:.4g}{unit} long; three members, {SHORTEST_BOUNDARY * length:.4g}{unit}, are needed"
         )
-    points, vertices = divide(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
-    _, gaps = feet_on_scan(points, narrow_surface(samples, FIT))
+    points, vertices = divide_polyline(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
+    _, gaps = feet_on_scan(points, narrow_surface(samples, POINTS_UNDER_LINE))
     if (worst := float(gaps.max())) > BRIDGED * length:
         place = words_of_place(points[int(gaps.argmax())] + samples.origin)
         raise LengthError(
             f"boundary {number} leaves the scan by up to {worst:.4g}{unit}, near ({place});"
             f" it must stay within half a member, {BRIDGED * length:.4g}{unit}, which the grid bridges"
         )
-    return points, _apart(points, find_corners(points, vertices, True, settings), CORNERS_APART * length)
+    return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)
 
 
 def _apart(points: np.ndarray, corners: Sequence[int], distance: float) -> np.ndarray:
@@ -295,7 +294,7 @@ def _inside_is_right(
         Both sides are the same region.
     """
     totals = [int(side.sum()) for side in sides]
-    if min(totals) <= HARDLY * max(totals):
+    if min(totals) <= LEAST_SCANNED_SHARE * max(totals):
         return totals[1] > totals[0]
     regions = [int(side.argmax()) for side in sides]
     if regions[0] == regions[1]:
@@ -317,7 +316,7 @@ def _rim_samples(
     places = [np.zeros((0, 3))]
     for points, piece in scanned:
         if piece not in seen:
-            places.append(points[_nearest(points, rings, AWAY * length) < 0])
+            places.append(points[_nearest(points, rings, SAME_BOUNDARY_WITHIN * length) < 0])
         seen.add(piece)
     owner = owners_of(samples, np.concatenate(places))
     return owner[owner >= 0]
@@ -327,5 +326,5 @@ def _is_hole(points: np.ndarray, samples: SurfaceSamples, inside: Inside, length
     """Whether a boundary loop of the scan (M, 3) lies inside and is none of those given."""
     owner = owners_of(samples, points)
     owner = owner[owner >= 0]
-    away = bool((_nearest(points, inside.rings, AWAY * length) < 0).any())
-    return away and len(owner) > 0 and bool(inside.sample[owner].mean() > INSIDE)
+    away = bool((_nearest(points, inside.rings, SAME_BOUNDARY_WITHIN * length) < 0).any())
+    return away and len(owner) > 0 and bool(inside.sample[owner].mean() > INSIDE_SHARE)

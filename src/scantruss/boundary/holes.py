@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.samples import SurfaceSamples
 
 FILLING_SPACING = 0.1  # distance between the points generated over a hole [member lengths]
 PLACES_AROUND_HOLE = 60  # places along the boundary of a hole from which its surroundings are sampled
 LOOK_STEP = 0.3  # step of a ray away from the hole [member lengths]
-SIGHT = (1.5, 0.25)  # how far a ray goes: in member lengths, in diameters of the hole; the larger counts
-LOST = 0.6  # distance from the nearest sample at which a ray has left the scan [member lengths]
+RAY_LENGTHS = (1.5, 0.25)  # how far a ray goes: in member lengths, in diameters of the hole; the larger counts
+RAY_LEAVES_SCAN = 0.6  # distance from the nearest sample at which a ray has left the scan [member lengths]
 # cosine of the angle between the surroundings and the plane of the hole below which that plane is not used
-STEEP = 0.35
+LEAST_PLANE_COSINE = 0.35
 FEWEST_PLACES_FOR_PLATE = 12  # fewest places around a hole through which a plate is fitted
 SMOOTHING = 1e-6  # smoothing of the plate [squared diameters of the hole]
 
@@ -39,12 +39,14 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
     """
     length = surface.length
     around = float(np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=1).sum())
-    start, away, places, normals = _look_around(surface, curve, max(SIGHT[0] * length, SIGHT[1] * around / np.pi))
+    start, away, places, normals = _look_around(
+        surface, curve, max(RAY_LENGTHS[0] * length, RAY_LENGTHS[1] * around / np.pi)
+    )
     if len(places) < FEWEST_PLACES_FOR_PLATE:
         return np.zeros((0, 3))
     axis = _axis(curve)
     least = float((normals @ axis).min())
-    if least > STEEP:
+    if least > LEAST_PLANE_COSINE:
         frame = _frame(axis)
         flat, hole_boundary = (places - curve.mean(axis=0)) @ frame.T, (curve - curve.mean(axis=0)) @ frame.T
         fine = min(1.0, 1.5 * least)
@@ -68,7 +70,7 @@ def _look_around(
     away : (K,) distance from there [scan unit]
     places, normals : (K, 3) on the scanned surface
     """
-    length, patch = surface.length, np.zeros(PATCH)
+    length, patch = surface.length, np.zeros(PATCH_COLUMNS)
     found: list[tuple[int, float, np.ndarray, np.ndarray]] = []
     sample = nearest_sample(surface, *curve[0].tolist())
     for i in range(0, len(curve), max(1, len(curve) // PLACES_AROUND_HOLE)):
@@ -80,7 +82,7 @@ def _look_around(
             out = out - normal * (out @ normal)
             place = place + LOOK_STEP * length * out / max(float(np.linalg.norm(out)), 1e-300)
             at = walk(surface, at, tuple(place))
-            if np.linalg.norm(surface.mean[at] - place) > LOST * length:
+            if np.linalg.norm(surface.mean[at] - place) > RAY_LEAVES_SCAN * length:
                 break
             fit_patch(surface, patch, at, tuple(place))
             place = np.array(onto_patch(patch, tuple(place)))

@@ -14,23 +14,25 @@ from .curves import heights_along, outward, room_across, runs_around, smooth_bet
 
 WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
 # half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
-WIDER = (1.0, 2.0, 3.0)
+WIDER_WINDOWS = (1.0, 2.0, 3.0)
 CURVE_PARTS = 6  # a window is never wider than the curve over this number
-MOVED = 2.0  # a wider window may move the curve inwards by this many times the sampling bias
+WINDOW_SHIFT = 2.0  # a wider window may move the curve inwards by this many times the sampling bias
 # a wider window may close a bay in which this many points are expected; with up to 1.5 times as many, half of it
-BAY = 4.0
-ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
-SIDE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
-EMPTY = 6.0  # a corner in a bay where no more points than this are expected does not count
+POINTS_OF_CLOSED_BAY = 4.0
+ROOM_ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
+OFFSET_SHARE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
+POINTS_OF_EMPTY_BAY = 6.0  # a corner in a bay where no more points than this are expected does not count
 BAY_REACH = 1.5  # a bay is measured under a chord that starts and ends this far from its middle [member lengths]
-FLAT = 0.7  # least cosine between the direction into a bay and the surface
-BEYOND = 0.44  # mean distance of the surface edge beyond the outermost random points, in the unit of `sampling_bias_of`
-EXACT = 0.1  # roughness of a boundary below which its points lie exactly on the edge [sampling biases]
+BAY_COSINE = 0.7  # least cosine between the direction into a bay and the surface
+# mean distance of the surface edge beyond the outermost random points, in the unit of `sampling_bias_of`
+MEAN_BEYOND = 0.44
+EXACT_ROUGHNESS = 0.1  # roughness of a boundary below which its points lie exactly on the edge [sampling biases]
 RANDOM_POINTS = 0.4  # roughness of a boundary above which its points are random [sampling biases]
-OUT = 0.6  # share of the sampling bias by which the curve is moved outwards; more would put nodes off the surface
+# share of the sampling bias by which the curve is moved outwards; more would put nodes off the surface
+OFFSET_OF_BIAS = 0.6
 # sampling bias up to which corners are found at full resolution; beyond it they are looked for more coarsely [member lengths]
 CORNERS_SHOW_TO = 0.07
-COARSEST = 2.0  # corners are looked for at most this many times more coarsely
+COARSEST_CORNERS = 2.0  # corners are looked for at most this many times more coarsely
 
 
 @dataclass(frozen=True)
@@ -47,13 +49,15 @@ NO_BIAS = SamplingBias(0.0, np.inf)
 def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:
     """Return how far the surface extends beyond its boundary points (M, 3), which a disc slid from outside touches.
 
-    For random points of density rho the mean is `BEYOND` rho^(-2/3) r^(-1/3): the disc of radius r enters to the depth h at which
+    For random points of density rho the mean is `MEAN_BEYOND` rho^(-2/3) r^(-1/3): the disc of radius r enters to the depth h at which
     the segment inside the surface, of area (4/3) (2 r)^(1/2) h^(3/2), holds about one point. Points placed on the edge itself, as
     in a mesh, hardly rise above the lines through their neighbours: then there is no bias.
     """
-    of_random_points = BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
+    of_random_points = MEAN_BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
     uneven = float(np.median(np.abs(heights_along(surface, points)))) / of_random_points
-    return SamplingBias(of_random_points * min(max((uneven - EXACT) / (RANDOM_POINTS - EXACT), 0.0), 1.0), density)
+    return SamplingBias(
+        of_random_points * min(max((uneven - EXACT_ROUGHNESS) / (RANDOM_POINTS - EXACT_ROUGHNESS), 0.0), 1.0), density
+    )
 
 
 def offset_curve(
@@ -73,15 +77,18 @@ def offset_curve(
         (narrow,), corner_at = smooth_between(curve, *find_corners(curve, settings), [round(WINDOW / CURVE_STEP)])
         return narrow, corner_at
     beyond, step = bias.beyond, CURVE_STEP * settings.length
-    room = SIDE * room_across(curve, ACROSS * settings.length, step)
-    curve = curve + np.minimum(OUT * beyond, room)[:, None] * outward(surface, curve)
+    room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
+    curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
     at, places = _corners(curve, bias, settings, surface)
-    halves = [round(WINDOW / CURVE_STEP), *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER)]
+    halves = [
+        round(WINDOW / CURVE_STEP),
+        *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER_WINDOWS),
+    ]
     (narrow, *wider), corner_at = smooth_between(curve, at, places, halves)
     smoothed, out = narrow, outward(surface, wider[-1])
-    room = SIDE * room_across(narrow, ACROSS * settings.length, step)
+    room = OFFSET_SHARE * room_across(narrow, ROOM_ACROSS * settings.length, step)
     for one in wider:
-        share = explained(one - narrow, out, room, bias.density * step, MOVED * beyond)
+        share = explained(one - narrow, out, room, bias.density * step, WINDOW_SHIFT * beyond)
         smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
 
@@ -90,11 +97,11 @@ def _corners(
     curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where a curve along random points has corners, and their places; not those in bays that random sampling explains."""
-    coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST)
+    coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST_CORNERS)
     at, places = find_corners(curve, settings, coarser)
     if len(at) == 0:
         return at, places
-    kept = bays_at(curve, at, outward(surface, curve)) * bias.density > EMPTY
+    kept = bays_at(curve, at, outward(surface, curve)) * bias.density > POINTS_OF_EMPTY_BAY
     return at[kept], places[kept]
 
 
@@ -112,7 +119,7 @@ def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     area = -0.5 * dots(np.cross(part[:, :-1], part[:, 1:]).sum(axis=1), normal)
     across = (chord[:, None] * share - part).sum(axis=1)
-    found: np.ndarray = np.where(dots(across, outwards) > FLAT * np.linalg.norm(across, axis=1), area, np.inf)
+    found: np.ndarray = np.where(dots(across, outwards) > BAY_COSINE * np.linalg.norm(across, axis=1), area, np.inf)
     return found
 
 
@@ -131,7 +138,7 @@ def explained(step: np.ndarray, out: np.ndarray, room: np.ndarray, density: floa
     along = dots(step, out)
     run = runs_around(along > 0.0)
     missing = np.bincount(run, np.abs(along))[run] * density
-    bay = np.minimum(2.0 - missing / BAY, room / np.maximum(along, 1e-300))
+    bay = np.minimum(2.0 - missing / POINTS_OF_CLOSED_BAY, room / np.maximum(along, 1e-300))
     tongue = 2.0 - np.linalg.norm(step, axis=1) / inwards
     share: np.ndarray = np.clip(np.where(along > 0.0, bay, tongue), 0.0, 1.0)
     return share

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH, Surface, fit_patch, onto_patch, walk
+from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, walk
 
 if TYPE_CHECKING:
     from ..settings import Settings
 
-COARSE = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
+POINTS_UNDER_LINE = 120.0  # points of the scan that a patch under a line or a boundary is fitted to
+ZIGZAG_WIDTH = 0.03  # zigzags below this are straightened before corners are looked for [member lengths]
 
 
 def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
@@ -44,7 +45,7 @@ def simplify(points: np.ndarray, tolerance: float, closed: bool) -> np.ndarray:
     return found
 
 
-def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
+def divide_polyline(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Return points (M, 3) at most a step apart along a polyline, its vertices among them, and which those are.
 
     The first point of a closed line, given again as its last, is not repeated.
@@ -59,11 +60,11 @@ def divide(vertices: np.ndarray, closed: bool, step: float) -> tuple[np.ndarray,
     return np.concatenate([*parts, vertices[-1:]]), np.array(at)
 
 
-def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
+def corners_of_polyline(points: np.ndarray, vertices: np.ndarray, closed: bool, settings: Settings) -> list[int]:
     """Return which of the points (M, 3) of a line are corners, the sharpest first: where it turns by more than `corner_angle`."""
     places = points[vertices]
     whole = np.concatenate([places, places[:1]]) if closed else places
-    coarse = simplify(whole, COARSE * settings.length, closed)
+    coarse = simplify(whole, ZIGZAG_WIDTH * settings.length, closed)
     before, after = np.diff(coarse, axis=0), np.diff(coarse, axis=0)[1:]
     if closed:
         after = np.concatenate([after, before[:1]])
@@ -79,7 +80,7 @@ def find_corners(points: np.ndarray, vertices: np.ndarray, closed: bool, setting
 
 def feet_on_scan(points: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the feet (M, 3) on the scan of the points of a polyline, and how far it leaves the scan there (M,) [scan unit]."""
-    patch, feet, gaps, sample = np.zeros(PATCH), np.empty_like(points), np.empty(len(points)), -1
+    patch, feet, gaps, sample = np.zeros(PATCH_COLUMNS), np.empty_like(points), np.empty(len(points)), -1
     for k, place in enumerate(points.tolist()):
         at = (place[0], place[1], place[2])
         sample = walk(surface, sample, at) if sample >= 0 else nearest_sample(surface, *at)

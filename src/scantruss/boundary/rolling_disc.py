@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.boundary import loops as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
-from ..scan.normals import SAMPLES_PER_THREAD
+from ..scan.normals import NORMALS_PER_THREAD
 from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
@@ -36,7 +36,7 @@ def boundary_loops(
         own = surface if part == 0 else with_own_scratch(surface)
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
-    in_parts(len(free), SAMPLES_PER_THREAD, look)
+    in_parts(len(free), NORMALS_PER_THREAD, look)
     rolling = _RollingDisc(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
     loops, short, closed = list[Rolled](), list[Rolled](), np.zeros(len(free), np.bool_)
     for sample in np.flatnonzero(free < 9.0).tolist():

@@ -29,11 +29,10 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-COVER_REACH = (
-    0.5  # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
-)
+# distance within which a point of the scan and a triangle are in reach of each other [member lengths]
+COVER_REACH = 0.5
 
-MOST_FAULTS = 3  # faults that a refusal names
+FAULTS_NAMED = 3  # faults that a refusal names
 
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -88,8 +87,8 @@ def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     grid = grid.replace(certificate=certificate)
     if certificate.passed:
         return grid
-    words = " and ".join(fault.words for fault in certificate.faults[:MOST_FAULTS])
-    more = len(certificate.faults) - MOST_FAULTS
+    words = " and ".join(fault.words for fault in certificate.faults[:FAULTS_NAMED])
+    more = len(certificate.faults) - FAULTS_NAMED
     words += f" and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
     raise CertificateError(f"the grid {words}; --keep-failed gives it all the same", grid, where)

@@ -16,7 +16,7 @@ from ..kernels.geometry.boxes import new_boxes
 from ..kernels.mesh.crossings import doubtful_pairs
 
 MOST_CROSSINGS = 100  # number of intersecting pairs after which the search stops
-ROOM = 1024  # pairs for which the first search has room
+ROOM_FOR_PAIRS = 1024  # pairs for which the first search has room
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
@@ -49,7 +49,7 @@ def _doubtful(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     middles = 0.5 * (lower + upper)
     radii = np.sqrt(((corners - middles[:, None]) ** 2).sum(axis=2).max(axis=1))
-    room, widest = ROOM, float(radii.max())
+    room, widest = ROOM_FOR_PAIRS, float(radii.max())
     while True:
         box = 2.0 * widest if widest > 0.0 else 1.0
         boxes = new_boxes(lower.min(axis=0), upper.max(axis=0), box, len(triangles), len(triangles))

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..grid.certificate import Certificate, Fault, Place, place_of
+from ..errors import Place
+from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.topology import pinched_nodes
 from ..kernels.geometry.components import component_labels
 from .crossings import MOST_CROSSINGS
-from .limits import MOST_PLACES
+from .limits import PLACES_KEPT
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -83,7 +84,7 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         pairs = "a pair" if len(crossings) == 1 else f"{len(crossings)} pairs"
         more = " or more" if len(crossings) == MOST_CROSSINGS else ""
         middles = grid.nodes[grid.triangles[crossings]].mean(axis=(1, 2)) + grid.origin
-        where, *others = (place_of(middle) for middle in middles[:MOST_PLACES])
+        where, *others = (place_of(middle) for middle in middles[:PLACES_KEPT])
         words = f"has {pairs}{more} of triangles that cut each other"
         faults.append(Fault("crossing", words, where, tuple(others)))
     quality = grid.quality

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 FIRST_REACH = 0.1  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
-GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
-BOX = 0.5  # width of the boxes of triangles [member lengths]
+REACH_GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
+TRIANGLE_BOX = 0.5  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]
-AROUND = 12  # points through which the plane at a node goes
-POINTS_PER_THREAD = 20_000  # fewest points for a thread of their own
+POINTS_OF_PLANE = 12  # points through which the plane at a node goes
+PLACES_MEASURED_PER_THREAD = 20_000  # fewest points for a thread of their own
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +58,10 @@ def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np
     """
     distance, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
     waiting, reach = np.arange(len(points)), FIRST_REACH * length
-    for _ in range(GROWTHS):
-        index = triangle_boxes(grid.nodes, grid.triangles, max(BOX * length, reach), reach)
+    for _ in range(REACH_GROWTHS):
+        index = triangle_boxes(grid.nodes, grid.triangles, max(TRIANGLE_BOX * length, reach), reach)
         look_up = partial(nearest_triangles, points, index, grid.nodes, grid.triangles, waiting, distance, nearest)
-        in_parts(len(waiting), POINTS_PER_THREAD, lambda _, begin, end: look_up(begin, end))  # noqa: B023
+        in_parts(len(waiting), PLACES_MEASURED_PER_THREAD, lambda _, begin, end: look_up(begin, end))  # noqa: B023
         waiting = waiting[nearest[waiting] < 0]
         if not len(waiting):
             break
@@ -80,7 +80,7 @@ def distances_to_points(
     to_nodes, noise = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
     nearest_distances(grid.nodes, points, boxes, 0.25 * length, to_corners)
-    plane_distances(grid.nodes, points, boxes, AROUND, 2.5 * samples.spacing, to_nodes, noise)
+    plane_distances(grid.nodes, points, boxes, POINTS_OF_PLANE, 2.5 * samples.spacing, to_nodes, noise)
     if samples.measured < len(samples.surface.mean):
         to_middles[_over_holes(middles, samples)] = np.nan
         over = _over_holes(grid.nodes, samples)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 OTHER_PIECES = ("pieces", "not chosen", "floor")  # parts of the scan that are pieces by themselves, without a grid
-MOST_PLACES = 5  # places of a kind that are listed one by one; the others are one entry without a place
+PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
 
 def parts_left_out(
@@ -88,8 +88,8 @@ def _places(
         return []
     _, number, counts = np.unique(group, return_inverse=True, return_counts=True)
     largest = np.argsort(-counts, kind="stable")
-    parts = [_part(kind, which[number == each], samples, distance) for each in largest[:MOST_PLACES]]
-    rest = np.isin(number, largest[MOST_PLACES:])
+    parts = [_part(kind, which[number == each], samples, distance) for each in largest[:PLACES_LISTED]]
+    rest = np.isin(number, largest[PLACES_LISTED:])
     return [*parts, *([_part(kind, which[rest], samples, distance, placed=False)] if rest.any() else [])]
 
 
@@ -114,10 +114,10 @@ def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     holes = [_hole(places, samples, asked=True) for places in filled]
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged]
     holes.sort(key=lambda hole: -(hole.size or 0.0))
-    if len(more := holes[MOST_PLACES:]) < 2:
+    if len(more := holes[PLACES_LISTED:]) < 2:
         return holes
     rest = replace(more[0], where=None, number=len(more), asked=all(hole.asked for hole in more))
-    return [*holes[:MOST_PLACES], rest]
+    return [*holes[:PLACES_LISTED], rest]
 
 
 def _hole(places: np.ndarray, samples: SurfaceSamples, *, asked: bool) -> LeftOut:

@@ -20,8 +20,8 @@ WARN_ANGLE = 25.0  # angle of a triangle below which it is poor [degree]
 WARN_SHORT, WARN_LONG = 0.6, 1.6  # members below and above which they are poor [desired lengths]
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
-NOISE = 3.0  # rms distances of points from their plane that are noise
-MOST_PLACES = 30  # places of a fault that are kept, the worst first
+NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
+PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 WARN_LEFT_OUT = 0.01  # share of the points that ScanTruss may leave out by itself without a word
 
 
@@ -45,7 +45,7 @@ class Figure:
             return None
         worst = bad[np.argsort(-sign * self.values[bad], kind="stable")]
         more = f" ({len(bad):,} such places)" if len(bad) > 1 else ""
-        at, *others = (place_of(place) for place in self.places[worst[:MOST_PLACES]])
+        at, *others = (place_of(place) for place in self.places[worst[:PLACES_KEPT]])
         return Fault(self.kind, self.words.format(self.values[worst[0]]) + more, at, tuple(others))
 
 
@@ -76,7 +76,7 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     measured = np.isfinite(found.nodes) & ~grid.fixed
     if settings.boundary:  # its nodes lie where the user says
         measured[grid.edges[grid.edge_uses == 1]] = False
-    off = np.maximum(found.nodes - NOISE * found.noise, 0.0)[measured] / at_nodes[measured]
+    off = np.maximum(found.nodes - NOISES_OFF * found.noise, 0.0)[measured] / at_nodes[measured]
     return [
         Figure("angle", grid.angles[shapeable].ravel(), corners, settings.min_angle, WARN_ANGLE,
                "has an angle of {:.1f} degrees", largest=False),

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .outputs import claim, cloud_output, inputs_of, outs_of
+from .outputs import claim, claim_clouds
 from .shared import cloud_file_notes, note_compiling, read_scan
 
 if TYPE_CHECKING:
     from ..scan.clean.steps import CleanCloud
     from .options import Parser
 
-LARGEST = {"duplicates": 1.0, "loose-pieces": 0.5, "layer-distance": 20.0}  # beyond these most of a scan is lost
+LARGEST_VALUES = {"duplicates": 1.0, "loose-pieces": 0.5, "layer-distance": 20.0}  # beyond these most of a scan is lost
 SHARES = {  # option, step that it steers, metavar, default, what it is
     "duplicates": ("SHARE", 0.01, "remove points closer to an earlier one than this share of the spacing"),
     "outlier-distance": (
@@ -29,7 +29,7 @@ SHARES = {  # option, step that it steers, metavar, default, what it is
     ),
     "layer-distance": ("NUMBER", 2.0, "merge two layers up to this many spacings apart"),
 }
-KEEP = {
+KEEP_OPTIONS = {
     "duplicates": ("keep-duplicates", "keep duplicate points"),
     "outlier-distance": ("keep-outliers", "keep outliers"),
     "loose-pieces": ("keep-pieces", "keep loose pieces"),
@@ -54,7 +54,7 @@ def clean_parser() -> Parser:
         steps.add_argument(
             f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
         )
-        keep, said = KEEP[name]
+        keep, said = KEEP_OPTIONS[name]
         steps.add_argument(f"--{keep}", action="store_true", help=said)
     steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: remove no noise")
     steps.add_argument(
@@ -90,7 +90,7 @@ def clean(values: Namespace) -> None:
         for out in outs:
             write_points(save.beside(out), points, normals=result.normals, unit=result.unit, origin=result.origin)
         if report is not None:
-            save.json(report, report_of(result, len(cloud.points)))
+            save.json(report, figures_of_cleaning(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [*map(str, outs), *([str(report)] if report else [])]
     said = [note for out in outs for note in cloud_file_notes(out)]
@@ -101,11 +101,8 @@ def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:
     """Return where the results go, checked before anything is read."""
     from ..runtime.files import check_place
 
-    outs = [cloud_output(out) for out in outs_of(values)]
+    outs, taken = claim_clouds(values, "clean cloud")
     report = check_place(values.report, (".json",)) if values.report else None
-    taken = inputs_of(values)
-    for out in outs:
-        claim(out, "clean cloud", taken, force=values.force, kind="cloud")
     if report is not None:
         claim(report, "report", taken, force=values.force)
     return outs, report
@@ -121,14 +118,14 @@ def _steps(values: Namespace) -> dict[str, Any]:
     }
     for name in SHARES:
         field = name.replace("-", "_")
-        steps[field] = None if given[KEEP[name][0].replace("-", "_")] else given[field]
+        steps[field] = None if given[KEEP_OPTIONS[name][0].replace("-", "_")] else given[field]
         if steps[field] is not None and not 0 <= steps[field] < float("inf"):
             raise InputError(f"--{name} must be a number of 0 or more, got {given[field]:g}")
-        if (steps[field] or 0.0) > LARGEST.get(name, float("inf")):
+        if (steps[field] or 0.0) > LARGEST_VALUES.get(name, float("inf")):
             _, default, words = SHARES[name]
             raise InputError(
                 f"--{name} {given[field]:g} would {words.partition(',')[0]}, and so most of the scan;"
-                f" it must be at most {LARGEST[name]:g} (default {default:g})"
+                f" it must be at most {LARGEST_VALUES[name]:g} (default {default:g})"
             )
         if name == "outlier-distance" and 0 < (steps[field] or 0.0) < 1:
             raise InputError(f"--{name} {given[field]:g} would remove most of the scan; it must be 0, or 1 or more")
@@ -137,7 +134,7 @@ def _steps(values: Namespace) -> dict[str, Any]:
     return steps
 
 
-def report_of(result: CleanCloud, points: int) -> dict[str, Any]:
+def figures_of_cleaning(result: CleanCloud, points: int) -> dict[str, Any]:
     """Return all figures of a run, ready for JSON."""
     return {
         "points_read": points,

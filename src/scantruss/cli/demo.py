@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .grid import make_grid, show_grid
+from .grid import grid_with_notes, show_grid
 from .outputs import claim, result_folder
 from .shared import read_scan
 
@@ -38,7 +38,7 @@ def demo(values: Namespace) -> None:
         claim(folder / name, "result", {}, force=values.force)
     with Bars() as bars:
         cloud = read_scan(str(SCAN), demo_settings(), bars)
-        result = make_grid(cloud, demo_settings(), bars)
+        result = grid_with_notes(cloud, demo_settings(), bars)
         bars("picture, solid", 0.0)
         written = save_demo(folder, result, cloud, force=values.force)
     show_grid(result, len(cloud.points), written)

@@ -13,7 +13,7 @@ from ..export.drawing.style import VIEWS
 from ..export.style import OBJ_ELEMENTS, FileStyle
 from .outputs import claim, inputs_of, outs_of
 from .shared import (
-    SCAN,
+    SCAN_HELP,
     add_memory,
     note_compiling,
     note_layers,
@@ -42,7 +42,7 @@ def grid_parser() -> Parser:
         "Turn a scan into a triangular grid truss of a desired member length.\n"
         "The options come in three parts: everyday, expert, and for the method of the paper only.",
     )
-    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_outs(parser, "results; the suffix names the format", "*")
     files = parser.add_argument_group("files")
     files.add_argument(
@@ -101,7 +101,7 @@ def grid(values: Namespace) -> None:
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)
         try:
-            result = make_grid(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+            result = grid_with_notes(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
         except FrontError as error:
             draw_refusal(error, cloud, outs, style, bars, force=values.force)
             raise
@@ -145,7 +145,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
         check_ours(settings_file, "result")
 
 
-def make_grid(
+def grid_with_notes(
     cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
 ) -> Grid:
     """Run the chain, with a note if kernels must be compiled."""
@@ -161,23 +161,19 @@ def make_grid(
             note_pieces(bars, cloud, settings)
             words = f"{error}{nearby_words(bars, cloud, settings)}"
             raise type(error)(words, error.grid, error.where) from None
-    if grid.settings is not None and grid.settings.judge_outliers != settings.judge_outliers:
-        bars.note(
-            "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always"
-        )
-    if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
-        bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
-    if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
-        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
-    if grid.settings is not None and grid.settings.box_size != settings.box_size:
-        bars.note(
-            f"no grid passes with the usual sample spacing, so it is made as with --box-size {grid.settings.box_size:g}"
-        )
-    if grid.settings is not None and grid.settings.method != settings.method:
-        bars.note("no grid of the default method passes its certificate here, so it is made by the method of the paper")
-    note_outliers(bars, cloud, grid.settings or settings)
-    note_layers(bars, cloud, grid.settings or settings)
-    note_pieces(bars, cloud, grid.settings or settings)
+    made = grid.settings or settings
+    for name, words in {
+        "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
+        "keep_rods": "no grid passes with the columns, scaffold or cables of this scan, so they are left out",
+        "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
+        "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
+        "method": "no grid of the default method passes its certificate here, so it is made by the method of the paper",
+    }.items():
+        if getattr(made, name) != getattr(settings, name):
+            bars.note(words)
+    note_outliers(bars, cloud, made)
+    note_layers(bars, cloud, made)
+    note_pieces(bars, cloud, made)
     return grid
 
 

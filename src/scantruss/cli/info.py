@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from .shared import (
-    SCAN,
+    SCAN_HELP,
     add_memory,
     note_compiling,
     note_layers,
@@ -29,7 +29,7 @@ def info_parser() -> Parser:
         "SCAN [options]",
         "Points, extent, spacing, noise and boundaries of a scan, and the results of some member lengths.",
     )
-    parser.add_argument("scan", metavar="SCAN", help=SCAN)
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_memory(parser)
     add_settings(parser, ("length", "method", "thin_spacing", *READING))
     return parser

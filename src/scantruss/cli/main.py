@@ -14,7 +14,7 @@ from typing import cast
 
 from .. import __version__
 from ..errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
-from ..runtime.stopping import STATUS, asked, note_told, signals_heard, words_of_stop
+from ..runtime.stopping import SIGNAL_STATUS, asked, note_told, signals_heard, words_of_stop
 
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equal members
@@ -100,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 sys.stdout.flush()
             except BaseException as error:
                 return end(error)
-    except KeyboardInterrupt as error:  # while another end was told of
+    except KeyboardInterrupt as error:  # while another end was reported
         return end(error)
     return 0
 
@@ -108,14 +108,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def end(error: BaseException) -> int:
     """Say why a command has ended early and return the exit status; what says nothing in words is raised again."""
     if (number := asked()) is not None:  # whoever was interrupted may have made another error of it
-        return refuse(words_of_stop(number), STATUS[number])
+        return refuse(words_of_stop(number), SIGNAL_STATUS[number])
     if isinstance(
         error, BrokenPipeError
     ):  # the reader of the output has gone, as in `scantruss info scan.ply | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     if isinstance(error, KeyboardInterrupt):
-        return refuse(words_of_stop(signal.SIGINT), STATUS[signal.SIGINT])
+        return refuse(words_of_stop(signal.SIGINT), SIGNAL_STATUS[signal.SIGINT])
     if isinstance(error, FrontError):
         place = "" if error.where is None else f" (near {words_of_place(error.where)})"
         return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from ..errors import InputError
 from ..selection import Selection, read_crop
 from ..settings import CURVATURE, RECORDS, Settings
-from .positions import position, read_lines, read_positions
+from .positions import position, read_polylines, read_positions
 
 
 class UsageError(InputError):
@@ -267,11 +267,13 @@ def settings_of(values: argparse.Namespace) -> Settings:
         explicit["length_field"] = named if named.startswith(CURVATURE) else read_lengths(named)
         kept.pop("length", None)
     if "fixed_lines" in explicit:
-        named_lines = [line for path in explicit["fixed_lines"] for line in read_lines(path)]
+        named_lines = [line for path in explicit["fixed_lines"] for line in read_polylines(path)]
         explicit["fixed_lines"] = tuple(points for _, points in named_lines)
         explicit["line_names"] = tuple(name for name, _ in named_lines)
     if "boundary" in explicit:
-        explicit["boundary"] = tuple(ring for path in explicit["boundary"] for _, ring in read_lines(path, "boundary"))
+        explicit["boundary"] = tuple(
+            ring for path in explicit["boundary"] for _, ring in read_polylines(path, "boundary")
+        )
     merged = kept | explicit
     if "length" not in merged and not merged.get("length_field"):
         raise UsageError(

@@ -53,21 +53,21 @@ def outs_of(values: Namespace) -> list[Path]:
     """
     from .options import UsageError
 
-    outs = [Path(out) for out in (*_as_list(getattr(values, "outs", [])), *values.more_outs)]
+    given = getattr(values, "outs", None) or []
+    outs = [Path(out) for out in (*([given] if isinstance(given, str) else given), *values.more_outs)]
     if not outs:
         raise UsageError("missing OUT, the file of the result; write it last or as -o OUT")
     return outs
 
 
-def _as_list(given: str | list[str] | None) -> list[str]:
-    return given if isinstance(given, list) else [given] if given else []
-
-
-def cloud_output(path: str | Path) -> Path:
-    """Return the path of a cloud to be written, if its format is known and a file can be written there."""
+def claim_clouds(values: Namespace, what: str) -> tuple[list[Path], Taken]:
+    """Return the clouds that a command line names as results, and all files it names, once it is known that they can be written."""
     from ..scan.formats.writing import check_cloud_output
 
-    return check_cloud_output(path)
+    outs, taken = [check_cloud_output(out) for out in outs_of(values)], inputs_of(values)
+    for out in outs:
+        claim(out, what, taken, force=values.force, kind="cloud")
+    return outs, taken
 
 
 def result_folder(path: str | Path) -> Path:

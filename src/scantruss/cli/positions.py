@@ -9,7 +9,7 @@ from pathlib import Path
 from ..errors import FormatError
 
 Position = tuple[float, float, float]
-Part = tuple[str, list[Position]]  # name of a part of a file, "" for none, and its positions
+NamedPart = tuple[str, list[Position]]  # name of a part of a file, "" for none, and its positions
 
 
 def position(text: str) -> Position:
@@ -34,7 +34,7 @@ def read_positions(path: str | Path) -> list[Position]:
     return [place for _, part in _read_parts(path, "fixed nodes") for place in part]
 
 
-def read_lines(path: str | Path, what: str = "fixed line") -> list[Part]:
+def read_polylines(path: str | Path, what: str = "fixed line") -> list[NamedPart]:
     """Return the polylines in a text file with their names: points as `read_positions` takes them, an empty line between two of them.
 
     The name is that of a column `name`, a new one beginning a new polyline; without such a column that of the file, with a number
@@ -56,7 +56,7 @@ def read_lines(path: str | Path, what: str = "fixed line") -> list[Part]:
     ]
 
 
-def _read_parts(path: str | Path, what: str) -> list[Part]:
+def _read_parts(path: str | Path, what: str) -> list[NamedPart]:
     """Return the positions in a text file, in parts that empty lines divide, or that a column of names does."""
     try:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
@@ -64,7 +64,7 @@ def _read_parts(path: str | Path, what: str) -> list[Part]:
         raise FormatError(f"cannot read {what} {path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise FormatError(f"{path} is not a text file; {what} need a CSV file with three numbers a line") from None
-    found: list[Part] = []
+    found: list[NamedPart] = []
     columns, named = [0, 1, 2], -1
     header = False
     begins = True

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .options import Parser
 
 MOST_PIECES = 5  # pieces that are named one by one
-SCAN = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
+SCAN_HELP = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
 
 
 def add_memory(parser: Parser) -> None:
@@ -163,8 +163,8 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
 @contextmanager
 def note_compiling(bars: Bars) -> Iterator[None]:
     """Report, once a run, that kernels are being compiled, which takes long."""
-    from ..runtime.jit import FOLDER, report_compiling
+    from ..runtime.jit import KERNEL_FOLDER, report_compiling
 
-    words = "compiling kernels, once on this machine" if FOLDER else "compiling kernels"
+    words = "compiling kernels, once on this machine" if KERNEL_FOLDER else "compiling kernels"
     with report_compiling(lambda: bars.note_once(words)):
         yield

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..settings import UNITS
-from .outputs import claim, cloud_output, inputs_of, outs_of
+from .outputs import claim, claim_clouds
 from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
@@ -48,9 +48,7 @@ def splice(values: Namespace) -> None:
     from ..scan.formats.writing import write_points
 
     files = scan_files(values.scans)
-    outs = outs_of(values)
-    poses_file = outs[0].with_suffix(".poses.json")
-    check_outputs(values, outs, poses_file)
+    outs, poses_file = check_outputs(values)
     names = names_of(files)
     with Bars() as bars:
         result = splice_files(values, files, names, bars)
@@ -86,18 +84,17 @@ def names_of(files: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [file.as_posix() for file in files]
 
 
-def check_outputs(values: Namespace, outs: list[Path], poses_file: Path) -> None:
-    """Refuse outputs that cannot be written, before anything is read or computed."""
+def check_outputs(values: Namespace) -> tuple[list[Path], Path]:
+    """Return the clouds and the file of poses; what cannot be written is refused before anything is read or computed."""
     from ..runtime.files import check_place
 
-    taken = inputs_of(values)
-    for out in outs:
-        claim(cloud_output(out), "merged cloud", taken, force=values.force, kind="cloud")
-    check_place(poses_file, (".json",))
+    outs, taken = claim_clouds(values, "merged cloud")
+    poses_file = check_place(outs[0].with_suffix(".poses.json"), (".json",))
     if taken.get(poses_file.resolve()) != "poses":  # a run may replace the poses that it starts from
         claim(poses_file, "file of poses", taken, force=values.force)
     if values.use_poses and not values.poses:
         raise InputError("--use-poses needs --poses FILE, the poses to be used")
+    return outs, poses_file
 
 
 def splice_files(values: Namespace, files: list[Path], names: list[str], bars: Bars) -> Splice:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from argparse import Namespace
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from ..sweep import Trial
     from .options import Parser
 
-TABLES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
+SWEEP_FILES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
 
 
 def sweep_parser() -> Parser:
@@ -40,22 +41,13 @@ def sweep_parser() -> Parser:
     add_workers(parser)
     add_settings(parser)
     for action in parser._actions:
-        if action.dest not in ("help", "scan", "out", "settings", *ONE) and action.type is not None:
+        if action.dest not in ("help", "scan", "out", "settings", *ONE_AT_LEAST) and action.type is not None:
             action.type = _several(action.type)
     return parser
 
 
-ONE = (
-    "memory",
-    "workers",
-    "fixed",
-    "fixed_lines",
-    "unit",
-    "z_unit",
-    "returns",
-    "confidence",
-    "thin_spacing",
-)  # one value only
+# one value only
+ONE_AT_LEAST = ("memory", "workers", "fixed", "fixed_lines", "unit", "z_unit", "returns", "confidence", "thin_spacing")
 
 
 def _several(kind: Any) -> Callable[[str], list[Any]]:
@@ -84,7 +76,8 @@ def sweep(values: Namespace) -> None:
         fitting = thin_to_fit(values.scan, shortest, values.memory)
         cloud = read_scan(values.scan, fitting, bars)
         if fitting.thin_spacing:
-            trials = [_thinned(trial, fitting.thin_spacing) for trial in trials]
+            thin = {"thin_spacing": fitting.thin_spacing}
+            trials = [replace(trial, settings=trial.settings.replace(**thin)) for trial in trials]
         said = note_compiling(bars)
         with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars)
@@ -101,7 +94,7 @@ def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) 
     from ..runtime.files import check_place
     from ..runtime.ours import check_ours
 
-    names = (*TABLES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
+    names = (*SWEEP_FILES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
     for name in names:
         claim(folder / name, "result", taken, force=True)
         if folder.exists():
@@ -113,7 +106,7 @@ def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) 
 
 def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
     """Refuse a folder with grids that the new table would not know, though they stand beside it."""
-    if not (folder / TABLES[0]).exists():
+    if not (folder / SWEEP_FILES[0]).exists():
         return
     grids = (path.stem for path in sorted(folder.glob("*.json")) if path.with_suffix(".png").exists())
     if others := [name for name in grids if name not in names]:
@@ -121,12 +114,6 @@ def _refuse_earlier_sweep(folder: Path, names: set[str]) -> None:
         raise FormatError(
             f"{folder} holds grids of another sweep, {others[0]}{more}; name another folder, or remove these first"
         )
-
-
-def _thinned(trial: Trial, spacing: float) -> Trial:
-    from dataclasses import replace
-
-    return replace(trial, settings=trial.settings.replace(thin_spacing=spacing))
 
 
 def trials_of_words(values: Namespace) -> tuple[list[Trial], tuple[str, ...]]:
@@ -174,7 +161,7 @@ def _save(
         pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
         page = encode_page(title, head, rows, trials, outcomes)
         tables = (encode_table_csv(head, rows), encode_table_markdown(head, rows), page, encode_sheet(pictures))
-        for name, content in zip(TABLES, tables, strict=True):
+        for name, content in zip(SWEEP_FILES, tables, strict=True):
             save.beside(folder / name).write_bytes(content)
     for trial, outcome in zip(trials, outcomes, strict=True):
         if not outcome.grid:  # left by an earlier sweep; this table says there is no grid

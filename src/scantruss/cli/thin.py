@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from .outputs import claim, cloud_output, inputs_of, outs_of
+from .outputs import claim_clouds
 from .shared import cloud_file_notes, note_compiling, report_cloud
 
 if TYPE_CHECKING:
@@ -61,9 +61,7 @@ def thin(values: Namespace) -> None:
     from .options import selection_of
 
     check_spacing(values.spacing)
-    outs, taken = [cloud_output(out) for out in outs_of(values)], inputs_of(values)
-    for out in outs:
-        claim(out, "thinned scan", taken, force=values.force, kind="cloud")
+    outs, _ = claim_clouds(values, "thinned scan")
     scan = open_scan(values.scans, getattr(values, "unit", ""), selection_of(values))
     sources = scan.sources
     few = sum(source.points for source in sources) < POINTS_FOR_WORKERS

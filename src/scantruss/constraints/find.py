@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.find import Boundary, with_line_ends
+from ..errors import Place
 from .fixed_lines import add_polylines
 from .fixed_nodes import check_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
 from .ridges import add_ridges, cut_around, find_ridges
 from .ridges_at_boundary import with_ridge_ends
-
-Place = tuple[float, float, float]
 
 if TYPE_CHECKING:
     from ..settings import Settings

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..boundary.polylines import divide, feet_on_scan, find_corners, simplify
+from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
 from ..errors import InputError
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
 LINE_STEP = 0.05  # distance between the points of a line [member lengths]
 ZIGZAG = 0.005  # zigzags of a polyline below this are straightened first [member lengths]
-FIT = 120.0  # points of the scan that a patch under a line is fitted to
 RETURN = 1.5  # a line that comes back to itself after this length meets itself [member lengths]
-SHORTEST = 0.5  # shortest open line [member lengths]
+SHORTEST_LINE = 0.5  # shortest open line [member lengths]
 SHORTEST_RING = 2.0  # shortest closed line [member lengths]
 
 
@@ -32,17 +31,17 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
     InputError
         A line is too short for the member, or leaves the scan by more than half a member; names the line and the place.
     """
-    patches = narrow_surface(samples, FIT)
+    patches = narrow_surface(samples, POINTS_UNDER_LINE)
     for number, line in enumerate(settings.fixed_lines, 1):
         name = settings.line_names[number - 1] if settings.line_names else f"line {number}"
         given = np.array(line, float) - samples.origin
         _check_on_scan(given, line, number, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
         _check_length(given, closed, number, samples.unit, settings.length)
-        points, vertices = divide(
+        points, vertices = divide_polyline(
             simplify(given, ZIGZAG * settings.length, closed), closed, LINE_STEP * settings.length
         )
-        corners = find_corners(points, vertices, closed, settings)
+        corners = corners_of_polyline(points, vertices, closed, settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
             network.add(part, ring, own, name=name)
@@ -73,7 +72,7 @@ def _check_on_scan(
 def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, length: float) -> None:
     """Refuse a line on which no members have room."""
     total = float(np.linalg.norm(np.diff(given, axis=0), axis=1).sum())
-    least = (SHORTEST_RING if closed else SHORTEST) * length
+    least = (SHORTEST_RING if closed else SHORTEST_LINE) * length
     if total < least:
         what = "ring, that is at least two members" if closed else "line, that is at least half a member"
         raise InputError(

@@ -24,27 +24,27 @@ POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FITS = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
 STRIDE = 0.25  # step from place to place along a fold [member lengths]
-TURNS = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
+LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
 LIKELY = 0.35  # share of the ridge angle above which a fold is looked at more closely
 WEAK = 0.6  # share of the ridge angle from which a fold is followed
-SHARP = 1.5  # share of it from which no larger radius is tried
+SHARP_SHARE = 1.5  # share of it from which no larger radius is tried
 FADED = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
 BETTER = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
-PATIENCE = 12  # places that look folded and are no ridge, after which the search stops: the scan is rough
+MOST_FALSE_FOLDS = 12  # places that look folded and are no ridge, after which the search stops: the scan is rough
 MISSED = 2  # places in a row at which a fold may not be seen and still goes on
 TURNED = 0.94  # least cosine of the turn of a fold from place to place
 RING = 6  # places along the shortest ring
-FARTHEST = 20_000  # most places along a fold
+MOST_PLACES_OF_FOLD = 20_000  # most places along a fold
 MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
 FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
-BETWEEN = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
+PLACES_BETWEEN_CORNERS = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
 
 
 class Tracer:
@@ -76,7 +76,7 @@ class Tracer:
             fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, fold)
             if not fits or fold[GAIN] < BETTER or fold[OFF] > ROUGHEST * self.length:
                 continue
-            if self._is_clear(fold) and fold[BEND] >= SHARP * self.angle:
+            if self._is_clear(fold) and fold[BEND] >= SHARP_SHARE * self.angle:
                 return fold
             if best is None or self._rank(fold) > self._rank(best):
                 best = fold.copy()
@@ -103,7 +103,7 @@ class Tracer:
                 continue
             fold = self.fold_at(sample, places[k], np.zeros(3))
             misses += 1
-            if misses > PATIENCE:
+            if misses > MOST_FALSE_FOLDS:
                 break
             if (
                 fold is not None
@@ -121,7 +121,7 @@ class Tracer:
     def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Whether the scan is folded all along the straight way from one place to another."""
         ahead = (last - first) / np.linalg.norm(last - first)
-        for share in BETWEEN:
+        for share in PLACES_BETWEEN_CORNERS:
             place = first + share * (last - first)
             fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, len(self.radii) - 1)
             if fold is None or fold[BEND] < WEAK * self.angle or abs(fold[3:6] @ ahead) < TURNED:
@@ -140,7 +140,7 @@ class Tracer:
         """Samples (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
         bends = np.empty(len(self.surface.mean))
         kernels.bends_of_samples(self.surface, bends)
-        likely = np.flatnonzero(bends < np.cos(TURNS * self.angle))
+        likely = np.flatnonzero(bends < np.cos(LEAST_TURN_SHARE * self.angle))
         likely = likely[np.argsort(bends[likely], kind="stable")[:MOST_SAMPLES]]
         if not len(likely):
             return likely
@@ -171,7 +171,7 @@ class Tracer:
         steps: list[np.ndarray] = []
         known = np.concatenate([np.zeros((0, 3)), *others])
         missed = 0
-        while len(steps) < FARTHEST and missed <= MISSED:
+        while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED:
             stride = (1 + missed) * STRIDE * self.length
             place = at[:3] + stride * ahead
             x, y, z = place.tolist()
@@ -224,32 +224,37 @@ class Tracer:
         return moved
 
 
-AROUND = 3  # places on both sides from which the turn of a line is taken
-CORNER = 25.0  # by how much a line turns more in a corner than before and after it [degree]
+PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
+CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
 LONG = 1.0  # least length of a line of folds [member lengths]
-FULL = 0.75  # least length of it with the full angle [member lengths]
+LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
 SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN = (0.5, 3.5)
 BLUNT, ACUTE = 50.0, 70.0  # [degree]
 BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
-SURE = 25.0  # median gain, at least (F statistic)
+SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
 def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     """The parts (K, FOUND) of a line of folds between its corners, where its direction turns more than before and after."""
     count = len(folds)
-    if count < 4 * AROUND:
+    if count < 4 * PLACES_OF_TURN:
         return [folds]
-    ahead = folds[AROUND:, :3] - folds[:-AROUND, :3]
+    ahead = folds[PLACES_OF_TURN:, :3] - folds[:-PLACES_OF_TURN, :3]
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     turn = np.zeros(count)
-    turn[AROUND : count - AROUND] = np.arccos(np.clip((ahead[AROUND:] * ahead[:-AROUND]).sum(axis=1), -1.0, 1.0))
-    usual = np.maximum(np.roll(turn, 2 * AROUND), np.roll(turn, -2 * AROUND))
+    turn[PLACES_OF_TURN : count - PLACES_OF_TURN] = np.arccos(
+        np.clip((ahead[PLACES_OF_TURN:] * ahead[:-PLACES_OF_TURN]).sum(axis=1), -1.0, 1.0)
+    )
+    usual = np.maximum(np.roll(turn, 2 * PLACES_OF_TURN), np.roll(turn, -2 * PLACES_OF_TURN))
     parts, first = [], 0
-    for k in range(AROUND, count - AROUND):
-        if turn[k] - usual[k] > np.radians(CORNER) and turn[k] == turn[k - AROUND : k + AROUND + 1].max():
+    for k in range(PLACES_OF_TURN, count - PLACES_OF_TURN):
+        if (
+            turn[k] - usual[k] > np.radians(CORNER_TURN)
+            and turn[k] == turn[k - PLACES_OF_TURN : k + PLACES_OF_TURN + 1].max()
+        ):
             parts.append(folds[first : k + 1])
             first = k
     return [*parts, folds[first:]]
@@ -258,7 +263,7 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
 def is_even(folds: np.ndarray, angle: float) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
-    if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < FULL:
+    if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < LEAST_FULL_LENGTH:
         return False
     ahead = np.diff(folds[:, :3], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
@@ -266,7 +271,7 @@ def is_even(folds: np.ndarray, angle: float) -> bool:
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
     most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN)) + BY_NOISE / np.sqrt(max(gain, 1.0))
-    return bool(gain >= SURE and uneven <= most and bend < SHARPEST)
+    return bool(gain >= SURE_GAIN and uneven <= most and bend < SHARPEST)
 
 
 def smoothed(places: np.ndarray) -> np.ndarray:

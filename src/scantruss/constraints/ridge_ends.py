@@ -7,18 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
-STRAIGHT = 0.94  # least cosine of the angle between such an end and the way to the other
-ROUND = 0.8  # the same cosine where the ends of one ridge make it a ring
+COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
+ROUND = 0.8  # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
 TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED = 1  # places at an end that are left out, because the third side disturbs them
 AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
 STEADY = 0.998  # least cosine of the angle between both directions of a straight ridge
-CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
-BACK = 0.5  # the same way back, where an end has gone too far [member lengths]
+WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
+REACH_BACK = 0.5  # longest way back to a corner or another ridge, where an end has gone too far [member lengths]
 MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
-ONE_CORNER = 0.5  # corners nearer together than this are one [member lengths]
-FREE = 2.5  # least length of a ridge of which an end is free [member lengths]
-BETWEEN = 0.6  # least length of any other [member lengths]
+LEAST_FREE_RIDGE = 2.5  # least length of a ridge of which an end is free [member lengths]
+LEAST_RIDGE = 0.6  # least length of any other [member lengths]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ def join_ends(traced: list[Ridge], length: float) -> list[Ridge]:
         first, last = led.get((i, 0)), led.get((i, -1))
         line = lines[i] if first is not None or last is not None else ridge.places
         line = _led(_led(line, last)[::-1], first)[::-1]
-        least = BETWEEN if first is not None and last is not None else FREE
+        least = LEAST_RIDGE if first is not None and last is not None else LEAST_FREE_RIDGE
         if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() >= least * length:
             found.append(ridge.moved(line))
     return found
@@ -135,8 +134,8 @@ def _facing(lines: list[np.ndarray], length: float) -> tuple[End, End] | None:
         for two in ends[k + 1 :]:
             gap = two.place - one.place
             size = float(np.linalg.norm(gap))
-            straight = min(gap @ one.ahead, -(gap @ two.ahead)) > STRAIGHT * size or (
-                size < TOUCH * length and two.ahead @ one.ahead < -STRAIGHT
+            straight = min(gap @ one.ahead, -(gap @ two.ahead)) > COSINE_TO_OTHER_END * size or (
+                size < TOUCH * length and two.ahead @ one.ahead < -COSINE_TO_OTHER_END
             )
             if one.line != two.line and size < best and straight:
                 best, pair = size, (one, two)
@@ -151,7 +150,7 @@ def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray
     pairs = []
     for k, one in enumerate(ends):
         for two in ends[k + 1 :]:
-            if one.line != two.line and np.linalg.norm(one.place - two.place) < 2.0 * CORNER * length:
+            if one.line != two.line and np.linalg.norm(one.place - two.place) < 2.0 * WAY_TO_CORNER * length:
                 cost = _cost(one, two, length)
                 if cost is not None:
                     pairs.append((cost, k, ends.index(two, k + 1)))
@@ -167,12 +166,12 @@ def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray
 
 def _cost(one: End, two: End, length: float) -> float | None:
     """How far two ends have to go to meet, None where they do not meet."""
-    if abs(one.ahead @ two.ahead) >= STRAIGHT:
+    if abs(one.ahead @ two.ahead) >= COSINE_TO_OTHER_END:
         return None
     place = meeting([one, two])
     ways = [float((place - end.place) @ end.ahead) for end in (one, two)]
     miss = max(float(np.linalg.norm(np.cross(place - end.place, end.ahead))) for end in (one, two))
-    if min(ways) < -BACK * length or max(ways) > CORNER * length or miss > MISS * length:
+    if min(ways) < -REACH_BACK * length or max(ways) > WAY_TO_CORNER * length or miss > MISS * length:
         return None
     return max(abs(way) for way in ways) + miss
 
@@ -186,7 +185,7 @@ def _meet(numbers: list[int], ends: list[End], length: float) -> bool:
     for end in some:
         way = float((place - end.place) @ end.ahead)
         miss = float(np.linalg.norm(np.cross(place - end.place, end.ahead)))
-        if not -BACK * length <= way <= CORNER * length or miss > MISS * length:
+        if not -REACH_BACK * length <= way <= WAY_TO_CORNER * length or miss > MISS * length:
             return False
     return True
 
@@ -209,7 +208,7 @@ def _foot(end: End, others: list[np.ndarray], corners: list[np.ndarray], length:
         away = places - end.place
         way = away @ end.ahead
         miss = np.linalg.norm(away - way[:, None] * end.ahead, axis=1)
-        fits = (way >= -BACK * length) & (way <= CORNER * length) & (miss <= MISS * length)
+        fits = (way >= -REACH_BACK * length) & (way <= WAY_TO_CORNER * length) & (miss <= MISS * length)
         if fits.any():
             cost = bonus * np.where(fits, np.abs(way) + 2.0 * miss, np.inf)
             if cost.min() < best:

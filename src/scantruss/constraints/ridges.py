@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..boundary.polylines import divide
+from ..boundary.polylines import divide_polyline
 from ..kernels.surface.ridges import BEND
 from .fixed_lines import LINE_STEP
-from .fold_tracing import FULL, STRIDE, Tracer
+from .fold_tracing import LEAST_FULL_LENGTH, STRIDE, Tracer
 from .network import Network, runs
 from .ridge_ends import Ridge, join_ends
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-BESIDE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
+END_BESIDE_RIDGE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
 NEARLY = 0.9  # share of the ridge angle that counts as full: noise takes some away
-SHARE = 0.55  # least share of a ridge that has the full angle ...
-LONG_FULL = 2.5  # ... unless it has it over this length [member lengths]
-CUT = 1.8  # distance from a fault within which ridges are given up [member lengths]
-LEFT = 2.0  # least length of what is left of such a ridge [member lengths]
+SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
+LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
+FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
+LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]
-SHORTEST = 0.35  # shortest such ridge [member lengths]
+SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
 
 def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
@@ -44,7 +44,7 @@ def add_ridges(network: Network, ridges: list[Ridge]) -> None:
     """Add ridges to a network of lines."""
     for number, ridge in enumerate(ridges, 1):
         places = np.concatenate([ridge.places, ridge.places[:1]]) if ridge.ring else ridge.places
-        points, _ = divide(places, ridge.ring, LINE_STEP * network.length)
+        points, _ = divide_polyline(places, ridge.ring, LINE_STEP * network.length)
         network.add(points, ridge.ring, [], name=f"ridge {number}", sharp=True)
 
 
@@ -54,7 +54,7 @@ def kept_ridges(ridges: list[Ridge], length: float) -> list[Ridge]:
     others = [ridge for ridge in ridges if not ridge.sharp]
     while kept and others:
         places = np.concatenate([ridge.places for ridge in kept])
-        joined = [ridge for ridge in others if ridge.is_near(places, BESIDE * length)]
+        joined = [ridge for ridge in others if ridge.is_near(places, END_BESIDE_RIDGE * length)]
         if not joined:
             break
         kept.append(joined[0])
@@ -67,14 +67,14 @@ def cut_around(ridges: list[Ridge], places: np.ndarray, length: float) -> list[R
     found = []
     for ridge in ridges:
         away = np.linalg.norm(ridge.places[:, None] - places, axis=2).min(axis=1) if len(places) else np.ones(1)
-        if len(places) == 0 or away.min() > CUT * length:
+        if len(places) == 0 or away.min() > FAULT_REACH * length:
             found.append(ridge)
             continue
         first = int(away.argmin()) if ridge.ring else 0
-        line, far = np.roll(ridge.places, -first, axis=0), np.roll(away, -first) > CUT * length
+        line, far = np.roll(ridge.places, -first, axis=0), np.roll(away, -first) > FAULT_REACH * length
         for begin, end in runs(far):
             part = line[begin:end]
-            if np.linalg.norm(np.diff(part, axis=0), axis=1).sum() >= LEFT * length:
+            if np.linalg.norm(np.diff(part, axis=0), axis=1).sum() >= LEAST_REMAINDER * length:
                 found.append(Ridge(part, ridge.sharp))
     return found
 
@@ -84,13 +84,13 @@ def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
     length = tracer.length
     ends: list[np.ndarray] = []
     for place in (place for ridge in ridges if not ridge.ring for place in ridge.places[[0, -1]]):
-        if all(np.linalg.norm(place - other) > SHORTEST * length for other in ends):
+        if all(np.linalg.norm(place - other) > SHORTEST_RIDGE * length for other in ends):
             ends.append(place)
     found: list[Ridge] = []
     for first, last in combinations(ends, 2):
-        if SHORTEST * length < np.linalg.norm(last - first) <= SHORT * length:
+        if SHORTEST_RIDGE * length < np.linalg.norm(last - first) <= SHORT * length:
             middle = 0.5 * (first + last)[None]
-            taken = any(ridge.distance(middle[0]) < BESIDE * length for ridge in ridges + found)
+            taken = any(ridge.distance(middle[0]) < END_BESIDE_RIDGE * length for ridge in ridges + found)
             if not taken and tracer.is_folded_between(first, last):
                 steps = max(int(np.linalg.norm(last - first) / (STRIDE * length)), 1) + 1
                 found.append(Ridge(np.linspace(first, last, steps), True))
@@ -101,4 +101,4 @@ def _is_sharp(folds: np.ndarray, angle: float) -> bool:
     """Whether a line of folds (K, FOUND) has the full angle along enough of it."""
     full = folds[:, BEND] >= NEARLY * angle
     size = float(full.sum()) * STRIDE
-    return bool(size >= LONG_FULL or (size >= FULL and full.mean() >= SHARE))
+    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= SHARE))

@@ -13,20 +13,19 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .ridge_ends import Ridge
 
-AT_BOUNDARY = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
+BOUNDARY_REACH = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
 TUBE = 0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
-AIM = 3  # places from which the direction at the end of a ridge is taken
-STEADY_PLACES, BLURRED = (
-    9,
-    3,
-)  # places at the end of a ridge from which its direction is told, and the last of them that are left out
-CLOSE = 0.1  # distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
-BACK = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
+PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge is taken
+# places at the end of a ridge from which its direction is told, and the last of them that are left out
+STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3
+# distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
+CORNER_KEPT_WITHIN = 0.1
+DENSITY_REACH = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
 FORWARD = 2.0  # how far the scan may go on along it [member lengths]
-GAPS = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
-FEWEST = 8  # fewest points from which that is told
-BENT = 1.0  # length over which the boundary is bent to the end of a ridge [member lengths]
-FARTHEST = 0.4  # the boundary is not bent by more than this [member lengths]
+GAP_AT_END = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
+FEWEST_ALONG = 8  # fewest points from which that is told
+BENDING_LENGTH = 1.0  # length over which the boundary is bent to the end of a ridge [member lengths]
+MOST_BENDING = 0.4  # the boundary is not bent by more than this [member lengths]
 
 
 def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSamples, length: float) -> Boundary:
@@ -36,7 +35,7 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
         for line in () if ridge.ring or not loops else (ridge.places, ridge.places[::-1]):
             away = [np.linalg.norm(loop.points - line[-1], axis=1).min() for loop in loops]
             k = int(np.argmin(away))
-            if away[k] < AT_BOUNDARY * length and not _makes_for_corner(line, loops[k], length):
+            if away[k] < BOUNDARY_REACH * length and not _makes_for_corner(line, loops[k], length):
                 end = scan_end(line, samples, length)
                 loops[k] = loops[k] if end is None else _bent(loops[k], end, length)
     return replace(boundary, loops=tuple(loops))
@@ -44,19 +43,19 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
 
 def _makes_for_corner(line: np.ndarray, loop: Loop, length: float) -> bool:
     """Whether a ridge (K, 3), as far as it can be told some way back, makes for a corner of the boundary: then it is right."""
-    if not len(loop.corner_at) or len(line) < STEADY_PLACES:
+    if not len(loop.corner_at) or len(line) < STEADY_PLACES_OF_DIRECTION:
         return False
-    from_there = line[-BLURRED]
-    ahead = from_there - line[-STEADY_PLACES]
+    from_there = line[-PLACES_LEFT_OUT]
+    ahead = from_there - line[-STEADY_PLACES_OF_DIRECTION]
     ahead /= max(float(np.linalg.norm(ahead)), 1e-300)
     corner = loop.corners[np.linalg.norm(loop.corners - line[-1], axis=1).argmin()]
-    return bool(np.linalg.norm(np.cross(corner - from_there, ahead)) < CLOSE * length)
+    return bool(np.linalg.norm(np.cross(corner - from_there, ahead)) < CORNER_KEPT_WITHIN * length)
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:
     """Return where the scan ends (3,) along the continuation of a line (K, 3); None if that cannot be told."""
     from_there = line[-1]
-    ahead = from_there - line[max(len(line) - AIM, 0)]
+    ahead = from_there - line[max(len(line) - PLACES_OF_DIRECTION, 0)]
     size = float(np.linalg.norm(ahead))
     if size == 0.0:
         return None
@@ -68,11 +67,11 @@ def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.nda
     way = away @ ahead
     across = np.linalg.norm(away - way[:, None] * ahead, axis=1)
     radius = max(TUBE * length, 2.0 * samples.spacing)
-    way = np.sort(way[(across < radius) & (way > -BACK * length) & (way < FORWARD * length)])
-    if len(way) < FEWEST:
+    way = np.sort(way[(across < radius) & (way > -DENSITY_REACH * length) & (way < FORWARD * length)])
+    if len(way) < FEWEST_ALONG:
         return None
     usual = float(np.median(np.diff(way)))
-    gaps = np.flatnonzero(np.diff(way) > max(GAPS * usual, samples.spacing))
+    gaps = np.flatnonzero(np.diff(way) > max(GAP_AT_END * usual, samples.spacing))
     last = way[gaps[0]] if len(gaps) else way[-1]
     found: np.ndarray = from_there + (last + 0.5 * usual) * ahead
     return found
@@ -84,12 +83,12 @@ def _bent(loop: Loop, end: np.ndarray, length: float) -> Loop:
     away = np.linalg.norm(points - end, axis=1)
     corners = loop.corner_at
     at = int(away.argmin())
-    if len(corners) and away[corners].min() < FARTHEST * length:
+    if len(corners) and away[corners].min() < MOST_BENDING * length:
         at = int(corners[away[corners].argmin()])
-    if away[at] > FARTHEST * length:
+    if away[at] > MOST_BENDING * length:
         return loop
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     arc = np.abs(np.concatenate([[0.0], np.cumsum(steps)[:-1]]) - np.sum(steps[:at]))
     arc = np.minimum(arc, steps.sum() - arc)
-    share = np.clip(1.0 - arc / (BENT * length), 0.0, 1.0)
+    share = np.clip(1.0 - arc / (BENDING_LENGTH * length), 0.0, 1.0)
     return replace(loop, points=points + share[:, None] * (end - points[at]))

@@ -19,7 +19,7 @@ from .style import FileStyle
 Encoder = Callable[[Grid, Path, PointCloud | None, FileStyle], dict[Path, bytes]]
 
 #: suffix -> what the files of that format hold: pure functions of the grid, and of the cloud where it is drawn
-FORMATS: dict[str, Encoder] = {
+GRID_FORMATS: dict[str, Encoder] = {
     ".csv": lambda grid, path, cloud, style: encode_csv(grid, path, decimal_comma=style.decimal_comma),
     ".json": lambda grid, path, cloud, style: {path: encode_json(grid)},
     ".obj": lambda grid, path, cloud, style: {path: encode_obj(grid, style.obj)},
@@ -41,10 +41,10 @@ def check_output(path: str | Path) -> Path:
     path = Path(path)
     if path.suffix.lower() in SOLID_SUFFIXES:
         raise FormatError(
-            f'no format for "{path.suffix}" of a grid; use one of {" ".join(sorted(FORMATS))}, '
+            f'no format for "{path.suffix}" of a grid; use one of {" ".join(sorted(GRID_FORMATS))}, '
             f"or write a .json and make the solid from it with: scantruss print"
         )
-    path = check_place(path, FORMATS)
+    path = check_place(path, GRID_FORMATS)
     if path.suffix.lower() == ".csv":
         check_place(nodes_path(path), (".csv", path.suffix))
     return path
@@ -77,4 +77,4 @@ def write(
         Unknown suffix, no such folder, no space; nothing half-written is left.
     """
     path = check_output(path)
-    return write_files(FORMATS[path.suffix.lower()](grid, path, cloud, style or FileStyle()))
+    return write_files(GRID_FORMATS[path.suffix.lower()](grid, path, cloud, style or FileStyle()))

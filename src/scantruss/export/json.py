@@ -53,11 +53,13 @@ def encode_json(grid: Grid) -> bytes:
     }
     if grid.desired is not None:
         values["desired"] = np.asarray(grid.desired, float).tolist()
-    parts = [f"{json.dumps(key)}: {_lines(value) if key in ROWS else _text(value)}" for key, value in values.items()]
+    parts = [
+        f"{json.dumps(key)}: {_lines(value) if key in ROW_ARRAYS else _text(value)}" for key, value in values.items()
+    ]
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
 
-ROWS = ("nodes", "members", "triangles", "boundary_loops", "lines", "fixed_lines", "ridges")
+ROW_ARRAYS = ("nodes", "members", "triangles", "boundary_loops", "lines", "fixed_lines", "ridges")
 
 
 def _number(value: Any) -> Any:

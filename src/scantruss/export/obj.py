@@ -27,8 +27,7 @@ def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
     Parameters
     ----------
     grid : Grid
-    elements : str
-        faces for the triangles, lines for the members, or both.
+    elements : faces for the triangles, lines for the members, or both
     """
     lines = [f"# {line}" for line in header_lines(grid)]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in grid.scan_nodes.tolist()]

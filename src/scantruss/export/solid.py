@@ -76,14 +76,10 @@ def build_solid(
 
     Parameters
     ----------
-    grid : Grid
-        The grid; its coordinates are multiplied by `scale`.
-    member_diameter, node_diameter : float
-        Diameters in the solid, not scaled [unit of the grid].
-    scale : float
-        Size of the solid over the size of the grid.
-    sides : int
-        Sides of a member.
+    grid : the grid; its coordinates are multiplied by `scale`
+    member_diameter, node_diameter : diameters in the solid, not scaled [unit of the grid]
+    scale : size of the solid over the size of the grid
+    sides : sides of a member
 
     Raises
     ------
@@ -207,8 +203,7 @@ def is_watertight(triangles: np.ndarray) -> bool:
 
     Parameters
     ----------
-    triangles : np.ndarray
-        (M, 3) ids of vertices.
+    triangles : (M, 3) ids of vertices
     """
     start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     count = int(triangles.max(initial=-1)) + 1

@@ -19,8 +19,8 @@ from .. import __version__
 from ..errors import FormatError
 
 #: 3MF's words for our units; millimeter where it is not known
-UNITS = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
-MOST_ROUNDS = 32  #: of moving apart
+UNIT_NAMES = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
+ROUNDS_OF_MOVING = 32  #: of moving apart
 
 CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -85,15 +85,13 @@ def lattice_step(vertices: np.ndarray) -> float:
     return max(size * 2.0**-22, min(2.0**-25, size * 2.0**-16))
 
 
-def put_on_lattice(solid: Solid, rounds: int = MOST_ROUNDS) -> tuple[np.ndarray, int]:
+def put_on_lattice(solid: Solid, rounds: int = ROUNDS_OF_MOVING) -> tuple[np.ndarray, int]:
     """Return the vertices on the lattice, each at a place of its own, and how many are still at another's place.
 
     Parameters
     ----------
-    solid : Solid
-        What to write.
-    rounds : int
-        How often those that coincide are moved apart.
+    solid : what to write
+    rounds : how often those that coincide are moved apart
 
     Returns
     -------
@@ -141,7 +139,7 @@ def encode_3mf(solid: Solid) -> bytes:
     vertices, _ = put_on_lattice(solid)
     parts = {"[Content_Types].xml": CONTENT_TYPES, "_rels/.rels": RELATIONS}
     parts["3D/3dmodel.model"] = MODEL.format(
-        unit=UNITS.get(solid.unit, "millimeter"),
+        unit=UNIT_NAMES.get(solid.unit, "millimeter"),
         version=__version__,
         vertices="\n".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in vertices.tolist()),
         triangles="\n".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in solid.triangles.tolist()),

@@ -31,7 +31,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import (
     NEAREST_SAMPLE,
     NORMAL,
-    PATCH,
+    PATCH_COLUMNS,
     Surface,
     fit_patch,
     onto_patch,
@@ -45,12 +45,13 @@ from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
 STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no room waits for the next, more tolerant one
-GAP = 60  # most segments of a gap that is filled; larger gaps stay open
-CLEAR = 0.6  # least distance of a candidate node from the initial front [member lengths]
-NEARER = 0.33  # the same distance for the position of a fixed node [member lengths]
-BESIDE = 0.6  # how far the sides of a ridge are looked at [member lengths]
-BOX = 2.4  # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
-BUDGET = 500  # segments advanced between two reports of progress
+LARGEST_GAP = 60  # most segments of a gap that is filled; larger gaps stay open
+FRONT_CLEARANCE = 0.6  # least distance of a candidate node from the initial front [member lengths]
+FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial front [member lengths]
+SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
+# size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
+NODE_BOX = 2.4
+SEGMENTS_PER_REPORT = 500  # segments advanced between two reports of progress
 
 
 def advance_front(
@@ -134,7 +135,7 @@ def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) 
             segments = loop[:count].copy()
             length = settings.length * float(samples.surface.field[front.sample[front.tail[segments]]].mean())
             unreached = (front.state[segments] == lists.INACTIVE).all()
-            if unreached or count > GAP or not gaps.close_gap(front, segments, count, length):
+            if unreached or count > LARGEST_GAP or not gaps.close_gap(front, segments, count, length):
                 gaps.cut_out(front, segments)
 
 
@@ -142,7 +143,7 @@ def new_front(samples: SurfaceSamples, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
     mean, room = samples.surface.mean, int(2.0 * samples.graded_area / (0.433 * settings.length**2)) + 2000
     usual = settings.length * float(np.sqrt(samples.area / samples.graded_area))
-    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), BOX * usual, room, room)
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), NODE_BOX * usual, room, room)
     return _blank(room, boxes)
 
 
@@ -195,9 +196,9 @@ def start_front(
     check_links(front, samples.origin)
     for place in constraints.positions if settings.method != "paper" else ():
         length = settings.length * local_field(surface, place)
-        front = add_candidates(front, surface, nodes_at(place[None], surface, length), NEARER * length)
+        front = add_candidates(front, surface, nodes_at(place[None], surface, length), FIXED_CLEARANCE * length)
     if candidates is not None:
-        front = add_candidates(front, surface, candidates, CLEAR * settings.length)
+        front = add_candidates(front, surface, candidates, FRONT_CLEARANCE * settings.length)
     bounded = {loop.piece for loop in boundary.loops}
     bounded |= {int(samples.piece[nearest_sample(surface, *curve[0].tolist())]) for curve in constraints.lines.curves}
     for number in samples.pieces:
@@ -250,7 +251,7 @@ def face_both_sides(front: lists.Front, surface: Surface, nodes: list[int], leng
     """Let nodes on a ridge face as the surface does on all of its sides together: a patch there follows one of them only."""
     for node in nodes:
         x, y, z = front.nodes[node].tolist()
-        reach = BESIDE * length * float(surface.field[front.sample[node]])
+        reach = SIDE_REACH * length * float(surface.field[front.sample[node]])
         front.normals[node] = mean_normal(surface, int(front.sample[node]), (x, y, z), reach)[0]
 
 
@@ -285,7 +286,7 @@ def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length
 
 def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
     """Add three nodes of a regular triangle around a sample."""
-    patch = np.zeros(PATCH)
+    patch = np.zeros(PATCH_COLUMNS)
     centre = surface.mean[sample]
     fit_patch(surface, patch, sample, tuple(centre))
     normal = patch[NORMAL : NORMAL + 3].copy()
@@ -296,7 +297,7 @@ def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -
     ids = []
     for angle in np.radians([0.0, 120.0, 240.0]):
         place = centre + length / np.sqrt(3.0) * (np.cos(angle) * u + np.sin(angle) * v)
-        own = np.zeros(PATCH)
+        own = np.zeros(PATCH_COLUMNS)
         fit_patch(surface, own, sample, tuple(place))
         foot = onto_patch(own, tuple(place))
         near = walk(surface, int(own[NEAREST_SAMPLE]), foot)
@@ -311,7 +312,7 @@ def run(
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = samples.graded_area / (0.433 * rules.desired**2)
     while True:
-        status = step(samples.surface, front, rules, BUDGET)
+        status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:

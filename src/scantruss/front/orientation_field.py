@@ -21,14 +21,14 @@ from ..settings import Settings
 from ..surface.samples import SurfaceSamples
 
 LEVEL_SPACING = 0.55  # distance between the samples of the finest level [member lengths]
-COARSER = 2.0  # ratio of the distances from one level to the next
+LEVEL_RATIO = 2.0  # ratio of the distances from one level to the next
 FEWEST_SAMPLES_OF_A_LEVEL = 12  # fewest samples of the coarsest level
-LINKS_OF_A_SAMPLE = 12  # most links of a sample to its neighbours
-PASSES = 3  # passes of smoothing on each level
+LINKS_IN_A_LEVEL = 12  # most links of a sample to its neighbours
+SMOOTHING_PASSES = 3  # passes of smoothing on each level
 SAMPLES_FOR_THREADS = 5000  # fewest samples of a level that two threads smooth at once
-WITHIN = 0.7  # candidate nodes farther from their sample than this are dropped [member lengths]
+CANDIDATE_REACH = 0.7  # candidate nodes farther from their sample than this are dropped [member lengths]
 # lattice spacing on a closed surface, where the search adds nodes and never removes any [member lengths]
-CLOSED = 1.02
+CLOSED_SPACING = 1.02
 CANDIDATE_DISTANCE = 0.6  # least distance between candidate nodes [member lengths]
 
 
@@ -41,7 +41,7 @@ class FieldStart:
     laid: bool = True  #: False: no lattice, the front makes all of its nodes itself
 
 
-TURNS = {  # lattice directions of the fronts, by effort
+STARTS = {  # lattice directions of the fronts, by effort
     "quick": (FieldStart(),),
     "normal": tuple(FieldStart(10.0 * turn) for turn in range(6)),
     "best": tuple(FieldStart(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
@@ -52,7 +52,7 @@ SCALES = {  # lengths of the fronts instead, where the desired length varies ove
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
 }
 # largest area for which `normal` tries all directions: there the boundary decides [member lengths squared]
-SMALL = 600.0
+SMALL_AREA = 600.0
 
 
 class Field(NamedTuple):
@@ -81,8 +81,8 @@ def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStar
         return (FieldStart(laid=False),)
     if samples.graded:
         return tuple(FieldStart(scale=scale, laid=False) for scale in SCALES[settings.effort])
-    large = samples.graded_area > SMALL * settings.length**2
-    return TURNS[settings.effort][: 1 if settings.effort == "normal" and large else None]
+    large = samples.graded_area > SMALL_AREA * settings.length**2
+    return STARTS[settings.effort][: 1 if settings.effort == "normal" and large else None]
 
 
 def orientation_fields(
@@ -103,7 +103,7 @@ def orientation_fields(
         How they are laid out; by default as the effort allows.
     """
     starts = usual_starts(samples, settings) if starts is None else starts
-    closed = 1.0 if boundary.loops else CLOSED
+    closed = 1.0 if boundary.loops else CLOSED_SPACING
     scales = {start.scale for start in starts if start.laid}
     hierarchies = {scale: make_levels(samples.surface, closed * scale * settings.length) for scale in scales}
 
@@ -129,7 +129,7 @@ def orientation_field(
         for k in range(len(levels) - 1, -1, -1):
             if k < len(levels) - 1:
                 kernels.hand_down(levels[k + 1], owners[k + 1], levels[k], length)
-            for _ in range(PASSES):
+            for _ in range(SMOOTHING_PASSES):
                 two_at_once(partial(smooth, levels[k], length), independent_sets[k])
     return _chosen(levels[0], owners[0], length)
 
@@ -142,7 +142,7 @@ def _chosen(level: Level, owner: np.ndarray, length: float) -> CandidateNodes:
     """Lattice nodes of the finest samples, each once, those nearest to their samples first."""
     away = ((level.node - level.mean) ** 2).sum(axis=1)
     order = np.argsort(away, kind="stable")
-    order = order[away[order] < (WITHIN * length) ** 2]
+    order = order[away[order] < (CANDIDATE_REACH * length) ** 2]
     chosen = np.empty(len(away), np.int64)
     chosen = chosen[: kernels.list_nodes(level, order, length, CANDIDATE_DISTANCE * length, chosen)]
     first = np.empty(len(away), np.int64)
@@ -162,14 +162,14 @@ def make_levels(surface: Surface, length: float) -> Hierarchy:
         if levels and (count < FEWEST_SAMPLES_OF_A_LEVEL or count > 0.8 * len(mean)):
             return Hierarchy(levels, owners, [_independent_sets(level) for level in levels])
         level = Level(
-            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS_OF_A_SAMPLE), -1, np.int64),
+            np.zeros((count, 3)), np.zeros((count, 3)), np.full((count, LINKS_IN_A_LEVEL), -1, np.int64),
             np.zeros((count, 3)), np.zeros((count, 3)), np.zeros(count, np.int64),
         )  # fmt: skip
         kernels.link_level(mean, normals, neighbors, owner, level)
         levels.append(level)
         owners.append(owner)
         mean, normals, neighbors = level.mean, level.normals, level.neighbors
-        radius *= COARSER
+        radius *= LEVEL_RATIO
 
 
 def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:

@@ -1,1 +1,1 @@
-"""The grid and what improves it (Sec. 4)."""
+"""The grid: the record and its tables."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from ..errors import CertificateError, words_of_place
+from ..errors import CertificateError, Place, words_of_place
 
 if TYPE_CHECKING:
     from .grid import Grid
-
-Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..grid.grid import Grid
-from ..grid.quality import shape_qualities
 from ..kernels.mesh.equalize import RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
-from ..kernels.mesh.partition import BETWEEN
+from ..kernels.mesh.partition import BETWEEN_HALVES
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..runtime.parallel import two_at_once
 from .flips import flip_by_angle
@@ -28,16 +26,13 @@ from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
 LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
-LAST_LENGTH_WEIGHT = {
-    "balance": 3.0,
-    "lengths": 8.0,
-    "shapes": 0.5,
-}  # the same in the last sweeps, for each value of `prefer`
+# the same in the last sweeps, for each value of `prefer`
+LAST_LENGTH_WEIGHT = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
 LAST_SWEEPS = (12, 6)  # most sweeps in each of the last rounds; patches are fitted again before each round
 LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
-PRICE = 24.0  # energy per node of a mean length off the desired one, per square of its relative error
+MEAN_LENGTH_WEIGHT = 24.0  # energy per node of a mean length off the desired one, per square of its relative error
 LARGEST_SHARE = 0.1  # largest energy that an average node is assumed to have
-SEARCHES = 6  # most rounds of the local search
+LOCAL_SEARCH_ROUNDS = 6  # most rounds of the local search
 NODES_SETTLED_IN_HALVES = 2500  # nodes from which on two halves settle at once; with fewer, waiting costs more
 SWEEPS_IN_HALVES = 2  # sweeps of the halves between two sweeps of the nodes between them
 NODES_SEARCHED_IN_HALVES = 200  # irregular nodes from which on two halves are searched at once
@@ -76,7 +71,7 @@ def independent_sets_of(net: Net) -> list[np.ndarray]:
     if len(every) < NODES_SETTLED_IN_HALVES:
         return [every]
     label = Partition(net, live).label[every]
-    return [every[label == part] for part in (0, 1, BETWEEN)]
+    return [every[label == part] for part in (0, 1, BETWEEN_HALVES)]
 
 
 def settle(
@@ -140,7 +135,7 @@ def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch)
 
 def _search(mesh: WorkingMesh, net: Net, scratch: Scratch, terms: Terms) -> int:
     of_grid = mesh.patches, mesh.curves, scratch, mesh.length
-    return search(net, *of_grid, LENGTH_WEIGHT, terms.strain, PRICE, terms.share, terms.nodes)
+    return search(net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes)
 
 
 class Terms(NamedTuple):
@@ -157,18 +152,10 @@ def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
 
 
-def grid_energy(grid: Grid, length: float) -> float:
-    """Return the energy of a whole grid, without folded members."""
-    stretch = grid.stretches(length) - 1.0
-    shapes = shape_qualities(grid.nodes, grid.triangles)
-    price = PRICE * len(grid.nodes) * float(stretch.mean()) ** 2
-    return LENGTH_WEIGHT * float((stretch**2).sum()) + float((1.0 - shapes).sum()) + price
-
-
 def energy_of_node(mesh: WorkingMesh) -> float:
     """Return the energy of an opened grid per node, which compares grids with different numbers of nodes."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)
-    return energy / max(count, 1) + PRICE * (mean / mesh.length - 1.0) ** 2
+    return energy / max(count, 1) + MEAN_LENGTH_WEIGHT * (mean / mesh.length - 1.0) ** 2
 
 
 def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None) -> None:
@@ -176,9 +163,9 @@ def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None)
     flip_by_angle(mesh.net)
     settle(mesh, LENGTH_WEIGHT, 1e-3, 60)
     scratch = new_scratch(mesh)
-    for done in range(SEARCHES):
+    for done in range(LOCAL_SEARCH_ROUNDS):
         if progress:
-            progress(0.2 + 0.4 * done / SEARCHES)
+            progress(0.2 + 0.4 * done / LOCAL_SEARCH_ROUNDS)
         if search_once(mesh, scratch) == 0:
             break
         settle_again(mesh)

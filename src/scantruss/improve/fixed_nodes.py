@@ -7,7 +7,7 @@ import numpy as np
 from ..constraints.fixed_nodes import place_text
 from ..errors import InputError
 from ..kernels.boundary.curves import nearest_on_curves
-from ..kernels.mesh.grid import ON_CURVE, REST, may_split, split
+from ..kernels.mesh.grid import AT_REST, ON_CURVE, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..kernels.surface.local_surface import NEAREST_SAMPLE
@@ -15,9 +15,10 @@ from ..surface.samples import local_field
 from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 
-AT_BOUNDARY = 0.33  # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
+# distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
+BOUNDARY_NODE_REACH = 0.33
 SAME_PLACE = 1e-6  # distance up to which a node is already at a position [member lengths]
-CHOICES = 3  # number of the nearest nodes, and of the nearest edges, that are tried for a fixed node
+NEAREST_TRIED = 3  # number of the nearest nodes, and of the nearest edges, that are tried for a fixed node
 
 
 def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
@@ -26,16 +27,16 @@ def _candidates(mesh: WorkingMesh, place: np.ndarray) -> np.ndarray:
     For a place close to a corner it is the corner alone: two nodes so close to each other would spoil the triangles between them.
     """
     net = mesh.net
-    free = (net.degree > 0) & (net.kind < REST)
-    corners = np.flatnonzero((net.degree > 0) & (net.kind == REST) & ~mesh.fixed)
+    free = (net.degree > 0) & (net.kind < AT_REST)
+    corners = np.flatnonzero((net.degree > 0) & (net.kind == AT_REST) & ~mesh.fixed)
     away = np.linalg.norm(net.nodes[corners] - place, axis=1)
-    if len(away) and away.min() < AT_BOUNDARY * mesh.length:
+    if len(away) and away.min() < BOUNDARY_NODE_REACH * mesh.length:
         return corners[[away.argmin()]]
     curve, _, distance = nearest_on_curves(mesh.curves, *place.tolist())
     local = mesh.length * local_field(mesh.surface, place)
     on_line = (net.kind == ON_CURVE) & (net.is_open == 0)
     near = (net.kind == ON_CURVE) & (~on_line | (net.curve == curve))
-    if curve >= 0 and distance <= AT_BOUNDARY * local and np.any(free & near):
+    if curve >= 0 and distance <= BOUNDARY_NODE_REACH * local and np.any(free & near):
         free &= near
     else:
         free &= ~on_line  # a line may not be bent farther than that
@@ -58,7 +59,7 @@ def _put_node(mesh: WorkingMesh, v: int, place: np.ndarray) -> None:
     if net.kind[v] == ON_CURVE:
         net.curve[v], net.arc[v], _ = nearest_on_curves(mesh.curves, *place.tolist())
     net.nodes[v] = place
-    net.kind[v] = REST
+    net.kind[v] = AT_REST
     mesh.fixed[v] = True
 
 
@@ -114,7 +115,7 @@ def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
 def _ways(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
     """Ways to a node at a place: (node, -1) to be moved, (a, b) an edge to be split."""
     net = mesh.net
-    nodes = _candidates(mesh, place)[:CHOICES].tolist()
+    nodes = _candidates(mesh, place)[:NEAREST_TRIED].tolist()
     edges = []
     for a in nodes:
         for b in net.ring[a, : net.degree[a]].tolist():
@@ -124,7 +125,7 @@ def _ways(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
     if on_boundary == [True]:
         edges = [(a, b) for a, b in edges if net.curve[a] >= 0 and net.curve[a] == net.curve[b]]
     middle = [((0.5 * (net.nodes[a] + net.nodes[b]) - place) ** 2).sum() for a, b in edges]
-    order = np.argsort(middle, kind="stable")[:CHOICES]
+    order = np.argsort(middle, kind="stable")[:NEAREST_TRIED]
     return [(v, -1) for v in nodes] + [edges[i] for i in order]
 
 

@@ -26,11 +26,8 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-FOLDS = {
-    "quick": 1.0,
-    "normal": 1.0,
-    "best": 1.6,
-}  # factor of the weight of folds: a longer search can afford more of it
+# factor of the weight of folds: a longer search can afford more of it
+FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}
 
 Report = Callable[[float], None]
 

@@ -22,7 +22,7 @@ class Partition:
 
     def __init__(self, net: Net, among: np.ndarray) -> None:
         self._net = net
-        self.label = np.full(len(net.arc), kernels.BETWEEN, np.int64)  #: (C,) 0 or 1, or BETWEEN
+        self.label = np.full(len(net.arc), kernels.BETWEEN_HALVES, np.int64)  #: (C,) 0 or 1, or BETWEEN_HALVES
         away, queue = np.empty((2, len(net.arc)), np.int64), np.empty(len(net.arc), np.int64)
         if kernels.paths_from_ends(net, among, away, queue):
             ahead = away[0] - away[1]

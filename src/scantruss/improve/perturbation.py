@@ -17,7 +17,7 @@ from ..kernels.mesh.perturbation import (
     perturb_all,
 )
 from ..kernels.mesh.trial import Scratch
-from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, PRICE, Terms, new_scratch, settle_again, terms_of
+from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT, Terms, new_scratch, settle_again, terms_of
 from .partition import Partition
 from .working_mesh import WorkingMesh
 
@@ -116,4 +116,6 @@ def perturb(
 ) -> None:
     """Perturb a net of the grid once at each waiting irregular node (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
     of_grid = mesh.patches, mesh.curves, *room, waiting, mesh.length
-    perturb_all(net, *of_grid, LENGTH_WEIGHT, terms.strain, PRICE, terms.share, terms.nodes, temperature, allowance)
+    perturb_all(
+        net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes, temperature, allowance
+    )

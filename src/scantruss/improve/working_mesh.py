@@ -13,9 +13,9 @@ from ..grid.grid import Grid
 from ..kernels.boundary.curves import Curves
 from ..kernels.mesh import grid as kernels
 from ..kernels.mesh import point_location
-from ..kernels.mesh.grid import LOCKED, ON_CURVE, REST, Net
+from ..kernels.mesh.grid import AT_REST, LOCKED, ON_CURVE, Net
 from ..kernels.mesh.projection import project_nodes
-from ..kernels.surface.local_surface import NEAREST_SAMPLE, PATCH, Surface
+from ..kernels.surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface
 from ..runtime.parallel import in_parts
 from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
@@ -35,7 +35,7 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     """Open a grid: return it as rings of neighbours.
 
     A node whose triangles form several fans becomes several nodes of the net; these and the nodes of seams (edges inside the grid
-    without two triangles of one orientation) are LOCKED. Boundary nodes, fixed nodes and those of lines are at REST.
+    without two triangles of one orientation) are LOCKED. Boundary nodes, fixed nodes and those of lines are AT_REST.
 
     Returns
     -------
@@ -67,15 +67,15 @@ def open_net(grid: Grid) -> tuple[Net, np.ndarray]:
     spare = np.arange(capacity - 1, used - 1, -1)
     net.free[: len(spare)] = spare
     net.spare[0], net.in_use[0] = len(spare), used
-    net.kind[:used][net.is_open[:used] == 1] = REST
-    net.kind[:count][grid.fixed] = REST
+    net.kind[:used][net.is_open[:used] == 1] = AT_REST
+    net.kind[:count][grid.fixed] = AT_REST
     several = np.bincount(source[:used], minlength=count) > 1
     ring = np.sort(np.where(np.arange(net.ring.shape[1]) < net.degree[:used, None], net.ring[:used], -1), axis=1)
     twice = ((ring[:, 1:] == ring[:, :-1]) & (ring[:, 1:] >= 0)).any(axis=1)
     for a, b in inner_lines(grid).tolist():
         for v, u in ((a, b), (b, a)):
             kernels.mark_line(net, v, u)
-            net.kind[v] = REST
+            net.kind[v] = AT_REST
     net.kind[:used][several[source[:used]] | twice] = LOCKED
     return net, source
 
@@ -120,7 +120,7 @@ class WorkingMesh:
     net: Net
     source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 for a new one
     surface: Surface
-    patches: np.ndarray  #: (C, PATCH) local surface of each node
+    patches: np.ndarray  #: (C, PATCH_COLUMNS) local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at fixed positions
     curves: Curves
     length: float  #: desired member length where the length field is 1 [scan unit]
@@ -163,7 +163,7 @@ class WorkingMesh:
         if len(lines.curves):
             find_on_lines(net, lines, len(curves.total), fixed, length)
             curves, sharp = joined(curves, lines.arrays), np.concatenate([sharp, lines.sharp])
-        patches = np.zeros((len(net.degree), PATCH))
+        patches = np.zeros((len(net.degree), PATCH_COLUMNS))
         queue, located = np.zeros((2, len(net.degree)), np.int64)
         point_location.locate_nodes(net, surface, patches, length, queue, located)
         mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp, folds)

@@ -34,9 +34,8 @@ LADDER = (
 )  # fmt: skip
 NEXT = 1.4  # a length is suggested if that many times it passes too
 NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths that are tried in place of one that failed
-SURE_PER_SPACING = (
-    8.0  # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
-)
+# spacings in a member from which holes in the sampling are seldom taken for holes of the surface
+SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
 RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
@@ -45,7 +44,7 @@ CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class LengthTrial:
     """The result of trying a member length."""
 
     length: float  #: [scan unit]
@@ -80,12 +79,12 @@ class Advice:
     def __init__(self, cloud: PointCloud, settings: Settings, progress: Progress | None = None) -> None:
         self._cloud, self._progress = cloud, progress
         self._settings = settings.replace(effort="quick", length_field="")
-        self._found: dict[float, Trial] = {}
+        self._found: dict[float, LengthTrial] = {}
         self._briefly: set[float] = set()  # of these, by what usually gives a grid only
         self._usual = suggest_length(cloud)
         self._runs, self._run_length = RUNS, self._usual  # quick runs that are left, and the length they are counted at
 
-    def try_length(self, length: float, *, briefly: bool = False) -> Trial | None:
+    def try_length(self, length: float, *, briefly: bool = False) -> LengthTrial | None:
         """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or runs are used up."""
         known = self._found.get(length)
         if known is not None and (known.passed or briefly or length not in self._briefly):
@@ -101,13 +100,13 @@ class Advice:
         tried = self._counted(usual if briefly else others if known is not None else chain(usual, others), cost)
         try:
             grid = first_that_passes(self._cloud, settings, tried, progress=self._show(length))
-            trial = Trial(length, grid)
+            trial = LengthTrial(length, grid)
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(keep_rods=made.keep_rods, judge_outliers=made.judge_outliers)
         except FrontError as error:
-            trial = Trial(length, None, error) if known is None else known
+            trial = LengthTrial(length, None, error) if known is None else known
         except LengthError as error:
-            trial = Trial(length, None, FrontError(str(error)))
+            trial = LengthTrial(length, None, FrontError(str(error)))
         self._found[length] = trial
         (self._briefly.add if briefly or self._runs < cost else self._briefly.discard)(length)
         return trial
@@ -126,7 +125,7 @@ class Advice:
         return self._settings
 
     @property
-    def tried(self) -> list[Trial]:
+    def tried(self) -> list[LengthTrial]:
         """What came of the lengths that were tried by all that may give a grid, or that passed, the shortest first."""
         known = (self._found[length] for length in sorted(self._found))
         return [trial for trial in known if trial.passed or trial.length not in self._briefly]

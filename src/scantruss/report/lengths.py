@@ -10,7 +10,7 @@ from ..errors import words_of_place
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
-    from .advice import Advice, Trial
+    from .advice import Advice, LengthTrial
 
 MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
 
@@ -36,7 +36,7 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
     return (f"length{unit}", "members", f"sag L^2/8R{unit}", "L / spacing", "a quick run"), rows
 
 
-def result_of(trial: Trial | None) -> str:
+def result_of(trial: LengthTrial | None) -> str:
     """Return in a few words what came of a length: what is lost and why, or why no grid passes."""
     if trial is None:
         return "not tried"
@@ -60,7 +60,7 @@ def result_of(trial: Trial | None) -> str:
     return ", ".join(said)
 
 
-def _why(trial: Trial) -> str:
+def _why(trial: LengthTrial) -> str:
     """Return the first faults of the grid that came out, or why none did."""
     grid = getattr(trial.fault, "grid", None)
     if grid is not None and grid.certificate is not None:
@@ -88,7 +88,7 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     return lines
 
 
-def passing_lines(trials: list[Trial], unit: str) -> list[str]:
+def passing_lines(trials: list[LengthTrial], unit: str) -> list[str]:
     """Return between which lengths all that were tried pass, the shortest first; nothing where none passes."""
     spans: list[list[float]] = []
     begins = True

@@ -61,7 +61,7 @@ class Flags(Options):  # type: ignore[misc, valid-type]
 OF_NAMES = hash(Options()) if HANDS_OVER else 0
 
 
-class Part(JITCodeLibrary):  # type: ignore[misc]
+class KernelPart(JITCodeLibrary):  # type: ignore[misc]
     """A compiled kernel on its way into another: neither optimized by itself nor machine code."""
 
     def _optimize_final_module(self) -> None:
@@ -133,7 +133,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         """Make what Python calls when it first does: of most kernels it never does."""
         if name != "alone":
             raise AttributeError(name)
-        with MAKING:
+        with MAKING_KERNELS:
             if name not in vars(self):
                 alone = numba.jit(**self.targetoptions)(self.py_func)
                 alone._compiler._customize_flags = Flags
@@ -150,7 +150,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             flags = Flags()
             self.targetdescr.options.parse_as_flags(flags, self.targetoptions)
             flags.no_cpython_wrapper = flags.no_compile = True
-            part = Part(self.targetctx.codegen(), self.py_func.__qualname__)
+            part = KernelPart(self.targetctx.codegen(), self.py_func.__qualname__)
             details = {"dispatcher": self, "args": arguments, "return_type": None}
             with trigger_event("numba:compile", data=details):
                 result = compiler.compile_extra(
@@ -161,13 +161,13 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         return self.overloads[arguments].entry_point
 
 
-MAKING = RLock()  # numba asks one name for the folder, and a kernel is made once
+MAKING_KERNELS = RLock()  # numba asks one name for the folder, and a kernel is made once
 
 
 @contextmanager
 def stored_in(folder: Path) -> Iterator[None]:
     """Say to numba where it keeps machine code, while a block asks it to, which is left where numba cannot."""
-    with MAKING, suppress(RuntimeError):  # "cannot cache function"
+    with MAKING_KERNELS, suppress(RuntimeError):  # "cannot cache function"
         kept, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
         try:
             yield

@@ -32,11 +32,11 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 Work = Callable[[Job, Any], Result]
 
-AHEAD = 2  # jobs submitted per worker; more would let results pile up in memory
+JOBS_PER_WORKER = 2  # jobs submitted per worker; more would let results pile up in memory
 MOST_PER_PROCESSOR = 4  # workers; more only take memory
-PATIENCE = 10.0  # time a scheduler has to answer [s]
+SECONDS_TO_ANSWER = 10.0  # time a scheduler has to answer [s]
 NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[cluster]"'
-DIED = "a worker died, perhaps for lack of memory; use fewer workers"
+WORKER_DIED = "a worker died, perhaps for lack of memory; use fewer workers"
 
 
 class Workers(AbstractContextManager["Workers"]):
@@ -62,10 +62,8 @@ def open_workers(count: int | None = None, scheduler: str = "") -> Workers:
 
     Parameters
     ----------
-    count : int, optional
-        Processes on this machine; the number of processors by default.
-    scheduler : str
-        Address of the scheduler of a running Dask cluster, for example ``tcp://10.0.0.5:8786``.
+    count : processes on this machine; the number of processors by default; optional
+    scheduler : address of the scheduler of a running Dask cluster, for example ``tcp://10.0.0.5:8786``
 
     Raises
     ------
@@ -103,7 +101,7 @@ class Processes(Workers):
         running: dict[Future[Result], int] = {}
         try:
             while True:
-                for number, job in islice(coming, AHEAD * self.count - len(running)):
+                for number, job in islice(coming, JOBS_PER_WORKER * self.count - len(running)):
                     with signals_held():  # a process that is half started can be neither used nor ended
                         running[self._pool.submit(_with_shared, work, job, path)] = number
                 if not running:
@@ -111,7 +109,7 @@ class Processes(Workers):
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     yield running.pop(future), future.result()
         except BrokenProcessPool:
-            raise ScanTrussError(DIED) from None
+            raise ScanTrussError(WORKER_DIED) from None
 
     def _share(self, shared: Any) -> str:
         """Write what all jobs need to a file: a worker that dies while it is sent data would block the sender."""
@@ -213,7 +211,7 @@ class Cluster(Workers):
         done = as_completed()
         running: dict[str, int] = {}
         while True:
-            for number, job in islice(coming, AHEAD * self.count - len(running)):
+            for number, job in islice(coming, JOBS_PER_WORKER * self.count - len(running)):
                 future = self._client.submit(work, job, common, pure=False)
                 running[future.key] = number
                 done.add(future)
@@ -223,7 +221,7 @@ class Cluster(Workers):
             try:
                 result = future.result()
             except (CancelledError, KilledWorker):
-                raise ScanTrussError(DIED) from None
+                raise ScanTrussError(WORKER_DIED) from None
             yield running.pop(future.key), result
 
     def __exit__(
@@ -238,7 +236,7 @@ def _connect(scheduler: str) -> Any:
     from distributed import Client
 
     try:
-        return Client(scheduler, timeout=PATIENCE)
+        return Client(scheduler, timeout=SECONDS_TO_ANSWER)
     except Exception as error:
         said = " ".join(str(error).split())[:80] or type(error).__name__
         said = said if isinstance(error, OSError | ValueError) else "something else answers there"

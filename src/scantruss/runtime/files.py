@@ -27,8 +27,7 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
 
     Parameters
     ----------
-    path : str or Path
-        File to be written.
+    path : file to be written
     suffixes : collection of str
         The suffixes that can be written, in lower case.
 

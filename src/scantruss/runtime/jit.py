@@ -61,7 +61,7 @@ def _folder() -> Path | None:
     except RuntimeError:  # no home folder
         homes = []
     for home in (*homes, Path(tempfile.gettempdir()) / f"scantruss-{os.getuid() if hasattr(os, 'getuid') else 'user'}"):
-        folder = home / "scantruss" / NAME
+        folder = home / "scantruss" / FOLDER_NAME
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
@@ -78,13 +78,13 @@ def _installed() -> Path | None:
     """
     if os.environ.get("SCANTRUSS_INSTALLED") == "0":
         return None
-    folder = Path(__file__).parents[1] / "machine_code" / NAME
+    folder = Path(__file__).parents[1] / "machine_code" / FOLDER_NAME
     return folder if folder.is_dir() else None
 
 
-NAME = f"kernels-{_contents()}"
-FOLDER = _folder()
-INSTALLED = _installed()
+FOLDER_NAME = f"kernels-{_contents()}"
+KERNEL_FOLDER = _folder()
+INSTALLED_FOLDER = _installed()
 
 
 @contextmanager
@@ -111,12 +111,11 @@ def kernel(function: F) -> F:
 
     Parameters
     ----------
-    function : callable
-        A loop over arrays, numbers and NamedTuples of arrays.
+    function : a loop over arrays, numbers and NamedTuples of arrays
 
     Returns
     -------
     callable
         The compiled function; the plain one where NUMBA_DISABLE_JIT is set.
     """
-    return cast(F, compiled(function, FOLDER, INSTALLED))
+    return cast(F, compiled(function, KERNEL_FOLDER, INSTALLED_FOLDER))

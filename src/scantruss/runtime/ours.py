@@ -1,4 +1,4 @@
-"""Whether a file was written by ScanTruss, told by its content: only such a file is written over without being asked for."""
+"""Whether a file was written by ScanTruss, judged by its content: only such a file is written over without being asked for."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..errors import FormatError
 
 MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
 CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
-HEAD = 8192  # bytes from the beginning in which the mark stands
+BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
 # tables have no place for a mark: those of members, of nodes, of a sweep
-TABLES = re.compile(
+TABLE_HEADS = re.compile(
     rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b"
 )
 
@@ -22,17 +22,17 @@ def kind_of_ours(path: Path) -> str:
     """Return "cloud" or "result" for a file that ScanTruss has written; "" for any other, and for one that cannot be read."""
     try:
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            head = file.read(BYTES_WITH_MARK)
         if head.startswith(b"PK") and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as content:
                 name = next((name for name in content.namelist() if name.endswith((".model", "made_by.npy"))), None)
-                head = b"" if name is None else content.open(name).read(HEAD)
+                head = b"" if name is None else content.open(name).read(BYTES_WITH_MARK)
     except (OSError, zipfile.BadZipFile, EOFError):
         return ""
     text = head.replace(b"\x00", b"")  # numpy keeps text in four bytes a letter
     if b"point cloud by ScanTruss" in text or (text.startswith(b"LASF") and b"ScanTruss" in text):
         return "cloud"
-    return "result" if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLES.match(text) else ""
+    return "result" if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLE_HEADS.match(text) else ""
 
 
 def check_ours(path: Path, kind: str) -> None:

@@ -58,6 +58,11 @@ def in_parts(count: int, least: int, work: Callable[[int, int, int], object], ea
             raise error
 
 
+def run_in_parts(count: int, least: int, kernel: Callable[..., object], *arguments: Any) -> None:
+    """Call ``kernel(*arguments, begin, end)`` for all of `count` items, in parts of at least `least` items side by side."""
+    in_parts(count, least, lambda _, begin, end: kernel(*arguments, begin, end))
+
+
 def _taken(takers: dict[int, object], parts: int, taker: object) -> Iterator[int]:
     """Parts that nobody has taken yet; each is the taker's from then on."""
     return (part for part in range(parts) if takers.setdefault(part, taker) is taker)

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command within `PATIENCE` and leave nothing half-written, whatever it is in the middle of.
+"""Ctrl-C and SIGTERM end a command within `SECONDS_TO_END` and leave nothing half-written, whatever it is in the middle of.
 
 Python tells the main thread of a signal only between two of its own steps. Most work comes back to it in time and ends in order.
 Where it does not, in a long kernel, in a library that waits or swallows the interruption, in threads that are still joined, a
@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
-PATIENCE = 0.5  # time in which the main thread may end by itself [s]
-STATUS: dict[int, int] = {signal.SIGINT: 130, signal.SIGTERM: 143}
-WORDS: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "stopped"}
+SECONDS_TO_END = 0.5  # time in which the main thread may end by itself [s]
+SIGNAL_STATUS: dict[int, int] = {signal.SIGINT: 130, signal.SIGTERM: 143}
+SIGNAL_WORDS: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "stopped"}
 
 
 class Stopped(KeyboardInterrupt):
@@ -49,7 +49,7 @@ def note_told() -> None:
 def words_of_stop(number: int) -> str:
     """Return what to say of an end by a signal."""
     what = "what was written is whole" if _State.written else "nothing was written"
-    return f"{WORDS[number]}; {what}"
+    return f"{SIGNAL_WORDS[number]}; {what}"
 
 
 @contextmanager
@@ -57,7 +57,7 @@ def signals_heard() -> Iterator[None]:
     """Raise `Stopped` on the first signal to end, for as long as a command runs; then remove what it left half-written."""
     _State.asked, _State.told, _State.written = None, False, False
     with ExitStack() as stack:
-        for number in STATUS:
+        for number in SIGNAL_STATUS:
             if callable(kept := signal.getsignal(number)) or kept == signal.SIG_DFL:
                 with suppress(ValueError):  # only the main thread may
                     signal.signal(number, _raise_once)
@@ -82,7 +82,7 @@ def signals_held() -> Iterator[None]:
     with ExitStack() as stack:
         stack.callback(_raise_all, came)
         if threading.current_thread() is threading.main_thread():
-            for number in STATUS:
+            for number in SIGNAL_STATUS:
                 if callable(kept := signal.getsignal(number)):
                     signal.signal(number, lambda number, frame: came.append(number))
                     stack.callback(signal.signal, number, kept)
@@ -124,7 +124,7 @@ def clean_up() -> None:
 
 
 def watch() -> None:
-    """End this process `PATIENCE` after it was asked to, where it has not ended by itself."""
+    """End this process `SECONDS_TO_END` after it was asked to, where it has not ended by itself."""
     ear, mouth = socket.socketpair()
     mouth.setblocking(False)
     signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
@@ -133,25 +133,25 @@ def watch() -> None:
 
 def leave_to_watch() -> None:
     """Have the watch alone hear of signals from now on, while the process ends."""
-    for number in STATUS:
+    for number in SIGNAL_STATUS:
         if callable(signal.getsignal(number)):
             signal.signal(number, lambda number, frame: None)
 
 
 def _end_late(ear: socket.socket, mouth: socket.socket) -> None:
     number = _next_signal(ear)
-    threading.Event().wait(PATIENCE)
+    threading.Event().wait(SECONDS_TO_END)
     with _State.moving:
         for clean in reversed(_clean_ups.copy()):
             with suppress(Exception):
                 clean()
         if not _State.told:
             os.write(2, f"scantruss: {words_of_stop(number)}\n".encode())
-        os._exit(STATUS[number])
+        os._exit(SIGNAL_STATUS[number])
 
 
 def _next_signal(ear: socket.socket) -> int:
     """Wait for a signal to end; other signals send bytes too."""
-    while (number := ear.recv(1)[0]) not in STATUS:
+    while (number := ear.recv(1)[0]) not in SIGNAL_STATUS:
         pass
     return number

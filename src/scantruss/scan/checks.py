@@ -14,23 +14,24 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from .cloud import PointCloud
 
-POINTS_OF_EXTENT = 10_000  # points from which the place of a file is told
-BULK = 100_000  # points from which the place of most of a scan is told
+POINTS_OF_EXTENT = 10_000  # points from which the extent of a file is measured
+POINTS_OF_BULK = 100_000  # points from which the bulk of a scan is measured
 FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is an outlier
 BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which the bulk lies
-POINTS_OF_MIDDLE = 2_000  # points from which the place of the middle half is told
+POINTS_OF_MIDDLE = 2_000  # points from which the middle half of a scan is measured
 FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
-RASTER = 4.0  # most different x of a raster, in square roots of its number of points
-NO_DATA, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points that may have a value for no data
-CLIFF = 0.1  # gap to the other heights, as a share of their range, that no terrain has
+RASTER_COLUMNS = 4.0  # most different x of a raster, in square roots of its number of points
+NO_DATA_SHARES, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points that may have a value for no data
+CLIFF_GAP = 0.1  # gap to the other heights, as a share of their range, that no terrain has
 STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
-EXTENTS = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
+EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
 CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
-WIDEST = 1.0  # degrees that a scan spans at most
-STEEP = 50.0  # heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
+MOST_DEGREES = 1.0  # degrees that a scan spans at most
+# heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
+STEEPEST_DEGREES = 50.0
 
 
 def extent_of(points: np.ndarray) -> np.ndarray:
@@ -42,7 +43,7 @@ def extent_of(points: np.ndarray) -> np.ndarray:
 
 def bulk_of(points: np.ndarray) -> np.ndarray:
     """Return the lowest and highest coordinates of points (N, 3) but for a few outliers at each end, (2, 3)."""
-    return np.percentile(points[:: max(len(points) // BULK, 1)], BULK_PERCENTILES, axis=0)
+    return np.percentile(points[:: max(len(points) // POINTS_OF_BULK, 1)], BULK_PERCENTILES, axis=0)
 
 
 def usual_extent(points: np.ndarray) -> np.ndarray:
@@ -50,14 +51,14 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
 
     As (0, 0, 0) for no echo in a scan with national coordinates. Sparse far ends count.
     """
-    some = points[:: max(len(points) // BULK, 1)]
+    some = points[:: max(len(points) // POINTS_OF_BULK, 1)]
     lower, upper = bulk_of(some[:: max(len(some) // POINTS_OF_EXTENT, 1)])
     away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
     near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
     return np.stack([near.min(axis=0), near.max(axis=0)])
 
 
-def joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def joint_extent(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the extent of both."""
     return np.stack([np.minimum(one[0], other[0]), np.maximum(one[1], other[1])])
 
@@ -100,8 +101,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     points : (N, 3) float64 array
         Finite.
     lower, upper : their smallest and largest coordinates
-    said : str
-        Start of the message.
+    said : start of the message
 
     Raises
     ------
@@ -118,7 +118,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
             return None
         invalid: np.ndarray = (np.abs(points - middle) > FARTHEST_FROM_MIDDLE * width).any(axis=1)
     count = int(invalid.sum())
-    most_no_data = NO_DATA[1] * len(points) if have_one_height(points[invalid]) else 0.0
+    most_no_data = NO_DATA_SHARES[1] * len(points) if have_one_height(points[invalid]) else 0.0
     if count > max(MOST_INVALID_SHARE * len(points), most_no_data):
         most = np.abs(points[invalid]).max()
         raise InputError(
@@ -150,15 +150,19 @@ def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
     Then many points share exactly the least or the greatest height, and a cliff divides them from their neighbours; a lake has a shore.
     """
     z = points[:, 2]
-    if len(points) < FEWEST_POINTS or len(np.unique(points[:, 0])) > RASTER * math.sqrt(len(points)):
+    if len(points) < FEWEST_POINTS or len(np.unique(points[:, 0])) > RASTER_COLUMNS * math.sqrt(len(points)):
         return None
     for value in (z.min(), z.max()):
         at: np.ndarray = z == value
         count, rest = int(at.sum()), z[~at]
-        if not NO_DATA[0] * len(z) <= count <= NO_DATA[1] * len(z) or count < FEWEST_NO_DATA or not np.ptp(rest) > 0:
+        if (
+            not NO_DATA_SHARES[0] * len(z) <= count <= NO_DATA_SHARES[1] * len(z)
+            or count < FEWEST_NO_DATA
+            or not np.ptp(rest) > 0
+        ):
             continue
         gap = float(np.abs(rest - value).min())
-        if gap > CLIFF * np.ptp(rest) or _has_cliff(points[at], points[~at]):
+        if gap > CLIFF_GAP * np.ptp(rest) or _has_cliff(points[at], points[~at]):
             return at, float(value)
     return None
 
@@ -187,7 +191,7 @@ def no_data_note(count: int, value: float) -> str:
 
 def check_sensible(extent: float, said: str) -> None:
     """Refuse an extent that no scan has."""
-    if not EXTENTS[0] <= extent <= EXTENTS[1]:
+    if not EXTENTS_READ[0] <= extent <= EXTENTS_READ[1]:
         raise InputError(f"{said}the points span {extent:.3g}, as no scan does; {CAUSE}")
 
 
@@ -199,7 +203,7 @@ def degrees_note(cloud: PointCloud) -> tuple[str, ...]:
     lower, upper = bulk_of(some) + cloud.origin
     x, y, z = upper - lower
     on_earth = max(-lower[0], upper[0]) <= 180.0 and max(-lower[1], upper[1]) <= 90.0
-    if not (on_earth and min(x, y) > 0.0 and max(x, y) < WIDEST and z >= STEEP * max(x, y)):
+    if not (on_earth and min(x, y) > 0.0 and max(x, y) < MOST_DEGREES and z >= STEEPEST_DEGREES * max(x, y)):
         return ()
     return (
         f"x and y look like longitude and latitude in degrees, {x:.2g} by {y:.2g} beside heights of {z:.2g}: a grid needs lengths,"

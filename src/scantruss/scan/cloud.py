@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..runtime.parallel import in_parts, processors
+from ..runtime.parallel import in_parts, processors, run_in_parts
 from .checks import (
     CAUSE,
     check_sensible,
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
 INVALID = "with coordinates a million times too large"
-NO_DATA = "with a height that stands for no data"
+AT_NO_DATA = "with a height that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
-SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # ... and those of these files
-COPIES = 5  # times that a scan may be stored with every point repeated
+SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # files of scans that have z up, whatever their unit
+MOST_COPIES = 5  # times that a scan may be stored with every point repeated
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
-ROUGHLY = 60  # points among them for a first estimate
+POINTS_FOR_FIRST_SPACING = 60  # points among them for a first estimate
 POINTS_FOR_GAP = 200  # points at which the gap is measured
-POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
+COORDINATES_PER_THREAD = 50_000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class PointCloud:
 
     @property
     def z_is_up(self) -> bool:
-        """Whether z certainly points upwards: in surveys of buildings and terrain, told by their unit or file."""
+        """Whether z certainly points upwards: in surveys of buildings and terrain, judged by their unit or file."""
         return self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES)
 
     @property
@@ -135,14 +135,14 @@ class PointCloud:
             normals = normals[np.isfinite(array).all(axis=1)]
         if (invalid := find_invalid(clean, lower, upper, said)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
-            left_out = ((NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
+            left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             normals = normals if normals is None else normals[~invalid]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:
             at, value = no_data
             notes = (*notes, no_data_note(int(at.sum()), value + 0.0))
-            left_out = (*left_out, (NO_DATA, int(at.sum())))
+            left_out = (*left_out, (AT_NO_DATA, int(at.sum())))
             clean = np.ascontiguousarray(clean[~at])
             normals = normals if normals is None else normals[~at]
             lower, upper = bounds_of(clean)
@@ -197,7 +197,7 @@ def bounds_of(array: np.ndarray) -> Bounds:
     array = np.ascontiguousarray(array)
     found = np.empty((processors(), 2, 3))
     found[:, 0], found[:, 1] = math.inf, -math.inf
-    in_parts(len(array), POINTS_PER_THREAD, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
+    in_parts(len(array), COORDINATES_PER_THREAD, lambda part, begin, end: widen_bounds(array, found[part], begin, end))
     return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
@@ -232,11 +232,7 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     blocks = -(-len(points) // POINTS_PER_BLOCK)
     moved, sums = np.empty(points.shape), np.empty((blocks, 9))
-    in_parts(
-        blocks,
-        POINTS_PER_THREAD // POINTS_PER_BLOCK,
-        lambda _, begin, end: move_points(points, origin, moved, sums, begin, end),
-    )
+    run_in_parts(blocks, COORDINATES_PER_THREAD // POINTS_PER_BLOCK, move_points, points, origin, moved, sums)
     return moved, sums.sum(axis=0)
 
 
@@ -278,7 +274,7 @@ def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
     sample, place = np.unique(sample, axis=0, return_inverse=True)
     if len(place) < len(points):
         reach = float(np.linalg.norm(upper - lower))
-        some = _nearest_of(sample[:: len(sample) // ROUGHLY + 1], sample, same)
+        some = _nearest_of(sample[:: len(sample) // POINTS_FOR_FIRST_SPACING + 1], sample, same)
         nearest = _refine(points, sample, some, np.bincount(place.ravel()), same, reach)
     else:
         parts = np.array_split(sample, len(sample) // 500 + 1)
@@ -299,7 +295,7 @@ def measure_gap(points: np.ndarray) -> float:
     float
         About one spacing for points in a triangular pattern, 2.7 times the distance to the nearest for random ones.
     """
-    most = min(6 * COPIES, len(points) - 1)
+    most = min(6 * MOST_COPIES, len(points) - 1)
     gaps = []
     for place in points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_GAP)).astype(np.int64)]:
         squared = np.zeros(len(points))
@@ -356,7 +352,7 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     from ..kernels.geometry.boxes import new_boxes
     from ..kernels.scan import nearby
 
-    copies = nearby.COPIES * len(sample)
+    copies = nearby.BOXES_OF_A_PLACE * len(sample)
     boxes = new_boxes(sample.min(axis=0), sample.max(axis=0), 2.5 * size, copies, copies)
     marked = np.zeros(1 << 16, np.bool_)
     nearby.spread_sample(boxes, sample, size, marked)
@@ -365,6 +361,6 @@ def _search(points: np.ndarray, sample: np.ndarray, size: float, same: float) ->
     def search_part(part: int, begin: int, end: int) -> None:
         nearby.lower_to_nearest(points, boxes, sample, marked, size, same, squares[part], begin, end)
 
-    in_parts(len(points), POINTS_PER_THREAD, search_part)
+    in_parts(len(points), COORDINATES_PER_THREAD, search_part)
     nearest: np.ndarray = np.sqrt(squares.min(axis=0))
     return nearest

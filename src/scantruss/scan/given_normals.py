@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kernels.geometry.kd_tree import KDTree, nearest_of_places
 from ..runtime.parallel import in_parts
-from .clean.nearby import POINTS_PER_THREAD, build_kd_tree
+from .clean.nearby import SEARCHES_PER_THREAD, build_kd_tree
 
 NO_NORMALS = np.empty((0, 3))  # where none are given
 POINTS_TO_JUDGE = 2000  # points by which it is judged whether normals can be trusted
@@ -51,5 +51,5 @@ class GivenNormals:
         def look_up(_: int, begin: int, end: int) -> None:
             nearest_of_places(self.tree, places[begin:end], rank, squares[begin:end], which[begin:end])
 
-        in_parts(len(places), POINTS_PER_THREAD, look_up)
+        in_parts(len(places), SEARCHES_PER_THREAD, look_up)
         return which, squares

@@ -9,10 +9,12 @@ from ..errors import InputError, LengthError
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud, measure_gap
 
-SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be told from a gap
-GAPS = 1.75  #: ... and, for random points, this many distances to the sixth neighbour
-USUAL_GAPS = 3.5  #: the same for a suggested length, which suits evenly meshed scans
-USUAL = 25.0  #: members along the longest side of a scan, for a suggested length
+LEAST_SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be distinguished from a gap
+RANDOM_GAPS = (
+    1.75  # a member needs this many distances to the sixth neighbour, which for random points is more than the spacings
+)
+USUAL_GAPS = 3.5  # distances to the sixth neighbour in a suggested length, which suits evenly meshed scans
+USUAL_MEMBERS = 25.0  #: members along the longest side of a scan, for a suggested length
 LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape
 SOME_POINTS = 8_000  #: points of a first look at how far apart they lie
 SURELY_FEWER = 4  #: times as many in a scan: then they lie closer than in that look
@@ -54,7 +56,7 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
 
 def exact_range(cloud: PointCloud) -> tuple[float, float]:
     """Return the smallest and the largest possible member length of a scan [scan unit]."""
-    return max(SPACINGS * cloud.spacing, GAPS * cloud.gap), cloud.usual_extent / LARGEST_PER_EXTENT
+    return max(LEAST_SPACINGS * cloud.spacing, RANDOM_GAPS * cloud.gap), cloud.usual_extent / LARGEST_PER_EXTENT
 
 
 def length_range(cloud: PointCloud) -> tuple[float, float]:
@@ -66,15 +68,19 @@ def length_range(cloud: PointCloud) -> tuple[float, float]:
 def _surely_carries(cloud: PointCloud, shortest: float, longest: float) -> bool:
     """Whether members of such lengths are possible by a quick look: if some of the points lie near enough for them, all do."""
     every = len(cloud.points) // SOME_POINTS
-    if every < SURELY_FEWER or longest * LARGEST_PER_EXTENT > cloud.usual_extent or shortest < SPACINGS * cloud.spacing:
+    if (
+        every < SURELY_FEWER
+        or longest * LARGEST_PER_EXTENT > cloud.usual_extent
+        or shortest < LEAST_SPACINGS * cloud.spacing
+    ):
         return False
-    return GAPS * measure_gap(cloud.points[::every]) <= shortest
+    return RANDOM_GAPS * measure_gap(cloud.points[::every]) <= shortest
 
 
 def suggest_length(cloud: PointCloud) -> float:
     """Return a member length that suits the scan, rounded to two digits [scan unit]."""
     low, high = length_range(cloud)
-    wished = max(cloud.usual_extent / USUAL, USUAL_GAPS * cloud.gap)
+    wished = max(cloud.usual_extent / USUAL_MEMBERS, USUAL_GAPS * cloud.gap)
     return max(round_length(min(wished, high), "nearest"), low)
 
 

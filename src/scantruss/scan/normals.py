@@ -12,14 +12,16 @@ from .vectors import dots
 
 NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit is not used
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
-SAMPLES_PER_THREAD = 1500  # fewest samples that are worth a thread
-STEEP = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
+NORMALS_PER_THREAD = 1500  # fewest samples that are worth a thread
+STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
 def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> None:
     """Drop links (S, K) to samples that lie above a sample rather than beside it."""
     in_parts(
-        len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP, i, j)
+        len(mean),
+        NORMALS_PER_THREAD,
+        lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP_SINE, i, j),
     )
 
 
@@ -27,7 +29,7 @@ def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) 
     """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,)."""
     weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
     in_parts(
-        len(mean), SAMPLES_PER_THREAD, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j)
+        len(mean), NORMALS_PER_THREAD, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j)
     )
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
@@ -58,7 +60,7 @@ def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> n
     means = np.empty_like(normals)
     in_parts(
         len(normals),
-        SAMPLES_PER_THREAD,
+        NORMALS_PER_THREAD,
         lambda _, i, j: kernels.smooth_normals(normals, neighbors, facing, means, i, j),
     )
     return means

@@ -44,10 +44,8 @@ def metres_of_columns(path: Path, names: Sequence[str]) -> tuple[float | None, f
 
     Parameters
     ----------
-    path : Path
-        For messages.
-    names : sequence of str
-        Names of the columns of x, y, z.
+    path : for messages
+    names : names of the columns of x, y, z
 
     Raises
     ------

@@ -116,7 +116,7 @@ class Settings(
             values = json.loads(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             raise InputError(f"cannot read settings {path}: {error.strerror}") from None
-        except ValueError:
+        except (ValueError, RecursionError):
             raise InputError(f"{path} is not a settings file (JSON)") from None
         values = values.get("settings", values) if isinstance(values, dict) else None
         if not isinstance(values, dict):

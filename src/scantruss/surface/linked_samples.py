@@ -9,19 +9,20 @@ import numpy as np
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
-from ..runtime.parallel import in_parts
+from ..runtime.parallel import run_in_parts
 from ..scan.cloud import Bounds, bounds_of
 from ..scan.given_normals import NO_NORMALS, GivenNormals
-from ..scan.normals import SAMPLES_PER_THREAD
+from ..scan.normals import NORMALS_PER_THREAD
 from .streamline import is_dense, streamlined
 
-NEIGHBORS = 12  # most links of a sample
+LINKS_OF_A_SAMPLE = 12  # most links of a sample
+LINK_BOX = 4.0  # size d_B of the search boxes of the samples (Eq. 1), in which they are linked [sample radii]
 BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
 POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
 SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
 LONE_SPACING = 0.3  # point spacing above which most points are samples themselves [sample radii]
 SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]
-POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
+LINKED_POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
 PATCH_SPACING = 0.3  # point spacing that is dense enough for fitting patches [sample radii]
 ROUGH = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
 SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
@@ -42,7 +43,7 @@ class Linked(NamedTuple):
     start: np.ndarray  #: (S + 1,) int64 where each sample's points start
     boxes: SearchBoxes
     mean: np.ndarray  #: (S, 3)
-    neighbors: np.ndarray  #: (S, NEIGHBORS) int64
+    neighbors: np.ndarray  #: (S, LINKS_OF_A_SAMPLE) int64
     normals: np.ndarray  #: (S, 3)
     thickness: np.ndarray  #: (S,)
     facing: np.ndarray = NO_NORMALS  #: (S, 3) normals given with the scan, (0, 3) where none are
@@ -82,11 +83,7 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
         return False
     marks, least = np.empty(len(found.mean), np.bool_), float(np.cos(np.radians(uneven)))
     linked = found.mean, found.normals, found.neighbors
-    in_parts(
-        len(marks),
-        SAMPLES_PER_THREAD,
-        lambda _, begin, end: normal_kernels.mark_uneven(*linked, least, marks, begin, end),
-    )
+    run_in_parts(len(marks), NORMALS_PER_THREAD, normal_kernels.mark_uneven, *linked, least, marks)
     return bool(marks.sum() <= SAMPLES_WITHOUT_ROOM_FOR_RIDGE)
 
 
@@ -123,11 +120,7 @@ def without_bends(found: Linked, rough: float) -> np.ndarray:
     """Return the roughness of the samples (S,): the thickness, but for what of it above `rough` is a bend [scan unit]."""
     roughness = np.empty_like(found.thickness)
     linked = found.mean, found.normals, found.neighbors, found.thickness
-    in_parts(
-        len(roughness),
-        SAMPLES_PER_THREAD,
-        lambda _, begin, end: normal_kernels.rough_of_bent(*linked, rough, roughness, begin, end),
-    )
+    run_in_parts(len(roughness), NORMALS_PER_THREAD, normal_kernels.rough_of_bent, *linked, rough, roughness)
     return roughness
 
 
@@ -157,7 +150,7 @@ def samples_of_points(
         places = np.concatenate([places[:count], np.empty((3 * capacity, 3))])
         capacity = len(chosen)
     places, chosen = places[:count].copy(), chosen[:count].copy()
-    boxes = new_boxes(lower, upper, 4.0 * radius, count, count)
+    boxes = new_boxes(lower, upper, LINK_BOX * radius, count, count)
     kernels.put_all(boxes, places, np.arange(count))
     return owner, chosen, places, boxes
 
@@ -168,11 +161,8 @@ def _settled(
     """Return the nearest sample of each point, the point and position of each sample, the samples by box, and their neighbours."""
     owner, chosen, places, boxes = samples_of_points(points, radius, facing)
     neighbors = _neighbors(places, boxes, length, radius, spacing, facing[chosen] if len(facing) else facing)
-    in_parts(
-        len(points),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, facing, chosen, begin, end),
-    )
+    settled = points, places, neighbors, owner, facing, chosen
+    run_in_parts(len(points), LINKED_POINTS_PER_THREAD, kernels.settle_points, *settled)
     return owner, chosen, places, boxes, neighbors
 
 
@@ -180,14 +170,10 @@ def _neighbors(
     places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float, facing: np.ndarray
 ) -> np.ndarray:
     """Return the neighbours of each sample (S, 3) among the others."""
-    neighbors = np.full((len(places), NEIGHBORS), -1, np.int64)
+    neighbors = np.full((len(places), LINKS_OF_A_SAMPLE), -1, np.int64)
     far = max(0.7 * length, 3.0 * spacing)
     near = max(2.9 * radius, 1.5 * spacing)
-    in_parts(
-        len(places),
-        SAMPLES_PER_THREAD,
-        lambda _, begin, end: kernels.nearest_samples(places, boxes, near, far, neighbors, facing, begin, end),
-    )
+    run_in_parts(len(places), NORMALS_PER_THREAD, kernels.nearest_samples, places, boxes, near, far, neighbors, facing)
     if len(facing):
         kernels.cut_across_grooves(places, neighbors, facing)
     kernels.link_back(places, neighbors)
@@ -197,11 +183,7 @@ def _neighbors(
 def _normals(mean: np.ndarray, neighbors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the normal of each sample, not yet oriented, and the thickness there."""
     normals, thickness = np.empty_like(mean), np.empty(len(mean))
-    in_parts(
-        len(mean),
-        SAMPLES_PER_THREAD,
-        lambda _, begin, end: normal_kernels.sample_normals(mean, neighbors, normals, thickness, begin, end),
-    )
+    run_in_parts(len(mean), NORMALS_PER_THREAD, normal_kernels.sample_normals, mean, neighbors, normals, thickness)
     return normals, thickness
 
 

@@ -16,8 +16,8 @@ END_REACH = 1.3  # distance from a rod up to which samples may be its ends [memb
 END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is an end of it [member lengths]
 MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
 END_ROUNDS = 3  # most rounds in which ends of rods are looked for
-ENOUGH = 24  # samples in a usual neighbourhood from which a rod can be told from a sheet
-APART = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
+FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood from which a rod can be told from a sheet
+ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
 def rod_points(found: Linked, points: int, length: float, supports: np.ndarray | None = None) -> np.ndarray:
@@ -25,18 +25,15 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
 
     Parameters
     ----------
-    found : Linked
-        The samples of the points.
-    points : int
-        How many points there are.
-    length : float
-        Desired member length [scan unit].
+    found : the samples of the points
+    points : how many points there are
+    length : desired member length [scan unit]
     supports : (S,) bool, optional
         Samples that are known for supports, though they are no thinner than a member.
     """
     known = np.zeros(len(found.mean), np.bool_) if supports is None else supports
     spreads, _, count = _spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)
-    tells = np.median(count) >= ENOUGH  # of fewer samples around each a sheet may look thin too
+    tells = np.median(count) >= FEWEST_SAMPLES_AROUND  # of fewer samples around each a sheet may look thin too
     rod = known | (_thin(spreads) & tells)
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= _thin(_spreads(found, ~rod, FINE_REACH * length)[0])
@@ -69,7 +66,7 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     long = np.zeros(len(rod), np.bool_)
     long[label[order[first]]] = sizes.max(axis=1) >= length
     off = np.zeros(len(rod), np.bool_)
-    off[label[rod & (_moments(found, ~rod, APART * length)[2] == 0)]] = True
+    off[label[rod & (_moments(found, ~rod, ROD_DISTANCE * length)[2] == 0)]] = True
     long &= off
     long[label[known]] = True
     marked: np.ndarray = long[label]

@@ -18,13 +18,14 @@ from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.given_normals import GivenNormals
-from ..scan.normals import STEEP, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
+from ..scan.normals import STEEP_SINE, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .linked_samples import (
+    LINK_BOX,
+    LINKED_POINTS_PER_THREAD,
     MANY_ROUGH,
     PATCH_SPACING,
-    POINTS_PER_THREAD,
     ROUGH,
     SHEETS,
     Linked,
@@ -39,7 +40,7 @@ from .linked_samples import (
 )
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
-from .shape import check_is_surface, find_layers
+from .shape import check_is_surface, layers_of_surface
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 from .supports import support_samples
@@ -49,8 +50,8 @@ WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not r
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
-ALL = 24.0  # most points per sample to which a patch is fitted when nodes are projected
+PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
+PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ class SurfaceSamples:
     @cached_property
     def layers(self) -> tuple[float, float]:
         """Distance between two layers closer than half a member, and the share of the scan that has them; 0, 0 for one layer."""
-        return find_layers(self)
+        return layers_of_surface(self)
 
     @property
     def density(self) -> float:
@@ -164,7 +165,7 @@ _SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSa
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
-    """Return the samples of a cloud for a member length; kept as long as the cloud lives.
+    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); kept as long as the cloud lives.
 
     Parameters
     ----------
@@ -229,9 +230,9 @@ def narrow_surface(samples: SurfaceSamples, points: float) -> Surface:
     radius = np.sqrt(points * samples.area / (np.pi * len(surface.points)))
     surface = surface._replace(
         patch_radius=float(np.clip(radius, 0.1 * surface.length, surface.patch_radius)),
-        patch_points=ALL * (SMOOTH_SAMPLE_SPACING / SAMPLE_SPACING) ** 2
+        patch_points=PATCH_POINTS_TO_PROJECT * (SMOOTH_SAMPLE_SPACING / SAMPLE_SPACING) ** 2
         if samples.smooth
-        else ALL,  # as many for an area
+        else PATCH_POINTS_TO_PROJECT,  # as many for an area
     )
     if np.isfinite(points):  # the number of points does not depend on the length of the members
         surface = surface._replace(field=np.ones_like(surface.field))
@@ -248,7 +249,7 @@ def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_poin
     owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
     in_parts(
         len(near),
-        POINTS_PER_THREAD,
+        LINKED_POINTS_PER_THREAD,
         lambda _, begin, end: nearest_places(near, samples.boxes, means, far, owner, begin, end),
     )
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
@@ -332,9 +333,17 @@ def _prepare(
     )
 
 
+def radius_of_samples(asked: _Asked, spacing: float) -> float:
+    """Return the least distance between samples; their search boxes are `LINK_BOX` times as wide.
+
+    So they are never narrower than the spacing of the points, the lower bound of Eq. 1; holes need no upper one (docs/choices.md).
+    """
+    return max((asked.box_size or SAMPLE_SPACING) * asked.length, spacing / LINK_BOX)
+
+
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
     """Return which points (N, 3) belong to rods, (N,) bool."""
-    radius = max((asked.box_size or SAMPLE_SPACING) * asked.length, 0.25 * spacing)
+    radius = radius_of_samples(asked, spacing)
     found = link_samples(points, radius, asked.length, spacing)
     supports = support_samples(found, asked.length) if asked.z_is_up else None
     return rod_points(found, len(points), asked.length, supports)
@@ -359,7 +368,7 @@ def _usual_samples(
 ) -> _Chosen:
     """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets."""
     length, judged = asked.length, None
-    radius = max((asked.box_size or SAMPLE_SPACING) * length, 0.25 * spacing)
+    radius = radius_of_samples(asked, spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
@@ -383,7 +392,7 @@ def _usual_samples(
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
     """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP_SINE)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors)
     if len(found.facing):
@@ -399,7 +408,7 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         length=float(length),
         radius=float(radius),
         patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=POINTS_ON_THE_WAY,
+        patch_points=PATCH_POINTS_ON_THE_WAY,
         step=float(max(radius, 1.3 * spacing)),
         stamp=np.zeros(len(mean), np.int64),
         queue=np.zeros(len(mean), np.int64),

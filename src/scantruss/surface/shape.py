@@ -20,8 +20,8 @@ VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, 
 NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
 DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
 VOLUME_PLACES = 0.35  # the same for a volume: places near its surface see only half of it
-FEW = 30  # samples within a member below which all that lie there are looked at
-NEAREST = 16  # points around a place that always count
+FEWEST_SAMPLES_AROUND_PLACE = 30  # samples within a member below which all that lie there are looked at
+NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
@@ -44,7 +44,7 @@ def check_is_surface(samples: SurfaceSamples) -> None:
     lines = volumes = looked = 0
     for place in mean[_of_most_points(samples.surface)]:
         near = _within(some, place, samples.surface.length)
-        near = near if len(near) >= FEW else _within(mean, place, samples.surface.length)
+        near = near if len(near) >= FEWEST_SAMPLES_AROUND_PLACE else _within(mean, place, samples.surface.length)
         if len(near) < 5:
             continue
         looked += 1
@@ -78,7 +78,7 @@ def _nearest_points(surface: Surface, place: np.ndarray) -> np.ndarray:
     """Return the points (N, 3) within half a member of a place, or the nearest few where these are more."""
     points = _points_near(surface, place, surface.length)
     away = ((points - place) ** 2).sum(axis=1)
-    return points[away <= max((0.5 * surface.length) ** 2, np.sort(away)[min(NEAREST, len(away)) - 1])]
+    return points[away <= max((0.5 * surface.length) ** 2, np.sort(away)[min(NEAREST_COUNTED, len(away)) - 1])]
 
 
 def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarray:
@@ -87,13 +87,14 @@ def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarr
     return np.concatenate([surface.points[surface.start[s] : surface.start[s + 1]] for s in near])
 
 
-def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
+def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
     """Return the distance between two layers closer than half a member, and the share of places with two; 0, 0 for one layer."""
     surface = samples.surface
     if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
     apart, looked = [], 0
-    for sample in _spread_evenly(len(surface.mean)):
+    # samples with near numbers lie near each other, so these are from all over the scan
+    for sample in np.unique(np.linspace(0, len(surface.mean) - 1, PLACES_LOOKED_AT).astype(np.int64)):
         points = _points_near(surface, surface.mean[sample], LAYER_REACH * surface.length) - surface.mean[sample]
         if len(points) < 20:
             continue
@@ -122,8 +123,3 @@ def _of_most_points(surface: Surface) -> np.ndarray:
     """Return the numbers of the samples of some points from everywhere: outliers have few points, though many samples."""
     points = np.linspace(0, surface.start[-1] - 1, PLACES_LOOKED_AT).astype(np.int64)
     return np.unique(np.searchsorted(surface.start, points, side="right") - 1)
-
-
-def _spread_evenly(count: int) -> np.ndarray:
-    """Return the numbers of samples from all over the scan; samples with near numbers lie near each other."""
-    return np.unique(np.linspace(0, count - 1, PLACES_LOOKED_AT).astype(np.int64))

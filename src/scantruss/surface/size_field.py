@@ -18,10 +18,10 @@ from ..settings import Settings, shortest_and_longest
 RATIO = 1.2  # largest ratio of the desired lengths of two successive members
 SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 because links make distances longer
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
-BENT = 0.95  # share of the scan that is less curved than the places with the shortest members
+LESS_CURVED_SHARE = 0.95  # share of the scan that is less curved than the places with the shortest members
 NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature up to which it may be noise
 FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan [that length]
-SAMPLES_PER_THREAD = 200  # fewest samples worth a thread of their own
+LENGTHS_PER_THREAD = 200  # fewest samples worth a thread of their own
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _by_curvature(surface: Surface, most: float) -> np.ndarray:
     """
     bends = measured_bends(surface, most)
     shortest = surface.length
-    bulge = max(float(np.quantile(bends, BENT)) * shortest**2 / 8.0, FLAT_BULGE * most * shortest)
+    bulge = max(float(np.quantile(bends, LESS_CURVED_SHARE)) * shortest**2 / 8.0, FLAT_BULGE * most * shortest)
     lengths = np.sqrt(8.0 * bulge / np.maximum(bends, 1e-300)) / shortest
     return np.clip(lengths, 1.0, most)
 
@@ -139,7 +139,7 @@ def _curvatures(surface: Surface, samples: np.ndarray, wider: float) -> tuple[np
     def measure_part(part: int, begin: int, end: int) -> None:
         kernels.measure_curvatures(with_own_scratch(scaled), samples, found, deviations, begin, end)
 
-    in_parts(len(samples), SAMPLES_PER_THREAD, measure_part)
+    in_parts(len(samples), LENGTHS_PER_THREAD, measure_part)
     return found, deviations
 
 

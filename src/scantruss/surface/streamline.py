@@ -14,7 +14,7 @@ from ..runtime.parallel import in_parts, processors
 from ..scan.cloud import Bounds
 
 DENSE_SPACING = 0.35  # point spacing below which a scan is streamlined [box size]
-POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
+CHOSEN_POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
 EVERY_POINT = np.zeros(0, np.int64)  # stands for the numbers of all points
 MARKS = 1 << 20  # marks for boxes near a place; of some thousands of boxes two hardly ever share one
 LEAST_ROOM, MOST_ROOM = 1 << 16, 1 << 19  # bounds of the number of points that there is room for at first
@@ -48,7 +48,7 @@ def streamlined(points: np.ndarray, bounds: Bounds, size: float) -> np.ndarray:
         parts[part] = _First(points, lower, upper, size, room)
         parts[part].choose(EVERY_POINT, begin, end)
 
-    in_parts(len(points), POINTS_PER_THREAD, choose)
+    in_parts(len(points), CHOSEN_POINTS_PER_THREAD, choose)
     first, *others = (parts[part] for part in sorted(parts))
     for other in others:
         first.choose(other.chosen, 0, len(other.chosen))
@@ -84,9 +84,9 @@ class _First:
         """Make room for so many points and their blocks, at least four times as many blocks as there are."""
         old, rows = self.chosen, max(room // FILLED_BOXES, 4 * int(self.count[kernels.BLOCKS]), 1)
         self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
-        self.taken = np.zeros((rows, kernels.BYTES), np.uint8)
+        self.taken = np.zeros((rows, kernels.BLOCK_BYTES), np.uint8)
         table = new_boxes(np.zeros(3), np.ones(3), 1.0, rows, rows)
-        self.blocks = table._replace(counts=self.boxes.counts // kernels.SIDE + 1)
+        self.blocks = table._replace(counts=self.boxes.counts // kernels.BLOCK_SIDE + 1)
         self._choose(old, 0, len(old))
 
 
@@ -105,5 +105,5 @@ def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndar
             nearby.list_marked(points, boxes, marked, begin, end, found)
         parts[part] = found[:count]
 
-    in_parts(len(points), POINTS_PER_THREAD, look)
+    in_parts(len(points), CHOSEN_POINTS_PER_THREAD, look)
     return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""Supports: columns and legs as thick as a member between a shell and a level floor, told by where they stand."""
+"""Supports: columns and legs as thick as a member between a shell and a level floor, recognized by where they stand."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import numpy as np
 from ..kernels.geometry.components import component_labels
 from .linked_samples import Linked
 
-CELL = 0.25  # width of the cells in plan [member lengths]
-UNDER = 0.6  # height below the highest sample around from which on a sample lies under the shell [member lengths]
+CELL_WIDTH = 0.25  # width of the cells in plan [member lengths]
+# height below the highest sample around from which on a sample lies under the shell [member lengths]
+LEAST_HEADROOM = 0.6
 OFF_FLOOR = 0.3  # height above the floor from which on a sample is none of it [member lengths]
-LEVEL = 0.1  # half the thickness of a floor [member lengths]
-FLOOR = 0.05  # least share of the samples in a floor
-SLENDER = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
-MOST = 0.2  # share of the samples from which on they are no supports but the shell
+FLOOR_HALF_THICKNESS = 0.1  # half the thickness of a floor [member lengths]
+LEAST_FLOOR_SHARE = 0.05  # least share of the samples in a floor
+WIDEST_SUPPORT = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
+MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports but the shell
 
 
 def support_samples(found: Linked, length: float) -> np.ndarray:
@@ -21,23 +22,21 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
 
     Parameters
     ----------
-    found : Linked
-        The samples, z upwards.
-    length : float
-        Desired member length [scan unit].
+    found : the samples, z upwards
+    length : desired member length [scan unit]
     """
     mean, none = found.mean, np.zeros(len(found.mean), np.bool_)
-    under = mean[:, 2] < _highest_around(mean, CELL * length) - UNDER * length
-    if (floor := _floor_height(mean[under, 2], LEVEL * length, FLOOR * len(mean))) is None:
+    under = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    if (floor := _floor_height(mean[under, 2], FLOOR_HALF_THICKNESS * length, LEAST_FLOOR_SHARE * len(mean))) is None:
         return none
     between = under & (mean[:, 2] > floor + OFF_FLOOR * length)
     which = np.flatnonzero(between)
-    group = _beside_each_other(mean[which, :2], CELL * length)
+    group = _beside_each_other(mean[which, :2], CELL_WIDTH * length)
     support = none.copy()
     for each in np.unique(group):
         own = which[group == each]
-        support[own] = np.ptp(mean[own, :2], axis=0).max() <= SLENDER * length
-    return support if support.mean() <= MOST else none
+        support[own] = np.ptp(mean[own, :2], axis=0).max() <= WIDEST_SUPPORT * length
+    return support if support.mean() <= MOST_SUPPORTED else none
 
 
 def _highest_around(mean: np.ndarray, cell: float) -> np.ndarray:

@@ -10,12 +10,12 @@ import numpy as np
 from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
-OPEN = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
-FACING = 0.08  # ... above which it tells which way is up if no flat face does
+OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
+LEAST_FACING = 0.08  # ... above which it tells which way is up if no flat face does
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
-DIRECTIONS = 64  # directions in which a convex polygon is sought
+POLYGON_DIRECTIONS = 64  # directions in which a convex polygon is sought
 ANGLES = {  # azimuth and elevation of the views of a drawing [degree]
     "top": (0.0, 90.0), "bottom": (0.0, -90.0), "front": (0.0, 0.0), "back": (180.0, 0.0),
     "left": (-90.0, 0.0), "right": (90.0, 0.0),
@@ -113,7 +113,7 @@ def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
     An open shell stands on its opening. An object without a flat face stands along its longest side, or lies if it is flat.
     """
     openness = float(np.linalg.norm(facing))
-    if openness > OPEN:
+    if openness > OPEN_SHELL:
         return _upward(facing / openness)
     extent = np.ptp(nodes, axis=0)
     faces = {}
@@ -128,14 +128,14 @@ def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
     (axis, sign), (_, share) = max(faces.items(), key=lambda item: item[1][0])
     if share > FLAT_FACE:
         return sign * np.eye(3)[axis]
-    return _upward(facing / openness) if openness > FACING else _standing(extent)
+    return _upward(facing / openness) if openness > LEAST_FACING else _standing(extent)
 
 
 def _area_around(flat: np.ndarray) -> float:
     """Return about the area of the smallest convex polygon around points (N, 2)."""
     if len(flat) < 3:
         return 0.0
-    turn = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, POLYGON_DIRECTIONS, endpoint=False)
     rays = np.stack([np.cos(turn), np.sin(turn)])
     corner = flat[(flat @ rays).argmax(axis=0)]
     after = np.roll(corner, -1, axis=0)
@@ -179,7 +179,7 @@ def _front(nodes: np.ndarray, ground: np.ndarray, facing: np.ndarray, openness: 
         width, depth = np.ptp(nodes @ second), np.ptp(nodes @ first)
         if depth > 1.1 * width:
             first, second = second, -first
-    elif np.linalg.norm(level) > OPEN:  # as a facade does
+    elif np.linalg.norm(level) > OPEN_SHELL:  # as a facade does
         first = level / np.linalg.norm(level)
         second = np.cross(ground, first)
     front: np.ndarray = math.cos(turn) * first - math.sin(turn) * second

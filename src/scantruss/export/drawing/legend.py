@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...grid.certificate import Place
+from ...errors import Place
 from ...grid.grid import Grid
 from .camera import Camera
 from .strokes import INK

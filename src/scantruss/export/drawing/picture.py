@@ -41,8 +41,8 @@ from .style import PictureStyle
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-SIZE = (1600, 1200)  #: of a picture [pixel]
-PANELS = (2400, 800)  #: of three panels, or of several views [pixel]
+PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
+PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -63,8 +63,8 @@ def encode_picture(
         Views and size of the picture.
     """
     style = style or PictureStyle()
-    wide, tall = style.size or (SIZE if len(style.views) == 1 else PANELS)
-    em = 15.0 * min(wide / SIZE[0], tall / PANELS[1])  # height of the letters
+    wide, tall = style.size or (PICTURE_SIZE if len(style.views) == 1 else PANELS_SIZE)
+    em = 15.0 * min(wide / PICTURE_SIZE[0], tall / PANELS_SIZE[1])  # height of the letters
     strokes: list[Strokes] = []
     texts = [Text(wide / 2, 2.7 * em, caption_of(grid), em)] if caption else []
     rings: list[Ring] = []
@@ -141,7 +141,7 @@ def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[fl
 
 def encode_cloud(cloud: PointCloud) -> bytes:
     """Return a picture of a scan, PNG: its points seen from obliquely above."""
-    return paint(SIZE, [cloud_strokes(cloud, SIZE)], [])
+    return paint(PICTURE_SIZE, [cloud_strokes(cloud, PICTURE_SIZE)], [])
 
 
 def caption_of(grid: Grid) -> str:
@@ -174,21 +174,21 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
         The file written.
     """
     path = check_place(path, (".png",))
-    wide, tall = PANELS
+    wide, tall = PANELS_SIZE
     camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud))
     boxes = [(wide / 3 * k + 40, 80, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
     eyes = [framed(grid.nodes, grid.triangles, camera, box) for box in boxes[:2]]
-    scan, net = (look(grid.nodes, grid.triangles, eye, PANELS) for eye in eyes)
+    scan, net = (look(grid.nodes, grid.triangles, eye, PANELS_SIZE) for eye in eyes)
     own = framed(vertices, triangles, camera.around(vertices), boxes[2])
     strokes = [
         dot_strokes(placed(cloud, grid), float(np.mean(grid.lengths)), scan, over=False),
         *grid_strokes(grid, None, net),
         shadow_strokes(vertices, triangles, own),
-        solid_strokes(look(vertices, triangles, own, PANELS, mapped=False)),
+        solid_strokes(look(vertices, triangles, own, PANELS_SIZE, mapped=False)),
     ]
     titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
     texts = [Text(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
-    return write_files({path: paint(PANELS, strokes, texts)})[0]
+    return write_files({path: paint(PANELS_SIZE, strokes, texts)})[0]
 
 
 def paint(

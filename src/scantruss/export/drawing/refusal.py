@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import FrontError
 from ...scan.cloud import PointCloud
 from .legend import FAULT, Ring, Text
-from .picture import SIZE, encode_picture, paint
+from .picture import PICTURE_SIZE, encode_picture, paint
 from .strokes import cloud_strokes, oblique_view
 from .style import PictureStyle
 
@@ -30,8 +30,8 @@ def encode_refusal(error: FrontError, cloud: PointCloud, *, style: PictureStyle 
     """
     if error.grid is not None and len(error.grid.triangles) and error.grid.certificate is not None:
         return encode_picture(error.grid, cloud, style=style)
-    size = (style.size if style else None) or SIZE
-    em = 22.0 * min(size[0] / SIZE[0], size[1] / SIZE[1])  # height of the letters
+    size = (style.size if style else None) or PICTURE_SIZE
+    em = 22.0 * min(size[0] / PICTURE_SIZE[0], size[1] / PICTURE_SIZE[1])  # height of the letters
     lines = wrap(str(error), LINE)
     texts = [Text(2 * em, size[1] - (2 + 1.6 * k) * em, words, em, "left", FAULT) for k, words in enumerate(lines)]
     rings = []

@@ -16,12 +16,15 @@ PAPER = np.array([0.984, 0.980, 0.969])
 GROUND = np.array([0.925, 0.918, 0.898])
 INK = np.array([0.098, 0.180, 0.290])  # members
 BOUNDARY_COLOR = np.array([0.047, 0.098, 0.176])  # members on a boundary
-OUTSIDE = (np.array([0.345, 0.525, 0.620]), np.array([0.835, 0.925, 0.930]))  # triangles in the shade, in the light
-INSIDE = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
+OUTSIDE_SHADES = (
+    np.array([0.345, 0.525, 0.620]),
+    np.array([0.835, 0.925, 0.930]),
+)  # triangles in the shade, in the light
+INSIDE_SHADES = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
 CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
 PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
-MARK = np.array([0.851, 0.290, 0.180])  # fixed nodes
-BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
+FIXED_NODE_COLOUR = np.array([0.851, 0.290, 0.180])  # fixed nodes
+COLOUR_BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class Strokes:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class CameraView:
     """A surface as seen by a camera."""
 
     camera: Camera
@@ -56,7 +59,7 @@ class View:
 
 def look(
     nodes: np.ndarray, triangles: np.ndarray, camera: Camera, size: tuple[int, int], *, mapped: bool = True
-) -> View:
+) -> CameraView:
     """Return how a surface looks from a camera; the map of what is in front only if asked for."""
     flat, near = camera.project(nodes)
     corners, depth = flat[triangles], near[triangles]
@@ -72,7 +75,7 @@ def look(
     rows, columns = (size[1] // 2, size[0] // 2) if mapped else (0, 0)
     nearest, front = map_depth(corners / 2, depth, (rows, columns))
     span = (float(used.min()), float(used.max()))
-    return View(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
+    return CameraView(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
@@ -114,7 +117,7 @@ def _hazy(colour: np.ndarray, fade: np.ndarray, most: float) -> np.ndarray:
 
 
 def _surface_strokes(
-    view: View, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]
+    view: CameraView, outside: tuple[np.ndarray, np.ndarray], inside: tuple[np.ndarray, np.ndarray]
 ) -> Strokes:
     """Return the shaded triangles of a view."""
     colour = np.where(view.outside[:, None], _mix(outside, view.light), _mix(inside, view.light))
@@ -157,11 +160,11 @@ def framed(
     return camera.framed(everything, box)
 
 
-def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Strokes]:
+def grid_strokes(grid: Grid, scan: np.ndarray | None, view: CameraView) -> list[Strokes]:
     """Return shadow, triangles, members, fixed nodes and, if given, the points of the scan (N, 3)."""
     strokes = [
         shadow_strokes(grid.nodes, grid.triangles, view.camera),
-        _surface_strokes(view, OUTSIDE, INSIDE),
+        _surface_strokes(view, OUTSIDE_SHADES, INSIDE_SHADES),
         _member_strokes(grid, view),
     ]
     if scan is not None:
@@ -171,7 +174,7 @@ def grid_strokes(grid: Grid, scan: np.ndarray | None, view: View) -> list[Stroke
     return strokes
 
 
-def _member_strokes(grid: Grid, view: View) -> Strokes:
+def _member_strokes(grid: Grid, view: CameraView) -> Strokes:
     """Return the members as lines just in front of their triangles, those on a boundary or line bolder."""
     flat, near = view.camera.project(grid.nodes)
     ends = grid.edges
@@ -201,7 +204,7 @@ def some_of(points: np.ndarray, most: int) -> np.ndarray:
     return chosen
 
 
-def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) -> Strokes:
+def dot_strokes(points: np.ndarray, member: float, view: CameraView, *, over: bool) -> Strokes:
     """Return the points of the scan (N, 3) that are seen, as dots: over the triangles, or alone and shaded."""
     flat, near = view.camera.project(some_of(points, MOST_POINTS[over]))
     inside, triangle, nearest = _in_front(flat, view)
@@ -212,12 +215,12 @@ def dot_strokes(points: np.ndarray, member: float, view: View, *, over: bool) ->
     on = (triangle >= 0) & (near < nearest + slack)
     key = np.where(on, np.maximum(view.key[triangle], near), near) + slack
     light = np.where(triangle >= 0, view.light[triangle], 0.5)
-    colour = _hazy(_mix((INK, OUTSIDE[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
+    colour = _hazy(_mix((INK, OUTSIDE_SHADES[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
 
 
 def missed_strokes(
-    points: np.ndarray, colour: np.ndarray, view: View, box: tuple[float, float, float, float]
+    points: np.ndarray, colour: np.ndarray, view: CameraView, box: tuple[float, float, float, float]
 ) -> Strokes:
     """Return points that the grid leaves out (N, 3) in a colour (3,), as far as they lie in a box; faint where they lie behind the grid."""
     flat, near = view.camera.project(some_of(points, MOST_POINTS[True]))
@@ -225,13 +228,13 @@ def missed_strokes(
     flat, near = flat[shown], near[shown]
     inside, _, nearest = _in_front(flat, view)
     shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-    shown[:, 3] = np.where(inside & (near < nearest), BEHIND, 1.0)
+    shown[:, 3] = np.where(inside & (near < nearest), COLOUR_BEHIND, 1.0)
     return Strokes(
         near + 1e-6 * view.camera.distance, _dots(flat), np.zeros_like(shown), shown, np.full(len(flat), 3.0)
     )
 
 
-def _in_front(flat: np.ndarray, view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _in_front(flat: np.ndarray, view: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which places of a picture (N, 2) lie in it, and the triangle in front there and its nearness."""
     rows, columns = view.front.shape
     pixel = np.rint(flat / 2).astype(int)
@@ -275,22 +278,22 @@ def _dots(flat: np.ndarray) -> np.ndarray:
     return shape
 
 
-def _mark_strokes(grid: Grid, view: View) -> list[Strokes]:
+def _mark_strokes(grid: Grid, view: CameraView) -> list[Strokes]:
     """Return the marks of the fixed nodes: full where they are seen, faint behind the grid."""
     flat, near = view.camera.project(grid.nodes[grid.fixed])
     _, _, nearest = _in_front(flat, view)
     seen = near > nearest - 0.5 * float(np.mean(grid.lengths))
     shape = _dots(flat)
     strokes = []
-    for colour, width in ((PAPER, 15.0), (MARK, 11.0)):
+    for colour, width in ((PAPER, 15.0), (FIXED_NODE_COLOUR, 11.0)):
         shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-        shown[:, 3] = np.where(seen, 1.0, BEHIND)
+        shown[:, 3] = np.where(seen, 1.0, COLOUR_BEHIND)
         front = np.full(len(flat), np.inf)
         strokes.append(Strokes(front, shape, np.zeros_like(shown), shown, np.full(len(flat), width)))
     return strokes
 
 
-def solid_strokes(view: View) -> Strokes:
+def solid_strokes(view: CameraView) -> Strokes:
     """Return the outside of a solid, shaded."""
     surface = _surface_strokes(view, PRINT, PRINT)
     keep = view.outside

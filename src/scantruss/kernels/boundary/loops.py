@@ -16,11 +16,11 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, flood, walk
 
-DIRECTIONS = 64
-BINS = 240
-OVER = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
+DISC_DIRECTIONS = 64
+SWEEP_BINS = 240
+SHEET_SINE = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
 ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places, above which they may lie on one sheet
-FACING = 0.2  # samples whose normals have a smaller cosine are another sheet, or a plant
+SAME_SHEET_COSINE = 0.2  # samples whose normals have a smaller cosine are another sheet, or a plant
 
 
 @kernel
@@ -88,17 +88,17 @@ def _block(
     blocked: np.ndarray,
 ) -> int:
     """Mark the directions in which a disc `reach` wide that touches a place would hold another sample; how many are new."""
-    if dot(row(surface.normals, other), normal) < FACING:
+    if dot(row(surface.normals, other), normal) < SAME_SHEET_COSINE:
         return 0
     angle, distance = _polar(place, normal, u, v, row(surface.mean, other), noise)
     new = 0
     if 0.0 < distance < reach:
         half = math.acos(distance / reach)
-        low = int(math.ceil((angle - half) * DIRECTIONS / (2.0 * math.pi)))
-        high = int(math.floor((angle + half) * DIRECTIONS / (2.0 * math.pi)))
+        low = int(math.ceil((angle - half) * DISC_DIRECTIONS / (2.0 * math.pi)))
+        high = int(math.floor((angle + half) * DISC_DIRECTIONS / (2.0 * math.pi)))
         for b in range(low, high + 1):
-            new += not blocked[b % DIRECTIONS]
-            blocked[b % DIRECTIONS] = True
+            new += not blocked[b % DISC_DIRECTIONS]
+            blocked[b % DISC_DIRECTIONS] = True
     return new
 
 
@@ -109,7 +109,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
     Samples whose neighbours leave no gap wider than `widest` [rad] are inside and not looked at further. The direction (S,) is
     the middle of the widest free range, counted from `across(normal)`, less than a turn.
     """
-    blocked = np.zeros(DIRECTIONS, np.bool_)
+    blocked = np.zeros(DISC_DIRECTIONS, np.bool_)
     ahead = np.empty((surface.neighbors.shape[1], 3))
     noise = 0.2 * surface.length
     for s in range(begin, end):
@@ -120,7 +120,7 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
         if not has_gap(surface, s, u, v, widest, ahead):
             continue
         blocked[:] = False
-        reach, left = 2.0 * radii[s], DIRECTIONS
+        reach, left = 2.0 * radii[s], DISC_DIRECTIONS
         for k in range(surface.neighbors.shape[1]):  # these rule out most samples that are inside
             n = surface.neighbors[s, k]
             if n < 0 or left == 0:
@@ -133,11 +133,11 @@ def free_directions(surface: Surface, radii: np.ndarray, widest: float, free: np
         for i in range(1, flood(surface, s, place, reach)):
             _block(surface, surface.queue[i], place, normal, u, v, noise, reach, blocked)
         best, run = 0, 0
-        for b in range(2 * DIRECTIONS):
-            run = 0 if blocked[b % DIRECTIONS] else run + 1
-            if run > best and run <= DIRECTIONS:
+        for b in range(2 * DISC_DIRECTIONS):
+            run = 0 if blocked[b % DISC_DIRECTIONS] else run + 1
+            if run > best and run <= DISC_DIRECTIONS:
                 best = run
-                free[s] = (b - 0.5 * (run - 1)) % DIRECTIONS * 2.0 * math.pi / DIRECTIONS
+                free[s] = (b - 0.5 * (run - 1)) % DISC_DIRECTIONS * 2.0 * math.pi / DISC_DIRECTIONS
 
 
 @kernel
@@ -151,18 +151,18 @@ def sample_disc(surface: Surface, sample: int, direction: float, radius: float) 
 
 @kernel
 def _nearest_clear(cover: np.ndarray) -> int:
-    """Direction nearest to 0 that nothing covers, at most 75 degrees off; BINS if there is none.
+    """Direction nearest to 0 that nothing covers, at most 75 degrees off; SWEEP_BINS if there is none.
 
-    cover : (BINS + 1,) changes of the number of arcs at each direction; becomes their number.
+    cover : (SWEEP_BINS + 1,) changes of the number of arcs at each direction; becomes their number.
     """
-    for b in range(1, BINS):
+    for b in range(1, SWEEP_BINS):
         cover[b] += cover[b - 1]
-    for b in range(BINS * 5 // 24):
+    for b in range(SWEEP_BINS * 5 // 24):
         if cover[b] == 0:
             return b
-        if cover[BINS - 1 - b] == 0:
+        if cover[SWEEP_BINS - 1 - b] == 0:
             return -1 - b
-    return BINS
+    return SWEEP_BINS
 
 
 @kernel
@@ -193,8 +193,8 @@ def roll_disc(
     path[0] = sample
     count, came_from = 1, -1
     noise = 0.2 * surface.length
-    step = 2.0 * math.pi / BINS
-    cover = np.empty(BINS + 1, np.int64)
+    step = 2.0 * math.pi / SWEEP_BINS
+    cover = np.empty(SWEEP_BINS + 1, np.int64)
     while count < len(path):
         normal, place, radius = row(surface.normals, sample), row(surface.mean, sample), radii[sample]
         u = across(normal)
@@ -205,24 +205,24 @@ def roll_disc(
         cover[:] = 0
         for i in range(1, found):
             s = surface.queue[i]
-            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+            if dot(row(surface.normals, s), normal) < SAME_SHEET_COSINE or banned[s]:
                 continue
             angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
             if distance < 2.0 * radius:
                 half = math.acos(distance / (2.0 * radius))
-                begin = min(int((angle - half - phi) % (2.0 * math.pi) / step), BINS - 1)  # -1e-17 % 2 pi is 2 pi
-                end = min(int((angle + half - phi) % (2.0 * math.pi) / step), BINS - 1) + 1
+                begin = min(int((angle - half - phi) % (2.0 * math.pi) / step), SWEEP_BINS - 1)  # -1e-17 % 2 pi is 2 pi
+                end = min(int((angle + half - phi) % (2.0 * math.pi) / step), SWEEP_BINS - 1) + 1
                 cover[begin] += 1
                 cover[end] -= 1
                 if end <= begin:
                     cover[0] += 1
         clear = _nearest_clear(cover)
-        phi += (clear + 0.5) * step if clear < BINS else 0.0
-        slack = 0.0 if clear < BINS else 0.35
+        phi += (clear + 0.5) * step if clear < SWEEP_BINS else 0.0
+        slack = 0.0 if clear < SWEEP_BINS else 0.35
         least, to, to_angle = 1e300, -1, 0.0
         for i in range(1, found):
             s = surface.queue[i]
-            if dot(row(surface.normals, s), normal) < FACING or banned[s]:
+            if dot(row(surface.normals, s), normal) < SAME_SHEET_COSINE or banned[s]:
                 continue
             angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
             if distance < 2.0 * radius:
@@ -285,7 +285,7 @@ def touch_points(
         count = flood(surface, sample, row(surface.mean, sample), radius + 2.0 * surface.radius)
         for i in range(count):
             s = surface.queue[i]
-            if dot(row(surface.normals, s), normal) < FACING:
+            if dot(row(surface.normals, s), normal) < SAME_SHEET_COSINE:
                 continue
             for p in range(surface.start[s], surface.start[s + 1]):
                 d = subtract(row(surface.points, p), place)
@@ -314,7 +314,7 @@ def _beside(d: Vector, a: Vector, b: Vector) -> bool:
     """
     rise = dot(d, a) + dot(d, b)
     facing = dot(a, b)
-    return facing > ONE_SHEET_COSINE and rise * rise <= OVER * OVER * dot(d, d) * 2.0 * (1.0 + facing)
+    return facing > ONE_SHEET_COSINE and rise * rise <= SHEET_SINE * SHEET_SINE * dot(d, d) * 2.0 * (1.0 + facing)
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.triangles import quality, turned
 from ..geometry.vectors import Vector, along, norm, row, subtract
-from ..surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.size_field import length_at
 from .cases import choose_by_case, far_from_front
 from .fits import fits, left_angle, near_nodes, right_angle
@@ -165,7 +165,7 @@ def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Ru
 def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
-    patch = np.zeros(PATCH)
+    patch = np.zeros(PATCH_COLUMNS)
     for _ in range(budget):
         if not has_room(front):
             return FULL
@@ -182,7 +182,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """The same by the six cases of Table 1; separate from `advance`, so that it is compiled for method paper only."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
-    patch = np.zeros(PATCH)
+    patch = np.zeros(PATCH_COLUMNS)
     for _ in range(budget):
         if not has_room(front):
             return FULL

@@ -11,7 +11,7 @@ from ..geometry.boxes import search
 from ..geometry.triangles import distance_to_segment
 from ..geometry.vectors import dot, norm, row, subtract
 from ..mesh.point_location import nearest_sample
-from ..surface.local_surface import NEAREST_SAMPLE, PATCH, Surface, fit_patch, patch_normal, walk
+from ..surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch, patch_normal, walk
 from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
 
 
@@ -27,7 +27,7 @@ class CandidateNodes(NamedTuple):
 @kernel
 def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
     """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
-    patch = np.zeros(PATCH)
+    patch = np.zeros(PATCH_COLUMNS)
     first, sample = front.count[NODES], -1
     for i in range(len(nodes)):
         place = row(nodes, i)

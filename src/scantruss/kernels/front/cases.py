@@ -28,14 +28,16 @@ from .front import (
 )
 
 # What the paper leaves open: how strictly a triangle is tested.
-TOLERANT = 0.7  # strictness of the tests for a triangle that a case asks for, from 0 to 1
-SOUND = 0.4  # shape quality below which the triangle of two merged nodes is too flat
-KEPT_SOUND = 0.35  # shape quality below which merging would leave a finished triangle too flat
-ALIGNED = 0.5  # cosine of the angle between a triangle and the surface at its nodes, below which it stands up from it
-MERGED = 0.9  # free nodes farther apart than this are not merged [lengths]
-LEAST = 0.3  # quality delta below which no triangle with an existing node is made
-SEEN = 2.4  # distance from a segment up to which nodes of the front are considered [lengths]
-APART = 0.45  # least distance of a new node from a candidate node that the front has not reached yet [lengths]
+CASE_STRICTNESS = 0.7  # strictness of the tests for a triangle that a case asks for, from 0 to 1
+LEAST_MERGED_SHAPE = 0.4  # shape quality below which the triangle of two merged nodes is too flat
+LEAST_FINISHED_SHAPE = 0.35  # shape quality below which merging would leave a finished triangle too flat
+# cosine of the angle between a triangle and the surface at its nodes, below which it stands up from it
+LEAST_ALIGNMENT = 0.5
+FARTHEST_MERGED = 0.9  # free nodes farther apart than this are not merged [lengths]
+LEAST_DELTA = 0.3  # quality delta below which no triangle with an existing node is made
+SEARCH_REACH = 2.4  # distance from a segment up to which nodes of the front are considered [lengths]
+# least distance of a new node from a candidate node that the front has not reached yet [lengths]
+CANDIDATE_CLEARANCE = 0.45
 
 TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
 
@@ -65,7 +67,7 @@ def reach(length: float, segment: float, w1: float) -> float:
 @kernel
 def try_node(front: Front, s: int, p: int, rules: Rules, found: np.ndarray, near: int) -> bool:
     """Attach node p to a segment if that fits."""
-    good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
+    good, passage = fits(front, s, p, found, near, rules.length, CASE_STRICTNESS)
     if good:
         attach(front, s, p, passage)
     return good
@@ -73,25 +75,25 @@ def try_node(front: Front, s: int, p: int, rules: Rules, found: np.ndarray, near
 
 @kernel
 def close_triangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 1: the neighbours meet."""
+    """Table 1, case 1: the neighbours meet."""
     return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
 def close_left(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 6: a triangle with the previous neighbour."""
+    """Table 1, case 6: a triangle with the previous neighbour."""
     return try_node(front, s, front.tail[front.previous[s]], rules, found, near)
 
 
 @kernel
 def close_right(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 5: a triangle with the next neighbour."""
+    """Table 1, case 5: a triangle with the next neighbour."""
     return try_node(front, s, front.head[front.next[s]], rules, found, near)
 
 
 @kernel
 def close_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 2: the better diagonal of a quadrangle; its other triangle is then case 1."""
+    """Table 1, case 2: the better diagonal of a quadrangle; its other triangle is then case 1."""
     a, b = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
     c = row(front.nodes, front.tail[front.previous[s]])
     d = row(front.nodes, front.head[front.next[s]])
@@ -111,7 +113,7 @@ def _fan_holds(front: Front, node: int, place: Vector) -> bool:
         q, r = front.triangles[t, (k + 1) % 3], front.triangles[t, (k + 2) % 3]
         pq, pr = row(front.nodes, q), row(front.nodes, r)
         face = unit(cross(subtract(pq, place), subtract(pr, place)))
-        if dot(face, row(front.normals, q)) < ALIGNED or shape_quality(place, pq, pr) < KEPT_SOUND:
+        if dot(face, row(front.normals, q)) < LEAST_ALIGNMENT or shape_quality(place, pq, pr) < LEAST_FINISHED_SHAPE:
             return False
         at = front.corner_next[at]
     return True
@@ -139,7 +141,7 @@ def _share_neighbor(front: Front, c: int, d: int, a: int, b: int) -> bool:
 
 @kernel
 def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int) -> bool:
-    """Case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
+    """Table 1, case 3: the free ends of both neighbours merge into the point of the cloud closest to them.
 
     Nodes of a boundary stay: the other end comes to them. Where finished triangles would turn over, nothing is merged.
     """
@@ -151,7 +153,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
     if c == d or edge_exists(front, c, d) or _share_neighbor(front, c, d, a, b):
         return False
     pc, pd = row(front.nodes, c), row(front.nodes, d)
-    if norm(subtract(pd, pc)) > MERGED * rules.length:
+    if norm(subtract(pd, pc)) > FARTHEST_MERGED * rules.length:
         return False
     middle = along(pc, 0.5, subtract(pd, pc))
     keep, lose = (d, c) if front.on_boundary[d] else (c, d)
@@ -170,7 +172,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
                     least, place = dot(away, away), row(surface.points, p)
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     face = unit(cross(subtract(pb, pa), subtract(place, pa)))
-    if dot(face, row(front.normals, a)) < ALIGNED or shape_quality(pa, pb, place) < SOUND:
+    if dot(face, row(front.normals, a)) < LEAST_ALIGNMENT or shape_quality(pa, pb, place) < LEAST_MERGED_SHAPE:
         return False
     if not (_fan_holds(front, c, place) and _fan_holds(front, d, place)):
         return False
@@ -311,7 +313,8 @@ def far_from_front(
         if (
             i < near
             and q != p
-            and norm(subtract(pp, row(front.nodes, q))) < (least if front.out[q] >= 0 else max(least, APART * length))
+            and norm(subtract(pp, row(front.nodes, q)))
+            < (least if front.out[q] >= 0 else max(least, CANDIDATE_CLEARANCE * length))
         ):
             return False
     return True
@@ -336,7 +339,7 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
             t = front.out_next[t]
     for _ in range(near):
         i = int(np.argmax(score))
-        if score[i] <= LEAST:
+        if score[i] <= LEAST_DELTA:
             return False
         if try_node(front, s, found[i], rules, found, near):
             return True
@@ -348,13 +351,13 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
 def new_node(
     surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.ndarray
 ) -> bool:
-    """Case 4: the three steps of Sec. 3.4."""
+    """Table 1, case 4: the three steps of Sec. 3.4."""
     if not optimal_point(surface, front, s, rules, patch):
         return False
     p = front.count[NODES]
     pp = row(front.nodes, p)
     if far_from_front(front, s, p, pp, found, near, rules.nearness * rules.length, rules.length):
-        good, passage = fits(front, s, p, found, near, rules.length, TOLERANT)
+        good, passage = fits(front, s, p, found, near, rules.length, CASE_STRICTNESS)
         if good:
             add_node(front)
             attach(front, s, p, passage)
@@ -367,7 +370,7 @@ def new_node(
 @kernel
 def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
     """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
-    near = near_nodes(surface, front, s, SEEN * rules.length, rules.length, found)
+    near = near_nodes(surface, front, s, SEARCH_REACH * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
     if case == TRIANGLE:
         return close_triangle(front, s, rules, found, near)

@@ -23,9 +23,10 @@ from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, sub
 from ..surface.local_surface import Surface, linked
 from .front import NODES, Front, edge_exists
 
-FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, [member lengths]
-FACES = 0.5  # least cosine of the angle between such a line and the triangle
-SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
+# how far from a triangle a line of the front that faces as it does may be and still be crossed [member lengths]
+FOLD_DISTANCE = 0.85
+FACING_COSINE = 0.5  # least cosine of the angle between such a line and the triangle
+SHEET_DISTANCE = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
@@ -179,7 +180,7 @@ def clear_of_front(
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
         if i < near and q != p and q != a and q != b:
-            if abs(dot(subtract(pq, pa), normal)) < SHEET * length and inside_triangle(
+            if abs(dot(subtract(pq, pa), normal)) < SHEET_DISTANCE * length and inside_triangle(
                 onto_tangent_plane(pq, pa, u, v), a2, b2, p2
             ):
                 return False
@@ -198,8 +199,8 @@ def clear_of_front(
                 pe = row(front.nodes, e)
                 # a line in a fold lies deep below a triangle that bridges it, and faces as that does
                 faces = min(dot(normal, row(front.normals, q)), dot(normal, row(front.normals, e)))
-                bridged = front.on_boundary[q] and front.on_boundary[e] and faces > FACES
-                apart = (FOLD if bridged else SHEET) * length
+                bridged = front.on_boundary[q] and front.on_boundary[e] and faces > FACING_COSINE
+                apart = (FOLD_DISTANCE if bridged else SHEET_DISTANCE) * length
                 if q != a and e != a and lines_cross(pa, pp, pq, pe, apart):
                     return False
                 if q != b and e != b and lines_cross(pb, pp, pq, pe, apart):

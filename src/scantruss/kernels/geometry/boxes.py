@@ -26,7 +26,7 @@ class SearchBoxes(NamedTuple):
 
 
 def new_boxes(lower: np.ndarray, upper: np.ndarray, box: float, capacity: int, slots: int) -> SearchBoxes:
-    """Return empty search boxes no larger than `box` [scan unit], unless that makes more than 100,000 along an axis.
+    """Return empty search boxes (Eqs. 2, 3) no larger than `box` [scan unit], unless that makes more than 100,000 along an axis.
 
     Eq. 3 divides by N - 1, zero for a scan thinner than one box, and lets D grow to nearly 2 d_B; here N - 1 is rounded up, so
     that d_B / 2 < D <= d_B, and a thin direction has one box.

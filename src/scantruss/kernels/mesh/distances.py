@@ -13,7 +13,7 @@ from ..geometry.planes import plane_of
 from ..geometry.triangles import distance_to_triangle
 from ..geometry.vectors import Vector, dot, norm, row, subtract
 
-GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
+RADIUS_GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
 
 
 class TriangleBoxes(NamedTuple):
@@ -155,7 +155,7 @@ def plane_distances(
     """Fill in the distance of places (Q, 3) from the plane through the `around` nearest points, or from the nearest if that is less.
 
     boxes : the points by box. near : first search radius [scan unit]. noise : (Q,), filled with the rms distance of those points
-    from their plane. A place that has not `around` points within `GROWTHS` of the radius is inf away.
+    from their plane. A place that has not `around` points within `RADIUS_GROWTHS` of the radius is inf away.
     """
     wanted = min(around, len(points))
     found, squares, offsets = np.empty(wanted, np.int64), np.empty(wanted), np.empty((wanted, 3))
@@ -163,7 +163,7 @@ def plane_distances(
     for q in range(len(places)):
         place = row(places, q)
         count = nearest_points(boxes, points, place, reach, found, squares)
-        for _ in range(GROWTHS):
+        for _ in range(RADIUS_GROWTHS):
             if count == wanted:
                 break
             reach *= 1.5

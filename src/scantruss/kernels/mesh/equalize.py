@@ -14,9 +14,9 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, slide
 from ..geometry.vectors import dot, subtract, vector_in
-from ..surface.folds import BENT, chord_energy, chord_slope, fold_energy, fold_slope
+from ..surface.folds import FOLD_WEIGHT, chord_energy, chord_slope, fold_energy, fold_slope
 from ..surface.local_surface import CENTRE, NORMAL, onto_patch
-from .grid import INTERIOR, ON_CURVE, REST, Net
+from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular triangle 1 (Eq. 5)
 RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
@@ -74,14 +74,14 @@ def star_energy(
             sx += h * (bx + cx) - f * (ey * uz - ez * uy)
             sy += h * (by + cy) - f * (ez * ux - ex * uz)
             sz += h * (bz + cz) - f * (ex * uy - ey * ux)
-    if patches[v, BENT] > 0.0:
+    if patches[v, FOLD_WEIGHT] > 0.0:
         energy += fold_energy(patches, v, x, y, z)
         if slope:
             fx, fy, fz = fold_slope(patches, v, x, y, z)
             gx, gy, gz = gx + fx, gy + fy, gz + fz
     for i in range(d):
         w = net.ring[v, i]
-        if patches[v, BENT] > 0.0 or patches[w, BENT] > 0.0:
+        if patches[v, FOLD_WEIGHT] > 0.0 or patches[w, FOLD_WEIGHT] > 0.0:
             hx, hy, hz = 0.5 * (x + nodes[w, 0]), 0.5 * (y + nodes[w, 1]), 0.5 * (z + nodes[w, 2])
             energy += chord_energy(patches, v, w, hx, hy, hz)
             if slope:
@@ -100,7 +100,7 @@ def settle_node(
     still : shortest step that is made where `length` is desired [scan unit]. stride : over-relaxation
     """
     kind = net.kind[v]
-    if kind >= REST or net.degree[v] == 0:
+    if kind >= AT_REST or net.degree[v] == 0:
         return 0.0
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)

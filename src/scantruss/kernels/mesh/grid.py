@@ -15,7 +15,7 @@ from ...runtime.jit import kernel
 
 INTERIOR = 0  # kind of a node that slides on the scanned surface
 ON_CURVE = 1  # kind of a node that slides on its curve: of the boundary, or of a line if its ring is closed
-REST = 2  # kind of a corner or fixed node: never moved or removed
+AT_REST = 2  # kind of a corner or fixed node: never moved or removed
 LOCKED = 3  # kind of a node at a defect of the grid (pinch, seam): nothing near it changes
 
 
@@ -26,7 +26,7 @@ class Net(NamedTuple):
     ring: np.ndarray  #: (C, W) int64 neighbours, anticlockwise
     degree: np.ndarray  #: (C,) int64 number of neighbours; 0 for a free node
     is_open: np.ndarray  #: (C,) int64, 1 on the boundary, 0 inside
-    kind: np.ndarray  #: (C,) int64 INTERIOR, ON_CURVE, REST or LOCKED
+    kind: np.ndarray  #: (C,) int64 INTERIOR, ON_CURVE, AT_REST or LOCKED
     curve: np.ndarray  #: (C,) int64 curve of the boundary or of a line on which the node slides, -1 for none
     ideal: np.ndarray  #: (C,) int64 ideal number of neighbours: 6 inside, on the boundary by its angle
     line: np.ndarray  #: (C,) int64, bit i is set if the member to neighbour i of the ring is part of a line
@@ -221,7 +221,7 @@ def flip(net: Net, a: int, b: int) -> None:
 @kernel
 def may_collapse(net: Net, a: int, b: int) -> bool:
     """Whether node b can be collapsed into node a without a change of topology (link condition)."""
-    if net.kind[b] >= REST or net.kind[a] == LOCKED or net.kind[b] > net.kind[a]:
+    if net.kind[b] >= AT_REST or net.kind[a] == LOCKED or net.kind[b] > net.kind[a]:
         return False
     right, left = wings(net, a, b)
     if net.line[b] != 0 and not (

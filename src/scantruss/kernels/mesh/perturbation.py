@@ -56,7 +56,7 @@ class Area(NamedTuple):
     curve: np.ndarray  #: (A,) int64
     ideal: np.ndarray  #: (A,) int64
     line: np.ndarray  #: (A,) int64
-    patches: np.ndarray  #: (A, PATCH) their local surfaces: a node that is freed may come back elsewhere
+    patches: np.ndarray  #: (A, PATCH_COLUMNS) their local surfaces: a node that is freed may come back elsewhere
     free: np.ndarray  #: (SAVED_FREE_NODES,) int64 the top of the stack of free nodes
     saved: np.ndarray  #: (1,) int64 how many of these are saved
     spare: np.ndarray  #: (1,) int64 how many nodes were free

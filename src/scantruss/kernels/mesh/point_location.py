@@ -7,10 +7,10 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
 from ..geometry.vectors import fill_row, norm, row, subtract
-from ..surface.folds import REACH, fit_fold
+from ..surface.folds import PLANES_REACH, add_fold
 from ..surface.local_surface import IS_FITTED, NEAREST_SAMPLE, Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
-from .grid import INTERIOR, ON_CURVE, REST, Net
+from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FARTHEST_PATCH = 0.5  # distance of a new patch from its node above which it is of another sheet [member lengths]
 
@@ -65,7 +65,7 @@ def locate_nodes(
 def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.ndarray, length: float) -> None:
     """Find the place of each boundary node on the curves, along which all may slide except corners (K, 3) and fixed nodes."""
     for v in range(net.in_use[0]):
-        if net.is_open[v] == 0 or net.kind[v] != REST:
+        if net.is_open[v] == 0 or net.kind[v] != AT_REST:
             continue
         place = row(net.nodes, v)
         curve, arc, distance = nearest_on_curves(curves, place[0], place[1], place[2])
@@ -95,7 +95,7 @@ def renew_patches(
             if patches[v, IS_FITTED] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
                 fill_row(before, patches[v])
                 fit_patch(surface, patches[v], int(patches[v, NEAREST_SAMPLE]), place)
-                fit_fold(surface, patches[v], REACH, strength)
+                add_fold(surface, patches[v], PLANES_REACH, strength)
                 local = surface.length * net.desired[v]
                 if (
                     before[IS_FITTED] != 0.0

@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.quadric import TERMS_OF_QUADRIC
 from ..geometry.vectors import Vector, along, dot, fill_row, norm, put_vector, row, subtract
-from ..surface.folds import fit_fold, onto_crest
+from ..surface.folds import add_fold, onto_crest
 from ..surface.local_surface import (
     CENTRE,
     MEAN_DISTANCE,
@@ -79,9 +79,8 @@ def project_nodes(
 
     Parameters
     ----------
-    fine, middle, broad : Surface
-        The same scan with narrow patches, which follow it, and with wider ones, which average out its noise.
-    patches : (C, PATCH) patches of the nodes, replaced
+    fine, middle, broad : the same scan with narrow patches, which follow it, and with wider ones, which average out its noise
+    patches : (C, PATCH_COLUMNS) patches of the nodes, replaced
     fixed : (C,) bool, nodes that are not moved
     deviation : (C,), filled with the distance of each node from a narrow patch fitted at its place or close by [scan unit]
     folds : weight of folds; if it is positive, nodes near folds go to their crests
@@ -109,7 +108,7 @@ def project_nodes(
                 break
         if folds > 0.0 and net.kind[v] == INTERIOR and not fixed[v]:
             put_vector(patches[v], CENTRE, row(net.nodes, v))
-            fit_fold(broad, patches[v], CREST_REACH, 1.0)
+            add_fold(broad, patches[v], CREST_REACH, 1.0)
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = onto_crest(broad, patches[v], row(net.nodes, v))
         place = row(net.nodes, v)
         if not stayed:

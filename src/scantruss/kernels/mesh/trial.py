@@ -9,7 +9,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
-from ..surface.folds import BENT, chord_energy, fold_energy
+from ..surface.folds import FOLD_WEIGHT, chord_energy, fold_energy
 from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
 
@@ -135,7 +135,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
             if at >= 0 and not counted:
                 stretch = math.sqrt(cc) / target_length(net, v, w, length) - 1.0
                 energy += weight * stretch * stretch
-                if patches[v, BENT] > 0.0 or patches[w, BENT] > 0.0:
+                if patches[v, FOLD_WEIGHT] > 0.0 or patches[w, FOLD_WEIGHT] > 0.0:
                     hx, hy, hz = nodes[v, 0] + 0.5 * cx, nodes[v, 1] + 0.5 * cy, nodes[v, 2] + 0.5 * cz
                     energy += chord_energy(patches, v, w, hx, hy, hz)
             if at == 0 and not closed:

@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, nearest, put_into, slot_of
 
-COPIES = 27  # boxes that a place may be put into
+BOXES_OF_A_PLACE = 27  # boxes that a place may be put into
 
 
 @kernel
@@ -31,12 +31,12 @@ def _mark_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
 def spread_sample(boxes: SearchBoxes, sample: np.ndarray, size: float, marked: np.ndarray) -> None:
     """Put each place (K, 3) into all boxes within `size` of it, and mark these.
 
-    boxes : no smaller than `size`, so that a place reaches at most three along an axis, with room for COPIES * K items; item i
-    stands for place i // COPIES. marked : (2^m,) bool, several boxes may share a mark.
+    boxes : no smaller than `size`, so that a place reaches at most three along an axis, with room for BOXES_OF_A_PLACE * K items; item i
+    stands for place i // BOXES_OF_A_PLACE. marked : (2^m,) bool, several boxes may share a mark.
     """
     for s in range(len(sample)):
         x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]
-        item = COPIES * s
+        item = BOXES_OF_A_PLACE * s
         for i in range(box_index(boxes, 0, x - size), box_index(boxes, 0, x + size) + 1):
             for j in range(box_index(boxes, 1, y - size), box_index(boxes, 1, y + size) + 1):
                 for k in range(box_index(boxes, 2, z - size), box_index(boxes, 2, z + size) + 1):
@@ -68,7 +68,7 @@ def lower_to_nearest(
         if marked[_mark_of(boxes, i, j, k) & mask]:
             item = boxes.first[slot_of(boxes, i, j, k)]
             while item >= 0:
-                s = item // COPIES
+                s = item // BOXES_OF_A_PLACE
                 dx, dy, dz = sample[s, 0] - x, sample[s, 1] - y, sample[s, 2] - z
                 dd = dx * dx + dy * dy + dz * dz
                 if same * same < dd < square[s] and dd <= size * size:

@@ -10,9 +10,9 @@ from ..geometry.quadric import COLUMNS, RESIDUAL, SQUARE
 from ..geometry.vectors import along, dot, row, subtract, unit
 from ..surface.patches import Patches, fit, foot, gather
 
-ROOM = 600  # most points around a place
+MOST_AROUND = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
-PATCH_FITS = 2  # fits of a patch, the second with less weight for points off the first
+NOISE_PATCH_FITS = 2  # fits of a patch, the second with less weight for points off the first
 
 
 @kernel
@@ -38,17 +38,17 @@ def fit_patches(
     patches : filled
     flatness : (C,), filled with the kurtosis of the distances of the points from each patch, see `_flatness`
     """
-    stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(ROOM, np.int64)
-    buffer, matrix = np.zeros((ROOM, COLUMNS)), np.zeros((6, 7))
+    stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(MOST_AROUND, np.int64)
+    buffer, matrix = np.zeros((MOST_AROUND, COLUMNS)), np.zeros((6, 7))
     for i in range(begin, end):
         place = row(tree.points, centres[i])
         taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
         share = widest
-        while taken == ROOM and share > 1.0:
+        while taken == MOST_AROUND and share > 1.0:
             share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:  # the share falls to one
-            fit(buffer, taken, share * radii[i], PATCH_FITS, patches, i, matrix)
+            fit(buffer, taken, share * radii[i], NOISE_PATCH_FITS, patches, i, matrix)
             if patches.rms[i] <= usual[i] or share <= 1.0:
                 break
             share = max(share / RADIUS_RATIO, 1.0)

@@ -13,19 +13,15 @@ from ..geometry.quadric import COLUMNS, SQUARE
 from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
 from ..surface.patches import POINTS_FOR_PLANE, POINTS_FOR_QUADRIC, empty_patches, fit, height_variance, terms_for
 
-PATCH_FITS = 3  # fits of a patch, each with less weight for points off the one before
-BULK = 40  # points around a place by which a cloud is told from a crease
+OUTLIER_PATCH_FITS = 3  # fits of a patch, each with less weight for points off the one before
+POINTS_OF_CLOUD = 40  # points around a place by which a cloud is told from a crease
 FEW_COMPANY, COMPANY = 10, 16  # points by which a sheet through a point is found: a thin one, any
-THIN_SHEET, SHEET = (
-    0.08,
-    0.15,
-)  # thickness of that sheet and distance of the point from it; 1 of 5,000 random points are as flat [radii]
+# thickness of that sheet and distance of the point from it; 1 of 5,000 random points are as flat [radii]
+THIN_SHEET, OFF_SHEET = 0.08, 0.15
 SIMILAR = 3.0  # largest ratio of the reaches of two points that are about equally dense
 MOST_LOOKED_AT = 512  # most points searched for those
-SECTORS, EMPTY_SECTORS = (
-    12,
-    5,
-)  # sectors around a point on a sheet, and those side by side without any point where it ends
+# sectors around a point on a sheet, and those side by side without any point where it ends
+SECTORS, EMPTY_SECTORS = 12, 5
 THICK = 0.2  # thickness, in radii, above which the points around a place form no surface
 
 
@@ -102,7 +98,7 @@ def stand_off(
             most *= 2
         if taken < POINTS_FOR_QUADRIC or radius <= 0.0:
             continue
-        fit(buffer, taken, radius, PATCH_FITS, patches, 0, matrix)
+        fit(buffer, taken, radius, OUTLIER_PATCH_FITS, patches, 0, matrix)
         rms = patches.rms[0]
         if rms > THICK * radius:
             continue
@@ -154,7 +150,7 @@ def find_sheets(
                     taken += 1
             exhausted = count < most or 2 * most > MOST_LOOKED_AT
         on = False
-        for few, thin in ((FEW_COMPANY, THIN_SHEET), (COMPANY, SHEET)):
+        for few, thin in ((FEW_COMPANY, THIN_SHEET), (COMPANY, OFF_SHEET)):
             on = taken >= few and _is_on_sheet(offsets, few, thin)
             if on:
                 at_edge[i] = _is_at_edge(tree, alive, place, offsets, few, found, count)
@@ -227,13 +223,17 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
 
     0 on a surface, 1/3 where points spread evenly to all sides, and little more than half of that in a sharp crease.
     """
-    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(2 * BULK, np.int64), np.empty(2 * BULK)
-    offsets = np.empty((BULK, 3))
+    stack, found, away = (
+        np.empty(2 * STACK_LEVELS, np.int64),
+        np.empty(2 * POINTS_OF_CLOUD, np.int64),
+        np.empty(2 * POINTS_OF_CLOUD),
+    )
+    offsets = np.empty((POINTS_OF_CLOUD, 3))
     for i in range(begin, end):
         place = row(tree.points, which[i])
         count = 0
-        for k in range(nearest(tree, place[0], place[1], place[2], 2 * BULK, stack, found, away)):
-            if alive[found[k]] and count < BULK:
+        for k in range(nearest(tree, place[0], place[1], place[2], 2 * POINTS_OF_CLOUD, stack, found, away)):
+            if alive[found[k]] and count < POINTS_OF_CLOUD:
                 offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(row(tree.points, found[k]), place)
                 count += 1
         bulk[i] = 0.0

@@ -7,10 +7,10 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put_into, slot_of
 
-BITS = 3
-SIDE = 1 << BITS  # boxes along the side of a block
-REST = SIDE - 1
-BYTES = SIDE * SIDE  # a bit for each box of a block
+SIDE_BITS = 3
+BLOCK_SIDE = 1 << SIDE_BITS  # boxes along the side of a block
+SIDE_MASK = BLOCK_SIDE - 1
+BLOCK_BYTES = BLOCK_SIDE * BLOCK_SIDE  # a bit for each box of a block
 CHOSEN, BLOCKS = 0, 1  # places in `count`
 
 
@@ -35,7 +35,7 @@ def choose_first(
     points : (N, 3)
     boxes : SearchBoxes, of which only bounds, sizes and counts are used
     blocks : SearchBoxes of the blocks of boxes, each with its row of `taken` as its first item
-    taken : (B, BYTES) uint8, zero at the start: a bit for each box of a block
+    taken : (B, BLOCK_BYTES) uint8, zero at the start: a bit for each box of a block
     chosen : (capacity,) int64, filled with the points
     begin, end : where to go on and to stop in `among`
     count : (2,) int64 the points and the blocks so far
@@ -51,14 +51,14 @@ def choose_first(
             box_index(boxes, 1, points[p, 1]),
             box_index(boxes, 2, points[p, 2]),
         )
-        block = blocks.first[slot_of(blocks, i >> BITS, j >> BITS, k >> BITS)]
+        block = blocks.first[slot_of(blocks, i >> SIDE_BITS, j >> SIDE_BITS, k >> SIDE_BITS)]
         if block < 0:
             block = count[BLOCKS]
             if block == len(taken):
                 return m
-            put_into(blocks, block, i >> BITS, j >> BITS, k >> BITS)
+            put_into(blocks, block, i >> SIDE_BITS, j >> SIDE_BITS, k >> SIDE_BITS)
             count[BLOCKS] += 1
-        byte, bit = ((i & REST) << BITS) + (j & REST), np.uint8(1 << (k & REST))
+        byte, bit = ((i & SIDE_MASK) << SIDE_BITS) + (j & SIDE_MASK), np.uint8(1 << (k & SIDE_MASK))
         if taken[block, byte] & bit == 0:
             if count[CHOSEN] == len(chosen):
                 return m

@@ -15,13 +15,13 @@ import numpy as np
 from ...runtime.jit import kernel
 
 STEPS = 4294967296.0  # along the side of a box; 2**31 points fit into a box
-FARTHEST = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box is finer than float64
+FARTHEST_BOX = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box is finer than float64
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
-LARGEST_INTEGER = 9223372036854775807  # int64
+LARGEST_INT64 = 9223372036854775807  # int64
 ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
-WIDE = 2  # boxes to every side by which a box at the boundary is told
+BOUNDARY_BOXES = 2  # boxes to every side by which a box at the boundary is told
 BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
-ASIDE = 0.25  # distance of their centre from its own mean above which a box is at the boundary [box]
+BOUNDARY_SHIFT = 0.25  # distance of their centre from its own mean above which a box is at the boundary [box]
 
 
 class BoxTable(NamedTuple):
@@ -37,8 +37,8 @@ class BoxTable(NamedTuple):
 def slot_of_box(slots: np.ndarray, rows: np.ndarray, i: int, j: int, k: int) -> int:
     """Slot of a box, or the free slot for it. Eight boxes along x are stored side by side, as scans are ordered that way."""
     mask = len(slots) - 1
-    mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST_INTEGER
-    mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST_INTEGER
+    mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST_INT64
+    mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST_INT64
     slot = (8 * (mixed ^ (mixed >> 19)) + (i & 7)) & mask
     while slots[slot] >= 0:
         row = slots[slot]
@@ -94,7 +94,7 @@ def add_points(table: BoxTable, points: np.ndarray, begin: int, size: float) -> 
     last_i, last_j, last_k, row = 0, 0, 0, -1
     for n in range(begin, len(points)):
         x, y, z = points[n, 0] / size, points[n, 1] / size, points[n, 2] / size
-        if not (abs(x) < FARTHEST and abs(y) < FARTHEST and abs(z) < FARTHEST):
+        if not (abs(x) < FARTHEST_BOX and abs(y) < FARTHEST_BOX and abs(z) < FARTHEST_BOX):
             finite = math.isfinite(points[n, 0]) and math.isfinite(points[n, 1]) and math.isfinite(points[n, 2])
             table.counters[TOO_FAR if finite else NOT_FINITE] += 1
             continue
@@ -166,7 +166,7 @@ def take_nearest(
     missed = 0
     for n in range(len(points)):
         x, y, z = points[n, 0] / size, points[n, 1] / size, points[n, 2] / size
-        if not (abs(x) < FARTHEST and abs(y) < FARTHEST and abs(z) < FARTHEST):
+        if not (abs(x) < FARTHEST_BOX and abs(y) < FARTHEST_BOX and abs(z) < FARTHEST_BOX):
             missed += 1
             continue
         slot = slot_of_box(slots, rows, int(math.floor(x)), int(math.floor(y)), int(math.floor(z)))
@@ -193,7 +193,9 @@ def take_nearest(
 
 
 @kernel
-def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int) -> int:
+def choose_boundary_points(
+    table: BoxTable, means: np.ndarray, size: float, kept: np.ndarray, begin: int, end: int
+) -> int:
     """Mark in `kept` (C, 6), of the rows from `begin` to `end`, the extremes of boxes at the boundary that lie on its outer side.
 
     Returns their number. A box is at the boundary if the weighted centre of the points around it is far from its own mean. The
@@ -203,9 +205,9 @@ def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.nd
     for row in range(begin, end):
         around, x, y, z = 0.0, 0.0, 0.0, 0.0
         i, j, k = int(table.rows[row, 0]), int(table.rows[row, 1]), int(table.rows[row, 2])
-        for di in range(-WIDE, WIDE + 1):
-            for dj in range(-WIDE, WIDE + 1):
-                for dk in range(-WIDE, WIDE + 1):
+        for di in range(-BOUNDARY_BOXES, BOUNDARY_BOXES + 1):
+            for dj in range(-BOUNDARY_BOXES, BOUNDARY_BOXES + 1):
+                for dk in range(-BOUNDARY_BOXES, BOUNDARY_BOXES + 1):
                     other = table.slots[slot_of_box(table.slots, table.rows, i + di, j + dj, k + dk)]
                     if other < 0:
                         continue
@@ -221,7 +223,7 @@ def boundary_points(table: BoxTable, means: np.ndarray, size: float, kept: np.nd
                         around += weight
                         x, y, z = x + weight * dx, y + weight * dy, z + weight * dz
         x, y, z = x / around, y / around, z / around
-        if x * x + y * y + z * z < (ASIDE * size) ** 2:
+        if x * x + y * y + z * z < (BOUNDARY_SHIFT * size) ** 2:
             continue
         for side in range(6):
             a, b, c = (

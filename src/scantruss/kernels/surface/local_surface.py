@@ -39,7 +39,7 @@ from ..geometry.vectors import (
     vector_from,
 )
 
-PATCH = 31  # columns of a patch
+PATCH_COLUMNS = 31  # columns of a patch
 CENTRE = 0  # first of three columns: where the patch was fitted [scan unit]
 NORMAL = 3  # first of three columns: oriented unit normal of its plane
 TANGENT = 6  # first of three columns: unit vector u in the plane; v = normal x u
@@ -182,7 +182,7 @@ def gather_points(
 
 @kernel
 def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -> int:
-    """Fit a patch (PATCH,) to the points around a place, on the sheet of `sample`; returns how many points it was fitted to.
+    """Fit a patch (PATCH_COLUMNS,) to the points around a place, on the sheet of `sample`; returns how many points it was fitted to.
 
     Points weigh (1 - d^2 / R^2)^2. Where they lie off the fit (plants, noise), it is fitted again with those far off weighing less.
     """

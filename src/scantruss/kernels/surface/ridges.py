@@ -28,16 +28,12 @@ ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member leng
 CLEARLY = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
 FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
 SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
-SEARCHES, FOLD_FITS = (
-    2,
-    5,
-)  # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
+# rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
+SEARCHES, FOLD_FITS = 2, 5
 NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
-MIDDLE = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
-BESIDE, FARTHEST_MEETING = (
-    0.2,
-    0.4,
-)  # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
+MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
+# how far from the line the sides of a rounded fold may meet, at least and at most [radius]
+LEAST_MEETING, FARTHEST_MEETING = 0.2, 0.4
 SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet can be told [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
 POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
@@ -163,7 +159,7 @@ def flank(
         s = math.sqrt(u * u + h * h)
         if u > 0.0 and NEAR < s < 1.0:
             points += 1
-            s -= MIDDLE
+            s -= MIDDLE_OF_SIDES
             term[0], term[1], term[2], term[3] = 1.0, s, s * s, dot(d, e) / radius
             for r in range(4):
                 for k in range(4):
@@ -176,7 +172,7 @@ def flank(
             up[r, k] = across[r, k]
     if points < FEWEST_OF_FLANK or not solve(across, 4) or not solve(up, 4):
         return 0.0, 0.0, 0.0, 0.0, False
-    half = 1.0 - MIDDLE
+    half = 1.0 - MIDDLE_OF_SIDES
     outer = math.atan2(up[1, 4] + 2.0 * half * up[2, 4], across[1, 4] + 2.0 * half * across[2, 4])
     inner = math.atan2(up[1, 4] - 2.0 * half * up[2, 4], across[1, 4] - 2.0 * half * across[2, 4])
     return math.atan2(up[1, 4], across[1, 4]), outer - inner, across[0, 4], up[0, 4], True
@@ -200,7 +196,7 @@ def bend_of(
     # right: up = right_up + (u - right_at) tan(right); left: up = left_up - (u + left_at) tan(left)
     apart = math.tan(right) + math.tan(left)
     meet = (left_up - left_at * math.tan(left) - right_up + right_at * math.tan(right)) / apart if apart != 0.0 else 0.0
-    return max(turn - max(own, 0.0) * MIDDLE / (1.0 - MIDDLE), 0.0), meet
+    return max(turn - max(own, 0.0) * MIDDLE_OF_SIDES / (1.0 - MIDDLE_OF_SIDES), 0.0), meet
 
 
 @kernel
@@ -316,7 +312,7 @@ def fit_fold(
     across, ahead, _ = frame
     crest = matrix[0, TERMS] + matrix[6, TERMS] * rounding
     found[BEND], meet = bend_of(buffer, taken, frame, (shift, crest), radius)
-    aside = rounding > 0.0 or abs(meet) > BESIDE  # then the line is not yet the crest
+    aside = rounding > 0.0 or abs(meet) > LEAST_MEETING  # then the line is not yet the crest
     if aside and abs(meet) < FARTHEST_MEETING and found[BEND] > SHARP_ENOUGH:
         size = math.sqrt(meet * meet + rounding * rounding)
         crest = matrix[0, TERMS] + meet * (matrix[3, TERMS] + meet * matrix[4, TERMS])

@@ -10,14 +10,14 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, put, search
 from ..geometry.quadric import coefficients_from
 from ..geometry.vectors import Vector, dot, norm, row, subtract
-from .local_surface import HEIGHTS, MEAN_DISTANCE, PATCH, Surface, fit_patch, flood, walk
+from .local_surface import HEIGHTS, MEAN_DISTANCE, PATCH_COLUMNS, Surface, fit_patch, flood, walk
 
 BLEND_REACH = 2.2  # distance up to which the lengths of samples count at a place [steps between samples]
 CURVATURE_DEVIATION = 14.4  # standard deviation of a curvature inside the scan [that of a point / R^2 sqrt(points)]
 DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the mean of the points [patch radii]
 RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
 BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
-GROWTHS = 90  # times that a search radius grows by half at most: from any box to all of them
+SEARCH_GROWTHS = 90  # times that a search radius grows by half at most: from any box to all of them
 
 
 @kernel
@@ -100,7 +100,7 @@ def blend_lengths(
         place = row(places, s)
         reach *= 0.7
         count = search(boxes, given, place[0], place[1], place[2], reach, found)
-        for _ in range(GROWTHS):
+        for _ in range(SEARCH_GROWTHS):
             if count >= wanted:
                 break
             reach *= 1.5
@@ -164,7 +164,7 @@ def measure_curvatures(
     curvatures, deviations : (P,), filled with its absolute value and with the standard deviation that noise gives it: that of the least
     squares fit, which grows where the scan lies to one side only [1 / scan unit]
     """
-    patch = np.zeros(PATCH)
+    patch = np.zeros(PATCH_COLUMNS)
     for i in range(begin, end):
         place = row(surface.mean, samples[i])
         taken = fit_patch(surface, patch, samples[i], place)

@@ -9,12 +9,12 @@ from ...kernels.scan import duplicates as kernels
 from ...runtime.parallel import in_parts
 from .nearby import build_kd_tree
 
-POINTS_LOOKED_AT = 500  # points checked for duplicates before all are
+POINTS_CHECKED_FIRST = 500  # points checked for duplicates before all are
 REPEATED_SHARE = 0.01  # share of these that must be repeated
-POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
-COPIES = 16  # the spacing is still measured if points are repeated almost this often
-SAID = 300  # points at which the spacing is measured
-DENSEST = 0.05  # share of the points that lie closer than what counts as the spacing here
+COMPARED_POINTS_PER_THREAD = 50_000  # fewest points that are worth a thread
+REPEATS_MEASURED = 16  # the spacing is still measured if points are repeated almost this often
+POINTS_FOR_SPACING_OF_REPEATED = 300  # points at which the spacing is measured
+DENSEST_SHARE = 0.05  # share of the points that lie closer than what counts as the spacing here
 
 
 def find_repeated(points: np.ndarray) -> np.ndarray:
@@ -29,13 +29,13 @@ def find_repeated(points: np.ndarray) -> np.ndarray:
 def has_repeats(points: np.ndarray) -> bool:
     """Whether enough points are repeated to check all; takes a hundredth of the time of checking all."""
     points = np.ascontiguousarray(points, np.float64)
-    chosen = np.linspace(0, len(points) - 1, min(len(points), POINTS_LOOKED_AT)).astype(np.int64)
+    chosen = np.linspace(0, len(points) - 1, min(len(points), POINTS_CHECKED_FIRST)).astype(np.int64)
     slots = np.full(1 << 12, -1, np.int64)
     bits = points.view(np.int64)
     repeats = [kernels.enter_points(points, bits, np.unique(chosen), slots)]
     in_parts(
         len(points),
-        POINTS_PER_THREAD,
+        COMPARED_POINTS_PER_THREAD,
         lambda _, begin, end: repeats.append(kernels.count_repeats(points, bits, slots, begin, end)),
     )
     return sum(repeats) > REPEATED_SHARE * len(chosen)
@@ -62,10 +62,12 @@ def find_near_duplicates(points: np.ndarray, share: float) -> np.ndarray:
 
 def _densest_spacing(points: np.ndarray) -> float:
     """Mean spacing in the densest twentieth of a scan, from the sixteenth nearest point, so that a few copies do not matter."""
-    rank = min(COPIES, len(points) - 1)
+    rank = min(REPEATS_MEASURED, len(points) - 1)
     if rank < 1:
         return 0.0
-    places = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, min(len(points), SAID)).astype(np.int64)])
+    places = np.ascontiguousarray(
+        points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_SPACING_OF_REPEATED)).astype(np.int64)]
+    )
     squares, which = np.empty(len(places)), np.empty(len(places), np.int64)
     nearest_of_places(build_kd_tree(points), places, rank + 1, squares, which)
-    return float(np.sqrt(np.quantile(squares, DENSEST) * np.pi / rank))
+    return float(np.sqrt(np.quantile(squares, DENSEST_SHARE) * np.pi / rank))

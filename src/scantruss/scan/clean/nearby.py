@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.geometry import kd_tree as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import in_parts, run_in_parts
 
-NEAREST = 16  # neighbours of each point
+NEIGHBORS_OF_A_POINT = 16  # neighbours of each point
 REACH_TO = 8  # a point's reach is the distance to this one of them
-POINTS_PER_THREAD = 2000  # fewest points that are worth a thread
+SEARCHES_PER_THREAD = 2000  # fewest points that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,19 +19,18 @@ class Nearby:
     """Points in a k-d tree, and a table of the nearest of each; all rows in the order of the tree."""
 
     tree: kernels.KDTree
-    neighbors: np.ndarray  #: (N, NEAREST) int64, nearest first, -1 where there are fewer
-    squares: np.ndarray  #: (N, NEAREST) squared distances, inf if there are fewer [scan unit^2]
+    neighbors: np.ndarray  #: (N, NEIGHBORS_OF_A_POINT) int64, nearest first, -1 where there are fewer
+    squares: np.ndarray  #: (N, NEIGHBORS_OF_A_POINT) squared distances, inf if there are fewer [scan unit^2]
 
     @classmethod
     def of(cls, points: np.ndarray) -> Nearby:
         """Look up the nearest of all points (N, 3)."""
         tree = build_kd_tree(points)
-        neighbors, squares = np.empty((len(points), NEAREST), np.int64), np.empty((len(points), NEAREST))
-        in_parts(
-            len(points),
-            POINTS_PER_THREAD,
-            lambda _, begin, end: kernels.nearest_others(tree, neighbors, squares, begin, end),
+        neighbors, squares = (
+            np.empty((len(points), NEIGHBORS_OF_A_POINT), np.int64),
+            np.empty((len(points), NEIGHBORS_OF_A_POINT)),
         )
+        run_in_parts(len(points), SEARCHES_PER_THREAD, kernels.nearest_others, tree, neighbors, squares)
         return cls(tree, neighbors, squares)
 
     @property

@@ -10,16 +10,16 @@ from ...kernels.scan import noise as kernels
 from ...kernels.surface.patches import Patches, empty_patches
 from ...kernels.surface.size_field import choose_apart
 from ...runtime.parallel import in_parts
-from .nearby import NEAREST, Nearby
+from .nearby import NEIGHBORS_OF_A_POINT, Nearby
 
-NARROW = 28.0  # points of the narrowest patch
-WIDEST = 2.0  # radius of the widest patch over that of the narrowest
-WORSE = 1.1  # factor by which a wider patch may fit worse than the narrowest
-SPARSE = 8  # one of this many nearest points has a patch
-SOME = 0.02  # share of the points that must lie in layers; a few seem to at random
-FLATNESS = 2.1  # kurtosis of the distances from a patch below which they are those of two layers; 3 for noise
-BROAD = 3.0  # radius of a patch that holds two layers equally, in the largest distance of layers
-FOLLOWED = 0.5  # a narrower patch that fits better than this share shows a single surface
+NARROWEST_PATCH = 28.0  # points of the narrowest patch
+WIDEST_PATCH = 2.0  # radius of the widest patch over that of the narrowest
+WORSE_FIT = 1.1  # factor by which a wider patch may fit worse than the narrowest
+POINTS_PER_PATCH = 8  # one of this many nearest points has a patch
+LEAST_LAYERED = 0.02  # share of the points that must lie in layers; a few seem to at random
+LAYERED_KURTOSIS = 2.1  # kurtosis of the distances from a patch below which they are those of two layers; 3 for noise
+LAYERED_PATCH = 3.0  # radius of a patch that holds two layers equally, in the largest distance of layers
+FOLLOWED_SHARE = 0.5  # a narrower patch that fits better than this share shows a single surface
 PATCHES_PER_THREAD = 200  # fewest patches that are worth a thread
 
 
@@ -37,17 +37,17 @@ class Surfaces(NamedTuple):
 def fit_surfaces(near: Nearby) -> Surfaces:
     """Fit patches all over a scan, as wide as the surface allows."""
     chosen = np.zeros(len(near.neighbors), np.bool_)
-    choose_apart(np.ascontiguousarray(near.neighbors[:, :SPARSE]), chosen)
+    choose_apart(np.ascontiguousarray(near.neighbors[:, :POINTS_PER_PATCH]), chosen)
     centres = np.flatnonzero(chosen)
     number = np.full(len(chosen), -1, np.int64)
     number[centres] = np.arange(len(centres))
     reach = np.sqrt(near.squares[:, -1])
     known = np.where(near.neighbors >= 0, reach[near.neighbors], np.inf)
-    radii = (np.median(known, axis=1) * np.sqrt(NARROW / NEAREST))[centres]
+    radii = (np.median(known, axis=1) * np.sqrt(NARROWEST_PATCH / NEIGHBORS_OF_A_POINT))[centres]
     radii[~np.isfinite(radii)] = np.linalg.norm(np.ptp(near.tree.points, axis=0))
     narrow, _ = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
     usual = _around(near, number, narrow.rms)[centres]
-    return Surfaces(number, centres, *_fit(near, centres, radii, WIDEST, WORSE * usual))
+    return Surfaces(number, centres, *_fit(near, centres, radii, WIDEST_PATCH, WORSE_FIT * usual))
 
 
 def _fit(
@@ -118,7 +118,7 @@ def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.nda
 def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:
     """Return patches at the same points, wide enough for two layers."""
     centres = surfaces.centres
-    radii = np.maximum(BROAD * distance, surfaces.patches.radius)
+    radii = np.maximum(LAYERED_PATCH * distance, surfaces.patches.radius)
     patches, flatness = _fit(near, centres, radii, 1.0, np.full(len(centres), np.inf))
     return surfaces._replace(patches=patches, flatness=flatness)
 
@@ -126,8 +126,8 @@ def _broad(near: Nearby, surfaces: Surfaces, distance: float) -> Surfaces:
 def _two(near: Nearby, narrow: Surfaces, surfaces: Surfaces, distance: float) -> np.ndarray:
     """Return which points lie at two distances from the patches around them (N,), rows of the tree; none where only a few do."""
     thick = surfaces.patches.rms
-    apart = (2.0 * thick <= distance) & (narrow.patches.rms >= FOLLOWED * thick)
+    apart = (2.0 * thick <= distance) & (narrow.patches.rms >= FOLLOWED_SHARE * thick)
     calm = _around(near, surfaces.number, np.where(apart, surfaces.flatness, 3.0))
     own = np.where(near.neighbors >= 0, calm[near.neighbors], 3.0)
-    layers = np.median(own, axis=1) < FLATNESS
-    return layers if layers.mean() > SOME else np.zeros(len(layers), np.bool_)
+    layers = np.median(own, axis=1) < LAYERED_KURTOSIS
+    return layers if layers.mean() > LEAST_LAYERED else np.zeros(len(layers), np.bool_)

@@ -8,16 +8,16 @@ import numpy as np
 
 from ...kernels.scan.normals import turn_like_beside
 from ...kernels.surface import normals as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ..normals import HEAD_ON, cut_steep_links, face_one_side, face_outside
-from .nearby import POINTS_PER_THREAD, REACH_TO, Nearby, build_kd_tree
+from .nearby import REACH_TO, SEARCHES_PER_THREAD, Nearby, build_kd_tree
 from .thinning import thin_to
 
-COARSE = (
-    2.0  # spacing of the points at which sides are settled, in mean spacings: lines of a scanner are no pieces then
-)
+# spacing of the points at which sides are settled, in mean spacings: lines of a scanner are no pieces then
+SIDE_SPACING = 2.0
 LINKS_OF_A_POINT = 10  # links of each of these points
-SMOOTH = 0.15  # thickness, in their spacings, up to which they are smooth enough to reveal a one-sided surface
+# thickness, in their spacings, up to which they are smooth enough to reveal a one-sided surface
+ONE_SIDED_THICKNESS = 0.15
 NEIGHBORS_ASKED = 4  # nearest oriented points of a point; the one most in its tangent plane tells its side
 
 
@@ -37,7 +37,7 @@ def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) ->
     reach = near.reach[np.isfinite(near.reach)]
     mean_spacing = float(np.median(reach)) * np.sqrt(np.pi / REACH_TO) if len(reach) else 0.0
     extent = float(np.ptp(points, axis=0).max())
-    coarse = max(COARSE * mean_spacing, 1e-5 * extent, 1e-300)
+    coarse = max(SIDE_SPACING * mean_spacing, 1e-5 * extent, 1e-300)
     stays = thin_to(points, coarse)
     few = Nearby.of(points[stays])
     chosen = np.flatnonzero(stays)[few.tree.ids]
@@ -48,13 +48,9 @@ def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) ->
     face_outside(place, own, piece)
     planes, thickness = np.empty_like(own), np.empty(len(place))
     kernels.sample_normals(place, neighbors, planes, thickness, 0, len(place))
-    head_on = int(kernels.head_on_links(place, own, neighbors, thickness, SMOOTH * coarse))
+    head_on = int(kernels.head_on_links(place, own, neighbors, thickness, ONE_SIDED_THICKNESS * coarse))
     turned = normals.copy()
     tree = build_kd_tree(place)
     settled = np.ascontiguousarray(own[tree.ids])
-    in_parts(
-        len(points),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: turn_like_beside(tree, settled, points, turned, NEIGHBORS_ASKED, begin, end),
-    )
+    run_in_parts(len(points), SEARCHES_PER_THREAD, turn_like_beside, tree, settled, points, turned, NEIGHBORS_ASKED)
     return OrientedNormals(turned, int(piece.max(initial=-1)) + 1, head_on if head_on >= HEAD_ON else 0)

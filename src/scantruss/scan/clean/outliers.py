@@ -9,34 +9,34 @@ import numpy as np
 
 from ...kernels.geometry.components import component_labels
 from ...kernels.scan import outliers as kernels
-from ...runtime.parallel import in_parts
-from .nearby import NEAREST, POINTS_PER_THREAD, REACH_TO, Nearby
+from ...runtime.parallel import in_parts, run_in_parts
+from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
 
-MOST_ROUNDS = 5  # outliers close together hide each other: each round reveals some more
+ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
 FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
-CLOUD = 2.5  # ... if the points around it form no surface
-THICK = 0.2  # thickness of the nearest points, in radii, above which they form no surface
-MUCH = 0.1  # share of points without a surface above which they are no cloud of outliers but the scan itself
+CLOUD_REACH = 2.5  # reach, over the upper quartile of all, above which a point is an outlier if the points around it form no surface
+MOST_OF_CLOUDS = 0.1  # share of points without a surface above which they are no cloud of outliers but the scan itself
 CLOUD_SHARE = 0.18  # share of the spread across the plane above which points are a cloud and no crease
-SKIN = 3  # steps from neighbour to neighbour by which a cloud extends beyond its interior
+CLOUD_STEPS = 3  # steps from neighbour to neighbour by which a cloud extends beyond its interior
 CLOUD_NEIGHBORS = 4  # neighbours in a cloud with which a point is examined together with it
-SIGHT = 2.0  # distance from the plane of its neighbours, in their thickness, above which a point is examined
-TOO_FAR = 1.1  # reach above which points are too far apart for a grid [member lengths]
-LONELY = (
-    0.5  # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
+DOUBT_DISTANCE = 2.0  # distance from the plane of its neighbours, in their thickness, above which a point is examined
+FARTHEST_APART = 1.1  # reach above which points are too far apart for a grid [member lengths]
+# distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
+LONE_DISTANCE = 0.5
+DENSEST_AROUND = (
+    4  # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
 )
-DENSE = 4  # ... with the reach of the fifth densest point around it
-PATCH = 28  # points of the surface from which the distance of a point is measured
+POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
-THIN = 0.01  # least expected distance, in radii of that surface
+LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface
 SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
 OPEN_EDGE = 0.05  # share of them at a free edge above which they are a fringe of the scan
-LONE = 3e-4  # share of samples without neighbours above which outliers are sought
+LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
 
 
 def has_outliers(neighbors: np.ndarray) -> bool:
     """Whether enough samples are isolated to look for outliers; neighbors (S, K) as `kernels.nearest_samples`."""
-    return bool((neighbors[:, 5] < 0).mean() > LONE)
+    return bool((neighbors[:, 5] < 0).mean() > LONE_SHARE)
 
 
 def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
@@ -56,7 +56,7 @@ def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
 
 def judge_points(points: np.ndarray, distance: float, length: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
     """Return which points are outliers, and which others lie too far apart for a member length [scan unit]; (N,) bool each."""
-    if len(points) <= NEAREST:
+    if len(points) <= NEIGHBORS_OF_A_POINT:
         return np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)
     near = Nearby.of(points)
     alive = np.ones(len(points), np.bool_)
@@ -65,11 +65,11 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
     first_reach = reach.copy()
     usual = float(np.quantile(reach, 0.75))
     limit = FARTHEST_REACH * usual
-    for _ in range(MOST_ROUNDS):
+    for _ in range(ROUNDS_OF_OUTLIERS):
         thick, aside = _planes(near, which)
         outlier = _stand_alone(near, which, reach, distance, limit)
-        outlier |= (thick > THICK) & (reach[which] > CLOUD * usual)
-        outlier |= _stand_off(near, alive, which, ~outlier & (aside > SIGHT))
+        outlier |= (thick > kernels.THICK) & (reach[which] > CLOUD_REACH * usual)
+        outlier |= _stand_off(near, alive, which, ~outlier & (aside > DOUBT_DISTANCE))
         found = which[outlier]
         if not len(found):
             break
@@ -78,7 +78,7 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
         kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
         reach[which] = np.sqrt(near.squares[which, REACH_TO - 1])
     cloud = np.zeros(len(points), np.bool_)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(ROUNDS_OF_OUTLIERS):
         cloud |= _clouds(near, alive)
         beside = np.where(near.neighbors >= 0, cloud[near.neighbors], False).sum(axis=1) >= CLOUD_NEIGHBORS
         found = _in_clouds(near, alive, np.flatnonzero(alive & (cloud | beside)))
@@ -88,11 +88,11 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
             alive[found] = False
             which = np.flatnonzero(alive & ~alive[near.neighbors].all(axis=1))
             kernels.nearest_alive(near.tree, alive, which, near.neighbors, near.squares)
-            found = which[_stand_off(near, alive, which, _planes(near, which)[1] > 0.5 * SIGHT)]
+            found = which[_stand_off(near, alive, which, _planes(near, which)[1] > 0.5 * DOUBT_DISTANCE)]
         alive[found] = False
     doubted = np.flatnonzero(~alive)
     alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
-    sparse = alive & (first_reach > max(TOO_FAR * length, distance * float(np.median(first_reach))))
+    sparse = alive & (first_reach > max(FARTHEST_APART * length, distance * float(np.median(first_reach))))
     return near.in_order(~alive), near.in_order(sparse)
 
 
@@ -106,7 +106,7 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
     number[doubted] = np.arange(len(doubted))
     in_parts(
         len(doubted),
-        POINTS_PER_THREAD,
+        SEARCHES_PER_THREAD,
         lambda _, begin, end: kernels.find_sheets(
             near.tree, alive, number >= 0, reach, doubted, company, at_edge, begin, end
         ),
@@ -124,19 +124,15 @@ def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
     """Return which points belong to dense clouds (N,) bool: inside these, points spread to all sides, unlike in a crease."""
     which = np.flatnonzero(alive)
     cloud, bulk = np.zeros(len(alive), np.bool_), np.zeros(len(alive))
-    thick = which[_planes(near, which)[0] > THICK]
-    if not 0 < len(thick) < MUCH * len(which):
+    thick = which[_planes(near, which)[0] > kernels.THICK]
+    if not 0 < len(thick) < MOST_OF_CLOUDS * len(which):
         return cloud
     found = np.empty(len(thick))
-    in_parts(
-        len(thick),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.measure_bulk(near.tree, alive, thick, found, begin, end),
-    )
+    run_in_parts(len(thick), SEARCHES_PER_THREAD, kernels.measure_bulk, near.tree, alive, thick, found)
     bulk[thick] = found
     around = near.neighbors[thick]
     cloud[thick] = np.where(around >= 0, bulk[around], 0.0).mean(axis=1) > CLOUD_SHARE
-    for _ in range(SKIN):
+    for _ in range(CLOUD_STEPS):
         cloud[thick] |= np.where(around >= 0, cloud[around], False).any(axis=1)
     return cloud
 
@@ -148,8 +144,10 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
     off = np.empty(len(doubted))
     in_parts(
         len(doubted),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.stand_off(near.tree, sure, doubted, 2 * PATCH, THIN, off, begin, end),
+        SEARCHES_PER_THREAD,
+        lambda _, begin, end: kernels.stand_off(
+            near.tree, sure, doubted, 2 * POINTS_OF_PATCH, LEAST_EXPECTED, off, begin, end
+        ),
     )
     return doubted[off > STANDS_OFF]
 
@@ -157,10 +155,8 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the thickness of the points nearest to each, in radii, and its distance from their plane, in that thickness."""
     thick, aside = np.empty((2, len(which)))
-    in_parts(
-        len(which),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.measure_planes(near.tree, which, near.neighbors, thick, aside, begin, end),
+    run_in_parts(
+        len(which), SEARCHES_PER_THREAD, kernels.measure_planes, near.tree, which, near.neighbors, thick, aside
     )
     return thick, aside
 
@@ -169,14 +165,10 @@ def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: f
     """One round of `find_outliers`, by distances."""
     neighbors = near.neighbors[which]
     low, middle = np.empty((2, len(which)))
-    in_parts(
-        len(which),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.usual_reaches(neighbors, reach, DENSE, low, middle, begin, end),
-    )
+    run_in_parts(len(which), SEARCHES_PER_THREAD, kernels.usual_reaches, neighbors, reach, DENSEST_AROUND, low, middle)
     third = np.sqrt(near.squares[which, 2])
     own = reach[which]
-    return (own > distance * middle) | (own > limit) | (third > LONELY * distance * low)
+    return (own > distance * middle) | (own > limit) | (third > LONE_DISTANCE * distance * low)
 
 
 def _stand_off(near: Nearby, alive: np.ndarray, which: np.ndarray, doubted: np.ndarray) -> np.ndarray:
@@ -186,8 +178,10 @@ def _stand_off(near: Nearby, alive: np.ndarray, which: np.ndarray, doubted: np.n
     off = np.empty(len(looked))
     in_parts(
         len(looked),
-        POINTS_PER_THREAD,
-        lambda _, begin, end: kernels.stand_off(near.tree, alive, looked, PATCH, THIN, off, begin, end),
+        SEARCHES_PER_THREAD,
+        lambda _, begin, end: kernels.stand_off(
+            near.tree, alive, looked, POINTS_OF_PATCH, LEAST_EXPECTED, off, begin, end
+        ),
     )
     outlier[doubted] = off > STANDS_OFF
     return outlier

@@ -18,7 +18,7 @@ from .pieces import find_loose_pieces
 from .thinning import thin_to
 
 FEWEST_POINTS_OF_A_SURFACE = 24  # fewest points of a surface
-LAYERS = 3  # rounds of merging layers: those farther apart merge step by step
+LAYER_ROUNDS = 3  # rounds of merging layers: those farther apart merge step by step
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class _Work:
         if layer_distance is not None:
             distance = layer_distance * float(np.median(near.reach)) * np.sqrt(np.pi / REACH_TO)
             merged = np.zeros(len(self.points), np.bool_)
-            for _ in range(LAYERS):
+            for _ in range(LAYER_ROUNDS):
                 layers, between = find_layers(near, surfaces, distance, merged[near.tree.ids])
                 if not layers.any():
                     break

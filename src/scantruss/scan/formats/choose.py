@@ -9,11 +9,11 @@ import numpy as np
 
 from ...errors import InputError
 from ...selection import Selection, parts_of
-from .copc import Place
+from .copc import WantedBox
 
-WORDS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
+PLURALS = {"class": "classes", "return_number": "returns", "return_count": "returns", "confidence": "confidence"}
 POINTS_PER_TEST = 1 << 17  # points tested against a polygon in one go
-NONE = np.empty(0)
+NO_VALUES = np.empty(0)
 
 
 def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection: Selection) -> None:
@@ -21,12 +21,12 @@ def check_attributes(path: Path, attributes: Mapping[str, np.ndarray], selection
     if missing := [name for name in selection.needs if name not in attributes]:
         option = {"class": "--class", "confidence": "--confidence"}.get(missing[0], "--returns")
         raise InputError(
-            f"{path} has no {WORDS[missing[0]]}, which {option} needs; LAS files have classes and returns, other files"
+            f"{path} has no {PLURALS[missing[0]]}, which {option} needs; LAS files have classes and returns, other files"
             " where a property or column is named classification, return_number, number_of_returns or confidence"
         )
 
 
-def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
+def describe_points(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     """Return what could be selected from a file, in words; "" if all its points are NaN or infinite."""
     real = np.isfinite(points).all(axis=1)
     if not real.any():
@@ -34,9 +34,9 @@ def describe(points: np.ndarray, attributes: Mapping[str, np.ndarray]) -> str:
     held = {name: values[real & np.isfinite(values)] for name, values in attributes.items()}
     said = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
-        if len(values := held.get(name, NONE)):
+        if len(values := held.get(name, NO_VALUES)):
             said.append(f" {words} {' '.join(f'{value:g}' for value in np.unique(values)[:20])}")
-    if len(values := held.get("confidence", NONE)):
+    if len(values := held.get("confidence", NO_VALUES)):
         said.append(f" confidence up to {values.max():.4g}")
     corners = (points[real].min(axis=0), points[real].max(axis=0))
     said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
@@ -52,10 +52,8 @@ def choose(
     ----------
     points : (N, 3) array
         In the scan's own frame.
-    attributes : mapping
-        (N,) arrays, all that `Selection.needs` names.
-    selection : Selection
-        What to take.
+    attributes : (N,) arrays, all that `Selection.needs` names
+    selection : what to take
     """
     kept = np.ones(len(points), dtype=bool)
     left_out: dict[str, int] = {}
@@ -67,7 +65,7 @@ def choose(
     return kept, left_out
 
 
-def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
+def places_in(crops: Sequence[str], scale: np.ndarray) -> list[WantedBox]:
     """Return the boxes around parts of space in the unit of a file, whose axes are `scale` (3,) units of the scan long."""
     places = []
     for crop in crops:
@@ -82,7 +80,7 @@ def places_in(crops: Sequence[str], scale: np.ndarray) -> list[Place]:
         else:
             corners = np.concatenate([np.array(ring).reshape(-1, 2) for rings in polygons for ring in rings])
             lower[:2], upper[:2] = corners.min(axis=0), corners.max(axis=0)
-        places.append(Place(_outside(kind), lower / scale, upper / scale))
+        places.append(WantedBox(_outside(kind), lower / scale, upper / scale))
     return places
 
 

@@ -20,7 +20,7 @@ _FAMILIES = (_DIRECT, _COUNTED, _MAP, (*_DIRECT[:2], _MAP[2]))
 _NUMBER_OF_POINT = re.compile("id|ids|nr|no|num|number|index|idx|point|pointid|pt|name|label|fid|punkt|punktnummer|")
 
 #: attribute -> names that columns and properties have for it, in lower case, letters and digits only
-NAMES = {
+COLUMN_NAMES = {
     "class": ("classification", "class", "scalarclassification", "classid"),
     "return_number": ("returnnumber", "return", "scalarreturnnumber", "returnnum"),
     "return_count": ("numberofreturns", "returns", "scalarnumberofreturns", "numreturns", "returncount"),
@@ -55,7 +55,7 @@ def find_attributes(names: Sequence[str], wanted: Sequence[str]) -> dict[str, in
     return {
         attribute: column
         for attribute in wanted
-        if (column := next((clean.index(name) for name in NAMES[attribute] if name in clean), -1)) >= 0
+        if (column := next((clean.index(name) for name in COLUMN_NAMES[attribute] if name in clean), -1)) >= 0
     }
 
 
@@ -64,12 +64,9 @@ def fit_columns(names: Sequence[str], width: int, has_row_names: bool) -> tuple[
 
     Parameters
     ----------
-    names : sequence of str
-        Words of a header line.
-    width : int
-        Fields of a row.
-    has_row_names : bool
-        Whether the first field of the rows is a label or a running number, which a header may leave out.
+    names : words of a header line
+    width : fields of a row
+    has_row_names : whether the first field of the rows is a label or a running number, which a header may leave out
     """
     if len(names) > width:
         return find_columns(names[-width:])  # "columns: x y z"

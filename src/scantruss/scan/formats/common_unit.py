@@ -22,8 +22,7 @@ def to_common_unit(
     ----------
     path, content, unit, z_unit
         As for `to_one_unit`.
-    common : str
-        Unit of the files before; "" if none has one.
+    common : unit of the files before; "" if none has one
     """
     points, own, notes = to_one_unit(path, content, unit, z_unit)
     feet = (content.feet,) if content.feet and own != "foot" and not z_unit else ()
@@ -39,14 +38,10 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
 
     Parameters
     ----------
-    path : Path
-        For messages.
-    content : Content
-        What the file holds and says.
-    unit : str
-        What the user gives; it overrides the file.
-    z_unit : str
-        What the user gives for the heights.
+    path : for messages
+    content : what the file holds and says
+    unit : what the user gives; it overrides the file
+    z_unit : what the user gives for the heights
 
     Raises
     ------

@@ -16,15 +16,15 @@ import numpy as np
 from ...errors import FormatError
 from .las_header import HEADER_14, LASZIP, RECORD
 
-NAME = b"copc".ljust(16, b"\0") + b"\1\0"  # user and number of the record that describes the octree
-INFO = 160  # its bytes; it is the first of the file
+RECORD_NAME = b"copc".ljust(16, b"\0") + b"\1\0"  # user and number of the record that describes the octree
+RECORD_BYTES = 160  # its bytes; it is the first of the file
 ENTRY = np.dtype([("key", "<i4", 4), ("place", "<u8"), ("size", "<i4"), ("count", "<i4")])  # of the table
-ELSEWHERE = -1  # count of an entry that tells where more of the table is
+TABLE_ELSEWHERE = -1  # count of an entry that tells where more of the table is
 DEEPEST_OCTREE_LEVEL = 30  # level of an octree
-CLOSE = 1e-9  # of the octree's side; coordinates are rounded
+OCTREE_TOLERANCE = 1e-9  # of the octree's side; coordinates are rounded
 
 
-class Place(NamedTuple):
+class WantedBox(NamedTuple):
     """The box around a part of space from which points are wanted, in the unit of a file."""
 
     words: str  #: for points outside it
@@ -48,8 +48,8 @@ def find_boxes(path: Path, header: Any) -> Boxes | None:
     """Return the boxes of a file; None if it is no COPC or its table does not match its points, so that all must be read."""
     with path.open("rb") as file:
         file.seek(HEADER_14)
-        record = file.read(RECORD + INFO)
-        if len(record) < RECORD + INFO or record[2:20] != NAME:
+        record = file.read(RECORD + RECORD_BYTES)
+        if len(record) < RECORD + RECORD_BYTES or record[2:20] != RECORD_NAME:
             return None
         x, y, z, half, _, place, size = unpack_from("<5d2Q", record, RECORD)
         entries = _read_table(file, place, size, path.stat().st_size)
@@ -59,7 +59,7 @@ def find_boxes(path: Path, header: Any) -> Boxes | None:
     level, keys = entries["key"][:, 0], entries["key"][:, 1:]
     if level.min() < 0 or level.max() > DEEPEST_OCTREE_LEVEL or len(np.unique(entries["key"], axis=0)) < len(entries):
         return None
-    close = 2.0 * np.abs(header.scales) + CLOSE * half
+    close = 2.0 * np.abs(header.scales) + OCTREE_TOLERANCE * half
     whole = (corner - close <= header.mins) & (header.maxs <= corner + 2.0 * half + close)
     if not whole.all() or (keys < 0).any() or (keys >= 1 << level[:, None].astype(np.int64)).any():
         return None
@@ -80,7 +80,7 @@ def _read_table(file: BinaryIO, place: int, size: int, end: int) -> np.ndarray:
         left -= size
         file.seek(place)
         entries = np.frombuffer(file.read(size // ENTRY.itemsize * ENTRY.itemsize), ENTRY)
-        more = entries[entries["count"] == ELSEWHERE]
+        more = entries[entries["count"] == TABLE_ELSEWHERE]
         pages += zip(more["place"].tolist(), more["size"].tolist(), strict=True)
         found.append(entries[entries["count"] > 0])
     entries = np.concatenate(found)
@@ -118,7 +118,7 @@ def _begin_inside(path: Path, header: Any, boxes: Boxes) -> bool:
     return bool(((points >= boxes.lower) & (points <= boxes.upper)).all())
 
 
-def touching(boxes: Boxes, places: Sequence[Place]) -> tuple[np.ndarray, dict[str, int]]:
+def touching(boxes: Boxes, places: Sequence[WantedBox]) -> tuple[np.ndarray, dict[str, int]]:
     """Return the numbers of the boxes that touch all places, in order, and how many points lie in others, by the words of the places.
 
     The coarsest box is always included: it shows what the file holds.
@@ -143,8 +143,7 @@ def read_boxes(path: Path, header: Any, boxes: Boxes, rows: np.ndarray, most: in
         A COPC file.
     rows : (R,) int64 array
         Numbers of boxes; the points come in their order.
-    most : int
-        Most points in memory at once; at least one box.
+    most : most points in memory at once; at least one box
     fields
         What is unpacked, as lazrs says it.
 

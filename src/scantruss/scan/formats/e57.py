@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import FormatError
 from .columns import find_attributes
 from .content import Content
-from .e57_header import SPHERICAL, Field, Scan, logical, read_pages, read_scans
+from .e57_header import SPHERICAL, E57Field, E57Scan, logical, read_pages, read_scans
 from .kinds import read_head, wrong_kind
 from .las_header import room_note
 
@@ -91,7 +91,7 @@ def e57_scans(path: Path, wanted: Sequence[str] = ()) -> Iterator[ScanPoints]:
         yield ScanPoints(scan.name, points, scan.rotation, scan.translation, invalid, attributes, notes)
 
 
-def _attribute_fields(scan: Scan, wanted: Sequence[str]) -> dict[str, str]:
+def _attribute_fields(scan: E57Scan, wanted: Sequence[str]) -> dict[str, str]:
     """Return the fields that hold the wanted attributes, those of extensions too."""
     names = [field.name for field in scan.fields]
     known = ["return_number" if name == "returnIndex" else name.partition("_")[2] or name for name in names]
@@ -105,7 +105,7 @@ def _to_cartesian(places: np.ndarray) -> np.ndarray:
 
 
 def _read_columns(
-    path: Path, data: np.ndarray, scan: Scan, names: tuple[str, ...]
+    path: Path, data: np.ndarray, scan: E57Scan, names: tuple[str, ...]
 ) -> tuple[dict[str, np.ndarray], int]:
     """Return the named fields of all records, float64 each, and how many records there are, promised or not.
 
@@ -128,7 +128,7 @@ def _read_columns(
     return found, room
 
 
-def _collect(path: Path, data: np.ndarray, scan: Scan, wanted: list[int]) -> list[np.ndarray]:
+def _collect(path: Path, data: np.ndarray, scan: E57Scan, wanted: list[int]) -> list[np.ndarray]:
     """Return the bytes of the wanted fields, gathered from the data packets."""
     early = FormatError(f"{path} ends early: {scan.name} promises {scan.count:,} points; copy it again")
     try:
@@ -168,7 +168,7 @@ def _streams(packet: np.ndarray, count: int) -> list[np.ndarray] | None:
     return [packet[a:b] for a, b in zip([begin, *ends[:-1]], ends, strict=True)]
 
 
-def _decode(stream: np.ndarray, field: Field, count: int) -> np.ndarray:
+def _decode(stream: np.ndarray, field: E57Field, count: int) -> np.ndarray:
     """Return the values of a field, (count,) float64."""
     if field.kind != "integer":
         size = field.bits // 8

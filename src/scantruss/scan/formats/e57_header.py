@@ -24,7 +24,7 @@ FLOATS = {"double": 64, "single": 32}
 
 
 @dataclass(frozen=True)
-class Field:
+class E57Field:
     """One field of the records of a scan."""
 
     name: str
@@ -36,13 +36,13 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class E57Scan:
     """One scan of a file, and where it stands."""
 
     name: str
     count: int
     start: int  #: [byte] of the data, where its section begins
-    fields: tuple[Field, ...]
+    fields: tuple[E57Field, ...]
     rotation: np.ndarray  #: (3, 3); a place in the common frame is rotation @ place + translation
     translation: np.ndarray  #: (3,) [m]
 
@@ -102,7 +102,7 @@ def _table() -> np.ndarray:
     return table
 
 
-def read_scans(path: Path, data: np.ndarray) -> list[Scan]:
+def read_scans(path: Path, data: np.ndarray) -> list[E57Scan]:
     """Return all scans that an E57 file describes."""
     start, length = struct.unpack("<QQ", data[24:40].tobytes())
     start = logical(start)
@@ -128,7 +128,7 @@ def read_scans(path: Path, data: np.ndarray) -> list[Scan]:
     return scans
 
 
-def _scan(entry: ElementTree.Element, points: ElementTree.Element, number: int) -> Scan:
+def _scan(entry: ElementTree.Element, points: ElementTree.Element, number: int) -> E57Scan:
     prototype = points.find("prototype")
     fields = tuple(_field(child) for child in (prototype if prototype is not None else ()))
     count, offset = int(points.attrib["recordCount"]), int(points.attrib["fileOffset"])
@@ -136,14 +136,14 @@ def _scan(entry: ElementTree.Element, points: ElementTree.Element, number: int) 
         raise ValueError("negative recordCount or fileOffset")
     rotation, translation = _pose(entry.find("pose"))
     name = (entry.findtext("name") or "").strip() or f"scan {number + 1}"
-    return Scan(name, count, logical(offset), fields, rotation, translation)
+    return E57Scan(name, count, logical(offset), fields, rotation, translation)
 
 
-def _field(child: ElementTree.Element) -> Field:
+def _field(child: ElementTree.Element) -> E57Field:
     kind = child.attrib.get("type", "")
     if kind == "Float":
         precision = "single" if child.attrib.get("precision") == "single" else "double"
-        return Field(child.tag, precision, bits=FLOATS[precision])
+        return E57Field(child.tag, precision, bits=FLOATS[precision])
     if kind not in ("Integer", "ScaledInteger"):
         raise ValueError(f"field {child.tag} of type {kind!r}")
     low, high = int(child.attrib.get("minimum", -(2**63))), int(child.attrib.get("maximum", 2**63 - 1))
@@ -151,7 +151,7 @@ def _field(child: ElementTree.Element) -> Field:
     scale, offset = float(child.attrib.get("scale", 1)), float(child.attrib.get("offset", 0))
     if not 0 <= bits <= 64 or not -(2**63) <= low < 2**63 or not math.isfinite(scale + offset):
         raise ValueError(f"limits of field {child.tag}")
-    return Field(child.tag, "integer", low, bits, *((scale, offset) if kind == "ScaledInteger" else (1.0, 0.0)))
+    return E57Field(child.tag, "integer", low, bits, *((scale, offset) if kind == "ScaledInteger" else (1.0, 0.0)))
 
 
 def _pose(pose: ElementTree.Element | None) -> tuple[np.ndarray, np.ndarray]:

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-TALL = 45.0  # median height of woods that is not reached in metres
-POINTS_LOOKED_AT = 400_000  # most points examined
-PLACES = 100  # boxes of either kind that are needed to decide
+TALLEST_WOODS = 45.0  # median height of woods that is not reached in metres
+MOST_HEIGHTS = 400_000  # most points examined
+BOXES_TO_DECIDE = 100  # boxes of either kind that are needed to decide
 
 
 def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
@@ -27,7 +27,7 @@ def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
     if len(points) < 1000 or int(returns.max(initial=0)) < 2:
         return ""
     high = _height_of_woods(points, returns)
-    if high < TALL:
+    if high < TALLEST_WOODS:
         return ""
     return (
         f"where a pulse came back in several parts the points span a height of {high:.0f} (median): trees are rarely so"
@@ -38,8 +38,8 @@ def look_like_feet(points: np.ndarray, returns: np.ndarray) -> str:
 def _height_of_woods(points: np.ndarray, returns: np.ndarray) -> float:
     """Return the median span of heights in boxes with several returns, less that in boxes without; 0 where there are few."""
     x, y = points[:, 0], points[:, 1]
-    if len(points) > POINTS_LOOKED_AT:  # a strip of the scan, with all its points
-        share = 0.5 * POINTS_LOOKED_AT / len(points)
+    if len(points) > MOST_HEIGHTS:  # a strip of the scan, with all its points
+        share = 0.5 * MOST_HEIGHTS / len(points)
         low, high = np.quantile(x[:: max(1, len(x) // 100_000)], [0.5 - share, 0.5 + share])
         inside = np.flatnonzero((x >= low) & (x <= high))
         points, returns = points[inside], returns[inside]
@@ -57,6 +57,6 @@ def _height_of_woods(points: np.ndarray, returns: np.ndarray) -> float:
     span = np.maximum.reduceat(z, start) - np.minimum.reduceat(z, start)
     wooded = np.maximum.reduceat(several, start)
     bare, woods = span[enough & ~wooded], span[enough & wooded]
-    if len(woods) < PLACES:
+    if len(woods) < BOXES_TO_DECIDE:
         return 0.0
-    return float(np.median(woods) - (np.median(bare) if len(bare) >= PLACES else 0.0))
+    return float(np.median(woods) - (np.median(bare) if len(bare) >= BOXES_TO_DECIDE else 0.0))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from ...errors import FormatError
+from ...errors import FormatError, ScanTrussError
 
-HEAD = 4096  # bytes examined
+BYTES_OF_KIND = 4096  # bytes examined
 
 _SIGNATURES = (
     (b"ply\n", "a PLY file"),
@@ -54,7 +56,7 @@ def read_head(path: Path) -> bytes:
         if not path.exists():
             raise FormatError(f"{path} does not exist; check the name of the scan")
         with path.open("rb") as file:
-            head = file.read(HEAD)
+            head = file.read(BYTES_OF_KIND)
     except (OSError, ValueError) as error:
         raise FormatError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if not head:
@@ -88,11 +90,15 @@ def wrong_kind(path: Path, head: bytes, wanted: str) -> FormatError:
     return FormatError(f"{path} is not {wanted} but {kind}; give it the suffix of what it is, or export the scan again")
 
 
-def unreadable(path: Path, kind: str, error: BaseException) -> FormatError:
-    """Return the error for a file that a library cannot read; errors not caused by the file are raised unchanged."""
-    if isinstance(error, MemoryError | OSError) or not (
-        isinstance(error, Exception) or type(error).__name__ == "PanicException"  # Rust's, not an Exception
-    ):
-        raise error
-    said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
-    return FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again")
+@contextmanager
+def reading_as(path: Path, kind: str) -> Iterator[None]:
+    """Say in one line that a library cannot read a file; our own errors, and those not caused by the file, pass unchanged."""
+    try:
+        yield
+    except (ScanTrussError, MemoryError, OSError):
+        raise
+    except BaseException as error:
+        if not (isinstance(error, Exception) or type(error).__name__ == "PanicException"):  # Rust's, not an Exception
+            raise
+        said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
+        raise FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again") from None

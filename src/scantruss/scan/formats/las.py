@@ -12,39 +12,35 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FormatError, InputError, ScanTrussError
+from ...errors import FormatError, InputError
 from ...settings import UNITS
 from ..cloud import measure_spacing
 from .content import Cloud, Content
-from .copc import Place, find_boxes, read_boxes, touching
-from .heights import POINTS_LOOKED_AT, look_like_feet
-from .kinds import read_head, unreadable, wrong_kind
+from .copc import WantedBox, find_boxes, read_boxes, touching
+from .heights import MOST_HEIGHTS, look_like_feet
+from .kinds import read_head, reading_as, wrong_kind
 from .las_header import check_header
 from .systems import system_of
 
 POINTS_PER_CHUNK = 1_000_000  # points
-FIELDS = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
+FIELD_OF_ATTRIBUTE = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
 LOST_OF_SPACING = 1e-3  # rounding of a coordinate, as a share of the spacing
-LARGEST_INTEGER = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
-CODES = {"m": 9001, "foot": 9002}  # EPSG
+LARGEST_INT32 = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
+UNIT_CODES = {"m": 9001, "foot": 9002}  # EPSG
 WITHHELD = "marked as withheld"  # the format's term for deleted
 
-Places = Callable[[Content], list[Place]]  # by the units that a file states
+Places = Callable[[Content], list[WantedBox]]  # by the units that a file states
 
 
 def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:
-    """Return the points of a LAS or LAZ file and the wanted attributes; of a COPC file those near some places, where they are told."""
+    """Return the points of a LAS or LAZ file and the wanted attributes; of a COPC file those near some places, where they are given."""
     head = read_head(path)
     if not head.startswith(b"LASF"):
         raise wrong_kind(path, head, "a LAS or LAZ file")
     names = fields_of((*wanted, "return_count"))
-    try:
+    with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
         promised, said, chunks = _read(path, names, places_of)
-    except (KeyboardInterrupt, ScanTrussError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
     withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
     unread = sum(said.unread.values())
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
@@ -58,16 +54,16 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:
     """Return the wanted attributes that the format has, each once."""
-    return [name for name in dict.fromkeys(wanted) if name in FIELDS]
+    return [name for name in dict.fromkeys(wanted) if name in FIELD_OF_ATTRIBUTE]
 
 
-def take(record: Any, names: Sequence[str]) -> Content:
+def content_of_records(record: Any, names: Sequence[str]) -> Content:
     """Return the points of some records of laspy with attributes, but for those that are marked as withheld."""
     points = np.empty((len(record), 3))
     for axis, name in enumerate("XYZ"):
         np.multiply(record[name], record.scales[axis], out=points[:, axis])
         points[:, axis] += record.offsets[axis]
-    attributes = {name: np.array(record[FIELDS[name]]) for name in names}
+    attributes = {name: np.array(record[FIELD_OF_ATTRIBUTE[name]]) for name in names}
     kept = np.array(record["withheld"]) == 0
     if kept.all():
         return Content(points, attributes)
@@ -85,14 +81,11 @@ def note_on_heights(path: Path) -> str:
     """Return a note if the heights of a LAS or LAZ file look like feet, by its first points; "" if it states their unit."""
     import laspy
 
-    try:
-        with laspy.open(path) as file:
-            content = take(file.read_points(min(POINTS_LOOKED_AT, int(file.header.point_count))), ["return_count"])
-            return look_like_feet(content.points, content.attributes["return_count"])
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
+    with reading_as(path, "LAS or LAZ"), laspy.open(path) as file:
+        content = content_of_records(
+            file.read_points(min(MOST_HEIGHTS, int(file.header.point_count))), ["return_count"]
+        )
+        return look_like_feet(content.points, content.attributes["return_count"])
 
 
 def fields_for(names: Sequence[str]) -> Any:
@@ -104,7 +97,7 @@ def fields_for(names: Sequence[str]) -> Any:
 
 
 def records_near(
-    path: Path, header: Any, places: Sequence[Place], names: Sequence[str], most: int = POINTS_PER_CHUNK
+    path: Path, header: Any, places: Sequence[WantedBox], names: Sequence[str], most: int = POINTS_PER_CHUNK
 ) -> tuple[Iterator[Any], dict[str, int]] | None:
     """Return the records of a COPC file near all places, and how many others there are by the words of these; None of other files."""
     boxes = find_boxes(path, header) if places else None
@@ -124,7 +117,7 @@ def _read(path: Path, names: Sequence[str], places_of: Places | None) -> tuple[i
         said = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
         near = records_near(path, header, places_of(said), names) if places_of else None
         records, unread = near or (file.chunk_iterator(POINTS_PER_CHUNK), {})
-        chunks = [take(record, names) for record in records]
+        chunks = [content_of_records(record, names) for record in records]
     return header.point_count, replace(said, unread=unread), chunks
 
 
@@ -146,7 +139,7 @@ def write_las(path: Path, cloud: Cloud) -> None:
     scale = las_scale(points)
     lower, upper = points.min(axis=0), points.max(axis=0)
     middle = 0.5 * (lower + upper) if cloud.origin is None else np.asarray(cloud.origin, dtype=np.float64)
-    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST_INTEGER:
+    if max(np.abs(upper - middle).max(), np.abs(lower - middle).max()) / scale > LARGEST_INT32:
         middle = 0.5 * (lower + upper)
     header.scales, header.offsets = np.full(3, scale), np.round(middle / scale) * scale
     if normals is not None:
@@ -162,7 +155,10 @@ def write_las(path: Path, cloud: Cloud) -> None:
 def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarray | None) -> None:
     import laspy
 
-    with path.open("wb") as file, laspy.open(file, "w", header=header, do_compress=_is_laz(path), closefd=False) as out:
+    with (
+        path.open("wb") as file,
+        laspy.open(file, "w", header=header, do_compress=path.suffix.lower() == ".laz", closefd=False) as out,
+    ):
         for begin in range(0, len(points), POINTS_PER_CHUNK):
             part = slice(begin, begin + POINTS_PER_CHUNK)
             record = laspy.ScaleAwarePointRecord.zeros(len(points[part]), header=header)
@@ -175,7 +171,7 @@ def _write_points(path: Path, header: Any, points: np.ndarray, normals: np.ndarr
 def las_scale(points: np.ndarray) -> float:
     """Return the step of the coordinates: a power of ten below a thousandth of the spacing."""
     extent = float(np.ptp(points, axis=0).max())
-    finest = extent / (1.9 * LARGEST_INTEGER)
+    finest = extent / (1.9 * LARGEST_INT32)
     wanted = LOST_OF_SPACING * measure_spacing(points) or 1e-6 * extent or 1e-3
     scale = float(f"1e{math.floor(math.log10(wanted))}")
     if scale >= finest:
@@ -187,23 +183,19 @@ def las_scale(points: np.ndarray) -> float:
     return wanted
 
 
-def _is_laz(path: Path) -> bool:
-    return path.suffix.lower() == ".laz"
-
-
 def _unit_records(unit: str) -> list[Any]:
     """Return the GeoTIFF keys of a plane system that is not named, in a unit."""
     import laspy
 
     own = 32767  # "user defined"
     metres = UNITS[unit]
-    if code := CODES.get(unit):
+    if code := UNIT_CODES.get(unit):
         keys = [(1024, 0, 1, 1), (3072, 0, 1, own), (3076, 0, 1, code), (4099, 0, 1, code)]
     else:
         keys = [(1024, 0, 1, 1), (3072, 0, 1, own), (3076, 0, 1, own), (3077, 34736, 1, 0), (4099, 0, 1, own)]
     words = [1, 1, 0, len(keys), *(word for key in keys for word in key)]
     body = struct.pack(f"<{len(words)}H", *words)
     records = [laspy.VLR("LASF_Projection", 34735, "GeoKeyDirectoryTag", body)]
-    if unit not in CODES:
+    if unit not in UNIT_CODES:
         records.append(laspy.VLR("LASF_Projection", 34736, "GeoDoubleParamsTag", struct.pack("<d", metres)))
     return records

@@ -9,7 +9,8 @@ from ...errors import FormatError
 from .text_fields import number_of, split_fields, split_line
 from .text_layout import Layout, find_layout
 
-NAMES = ("length", "member", "desired", "l", "size", "edge")  # of the column of lengths, where a header names columns
+# of the column of lengths, where a header names columns
+LENGTH_COLUMN_NAMES = ("length", "member", "desired", "l", "size", "edge")
 
 
 def read_lengths(path: str | Path) -> list[tuple[float, ...]]:
@@ -51,7 +52,7 @@ def _length_column(header: list[str], layout: Layout) -> int:
         names = [name.strip().lower() for name in split_fields(line.strip().lstrip("#/%!;* "), layout.separator)]
         for column, name in enumerate(names if len(names) > 3 else ()):
             words = name.replace("_", " ").replace("[", " ").replace("(", " ").split()
-            if words and words[0] in NAMES:
+            if words and words[0] in LENGTH_COLUMN_NAMES:
                 return column
     return max(layout.columns) + 1
 

@@ -17,7 +17,7 @@ from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of
 from .columns import find_attributes
 from .content import Cloud, Content
-from .kinds import read_head, unreadable, wrong_kind
+from .kinds import read_head, reading_as, wrong_kind
 from .packed import check_size
 
 UNNAMED = "arr_0"  # the first array that was saved without a name
@@ -36,14 +36,9 @@ def read_npy(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"\x93NUMPY"):
         raise wrong_kind(path, head, "an NPY file")
-    try:
-        with path.open("rb") as file:
-            check_claim(path, file, path.stat().st_size)
-            array = np.load(file, allow_pickle=False)
-    except FormatError:
-        raise
-    except Exception as error:  # a damaged header raises many kinds of errors
-        raise unreadable(path, "NPY", error) from None
+    with reading_as(path, "NPY"), path.open("rb") as file:
+        check_claim(path, file, path.stat().st_size)
+        array = np.load(file, allow_pickle=False)
     content = _content(array, wanted)
     if content is None:
         if is_turned(array.shape):
@@ -79,17 +74,12 @@ def read_npz(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if not head.startswith(b"PK"):
         raise wrong_kind(path, head, "an NPZ file")
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            check_size(path, sum(member.file_size for member in arrays.zip.infolist()))
-            name, notes = _name_of_points(arrays, path)
-            content = _content(_member(arrays, name, path), wanted)
-            assert content is not None
-            return replace(content, metres=_metres(arrays, path), notes=notes)
-    except FormatError:
-        raise
-    except Exception as error:  # a damaged archive raises many kinds of errors
-        raise unreadable(path, "NPZ", error) from None
+    with reading_as(path, "NPZ"), path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        check_size(path, sum(member.file_size for member in arrays.zip.infolist()))
+        name, notes = _name_of_points(arrays, path)
+        content = _content(_member(arrays, name, path), wanted)
+        assert content is not None
+        return replace(content, metres=_metres(arrays, path), notes=notes)
 
 
 def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:

@@ -12,9 +12,9 @@ from ...errors import FormatError
 from ...runtime.files import temporary_folder
 from .kinds import read_head, wrong_kind
 
-MOST_SHRUNK = 100  # text of points packs to a third or a tenth; zeros pack to a thousandth
-ALWAYS = 1 << 26  # bytes that any file may unpack to
-BYTES_PER_BLOCK = 1 << 20  # bytes
+MOST_PACKED = 100  # text of points packs to a third or a tenth; zeros pack to a thousandth
+BYTES_ALWAYS_UNPACKED = 1 << 26  # bytes that any file may unpack to
+UNPACKED_BYTES_PER_BLOCK = 1 << 20  # bytes
 
 
 @contextmanager
@@ -42,7 +42,7 @@ def _unpack(path: Path, inner: Path) -> None:
     try:
         with gzip.open(path) as source, inner.open("wb") as target:
             size = 0
-            while block := source.read(BYTES_PER_BLOCK):
+            while block := source.read(UNPACKED_BYTES_PER_BLOCK):
                 size += len(block)
                 check_size(path, size)
                 target.write(block)
@@ -52,6 +52,6 @@ def _unpack(path: Path, inner: Path) -> None:
 
 def check_size(path: Path, size: int) -> None:
     """Refuse a packed file that unpacks to more bytes than any scan would."""
-    most = max(ALWAYS, MOST_SHRUNK * path.stat().st_size)
+    most = max(BYTES_ALWAYS_UNPACKED, MOST_PACKED * path.stat().st_size)
     if size > most:
         raise FormatError(f"{path} unpacks to over {most:,} bytes, which no scan of its size does; unpack it yourself")

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FormatError, ScanTrussError
+from ...errors import FormatError
 from ..units import metres_of_columns
 from .columns import check_not_degrees, find_attributes, find_columns
 from .content import Content
-from .kinds import read_head, unreadable, wrong_kind
+from .kinds import read_head, reading_as, wrong_kind
 
 BATCH = 1 << 18  # rows
 
@@ -25,13 +25,8 @@ def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
         raise wrong_kind(path, head, "a Parquet file")
     import pyarrow.parquet as parquet
 
-    try:
-        with parquet.ParquetFile(path, memory_map=True) as file:
-            return _read(path, file, wanted)
-    except (KeyboardInterrupt, ScanTrussError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "Parquet", error) from None
+    with reading_as(path, "Parquet"), parquet.ParquetFile(path, memory_map=True) as file:
+        return _read(path, file, wanted)
 
 
 def metres_of_parquet(path: Path) -> tuple[float | None, float | None]:

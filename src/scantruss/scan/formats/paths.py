@@ -10,10 +10,10 @@ from pathlib import Path
 
 from ...errors import FormatError
 
-Source = str | Path | Iterable[str | Path]
+FileNames = str | Path | Iterable[str | Path]
 
 
-def files_of(source: Source) -> list[Path]:
+def files_of(source: FileNames) -> list[Path]:
     """Return the files that a name, a pattern such as ``tiles/*.laz``, or several of these mean.
 
     The files of a pattern come in the order of their names (`**` looks into folders), each file once; a file whose name holds
@@ -31,7 +31,7 @@ def files_of(source: Source) -> list[Path]:
     return list(dict.fromkeys(found))
 
 
-def name_of_files(source: Source) -> str:
+def name_of_files(source: FileNames) -> str:
     """Return a short name for all of them, for messages."""
     if isinstance(source, str | Path):
         return Path(source).name

@@ -19,15 +19,15 @@ from ...runtime.ours import CLOUD_MARK
 from ..units import PATTERN, metres_of
 from .columns import find_attributes
 from .content import Cloud, Content, surplus_note
-from .kinds import kind_of, read_head, unreadable, wrong_kind
+from .kinds import kind_of, read_head, reading_as, wrong_kind
 
-LONGEST_HEADER = 1 << 16  # bytes
-MOST_SHRUNK = 100  # LZF makes at most 264 bytes of 3
-TYPES = {("F", s): f"<f{s}" for s in (2, 4, 8)} | {(t, s): f"<{t.lower()}{s}" for t in "IU" for s in (1, 2, 4, 8)}
+LONGEST_PCD_HEADER = 1 << 16  # bytes
+MOST_LZF = 100  # LZF makes at most 264 bytes of 3
+PCD_TYPES = {("F", s): f"<f{s}" for s in (2, 4, 8)} | {(t, s): f"<{t.lower()}{s}" for t in "IU" for s in (1, 2, 4, 8)}
 
 
 @dataclass(frozen=True)
-class Header:
+class PcdHeader:
     """What the header of a PCD file says."""
 
     names: tuple[str, ...]
@@ -65,15 +65,16 @@ def read_pcd(path: Path, wanted: Sequence[str] = ()) -> Content:
         notes.append(f"the viewpoint of {path.name} is where the scanner stood; the points are not moved by it")
     if len(table) > header.points:
         notes.append(surplus_note(path.name, len(table), header.points))
-    if header.data == "binary" and (more := _bytes_behind(path, header)) >= header.row.itemsize:
+    more = path.stat().st_size - header.start - header.points * header.row.itemsize
+    if header.data == "binary" and more >= header.row.itemsize:
         notes.append(f"{path.name} goes on for {more:,} bytes after the points that it promises; they are ignored")
     return Content(np.ascontiguousarray(table[:, :3]), attributes, metres=header.metres, notes=tuple(notes))
 
 
-def read_pcd_header(path: Path) -> Header:
+def read_pcd_header(path: Path) -> PcdHeader:
     """Return the header of a PCD file; FormatError if it is none."""
     with path.open("rb") as file:
-        raw = file.read(LONGEST_HEADER)
+        raw = file.read(LONGEST_PCD_HEADER)
     end = re.search(rb"(?:^|\n)[ \t]*DATA[ \t]+(\w+)[ \t]*\r?(\n|$)", raw)
     if not end:
         raise FormatError(f"{path} ends before the line DATA of its header; copy it again")
@@ -87,7 +88,7 @@ def read_pcd_header(path: Path) -> Header:
     try:
         sizes = [int(word) for word in words.get("SIZE", ["4"] * len(names))]
         counts = [int(word) for word in words.get("COUNT", ["1"] * len(names))]
-        types = [TYPES[pair] for pair in zip(words.get("TYPE", ["F"] * len(names)), sizes, strict=True)]
+        types = [PCD_TYPES[pair] for pair in zip(words.get("TYPE", ["F"] * len(names)), sizes, strict=True)]
         area = math.prod(int(words[key][0]) for key in ("WIDTH", "HEIGHT") if key in words)
         points = int(words["POINTS"][0]) if "POINTS" in words else area
         place = [float(word) for word in words.get("VIEWPOINT", [])]
@@ -102,35 +103,28 @@ def read_pcd_header(path: Path) -> Header:
     unit = re.search(rf"#\s*{PATTERN}", text, re.IGNORECASE)
     metres = metres_of(unit[1]) if unit else None
     moved = len(place) == 7 and place != [0, 0, 0, 1, 0, 0, 0]
-    return Header(tuple(names), tuple(types), tuple(counts), points, data, end.end(), metres, moved)
+    return PcdHeader(tuple(names), tuple(types), tuple(counts), points, data, end.end(), metres, moved)
 
 
-def _ends_early(path: Path, header: Header, got: str) -> FormatError:
+def _ends_early(path: Path, header: PcdHeader, got: str) -> FormatError:
     return FormatError(f"{path} ends early: its header promises {header.points:,} points, got {got}; copy it again")
 
 
-def _read_ascii(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_ascii(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     place = np.concatenate([[0], np.cumsum(header.counts)])
     if header.points > path.stat().st_size:
         raise _ends_early(path, header, f"{path.stat().st_size:,} bytes")
-    try:
-        with path.open("rb") as file:
-            file.seek(header.start)
-            lines = (line for line in file if not line.isspace())
-            usecols = [int(place[column]) for column in columns]
-            table = np.loadtxt(lines, usecols=usecols, ndmin=2, comments=None)
-    except ValueError as error:
-        raise unreadable(path, "PCD", error) from None
+    with reading_as(path, "PCD"), path.open("rb") as file:
+        file.seek(header.start)
+        lines = (line for line in file if not line.isspace())
+        usecols = [int(place[column]) for column in columns]
+        table = np.loadtxt(lines, usecols=usecols, ndmin=2, comments=None)
     if len(table) < header.points:
         raise _ends_early(path, header, f"{len(table):,}")
     return table
 
 
-def _bytes_behind(path: Path, header: Header) -> int:
-    return path.stat().st_size - header.start - header.points * header.row.itemsize
-
-
-def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_binary(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     held = (path.stat().st_size - header.start) // max(header.row.itemsize, 1)
     if held < header.points:
         raise _ends_early(path, header, f"{held:,}")
@@ -141,7 +135,7 @@ def _read_binary(path: Path, header: Header, columns: Sequence[int]) -> np.ndarr
     return table
 
 
-def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.ndarray:
+def _read_compressed(path: Path, header: PcdHeader, columns: Sequence[int]) -> np.ndarray:
     """Unpack a file that is stored field by field."""
     with path.open("rb") as file:
         file.seek(header.start)
@@ -150,16 +144,14 @@ def _read_compressed(path: Path, header: Header, columns: Sequence[int]) -> np.n
     if len(sizes) < 2 or len(packed) < sizes[0]:
         raise _ends_early(path, header, f"{len(packed):,} packed bytes")
     size = header.points * header.row.itemsize
-    if sizes[1] != size or size > MOST_SHRUNK * len(packed):
+    if sizes[1] != size or size > MOST_LZF * len(packed):
         raise FormatError(
             f"{path}: {header.points:,} points do not fit its {int(sizes[1]):,} bytes; the file is damaged"
         )
     from lzf import decompress
 
-    try:
+    with reading_as(path, "PCD"):
         raw = decompress(packed, size)
-    except ValueError as error:
-        raise unreadable(path, "PCD", error) from None
     if raw is None or len(raw) != size:
         raise FormatError(f"{path} cannot be unpacked; copy it again")
     table = np.empty((header.points, len(columns)))

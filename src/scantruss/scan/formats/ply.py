@@ -19,7 +19,7 @@ from .columns import NORMAL, find_attributes
 from .content import Cloud, Content
 from .faces import normals_from_faces
 from .kinds import read_head, wrong_kind
-from .ply_header import PLY, Element, Header, ends_early, read_header
+from .ply_header import PLY, Element, PlyHeader, ends_early, read_header
 
 LONGEST_LIST = 1 << 26  # entries
 LISTS_OF_CORNERS = ("vertex_indices", "vertex_index")  # properties of a face
@@ -55,7 +55,7 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     return Content(points, attributes, metres=metres_of(header.unit), normals=normals)
 
 
-def _faces(path: Path, header: Header) -> list[np.ndarray]:
+def _faces(path: Path, header: PlyHeader) -> list[np.ndarray]:
     """Return the faces of a PLY file, those of as many corners together; none where they are damaged or there are none."""
     element = next((each for each in header.elements if each.name == "face"), None)
     names = [] if element is None else [p.name for p in element.properties if p.count_type]
@@ -67,7 +67,7 @@ def _faces(path: Path, header: Header) -> list[np.ndarray]:
         return []
 
 
-def _binary_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]:
+def _binary_faces(path: Path, header: PlyHeader, face: Element) -> list[np.ndarray]:
     data, offset = np.memmap(path, dtype=np.uint8, mode="r"), header.start
     for element in header.elements[: header.elements.index(face)]:
         offset = _skip(path, data, offset, header.order, element, None)
@@ -79,7 +79,7 @@ def _binary_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]
     return found if whole else []
 
 
-def _ascii_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]:
+def _ascii_faces(path: Path, header: PlyHeader, face: Element) -> list[np.ndarray]:
     place = header.elements.index(face)
     if face.properties[0].name not in LISTS_OF_CORNERS:
         return []
@@ -96,7 +96,7 @@ def _ascii_faces(path: Path, header: Header, face: Element) -> list[np.ndarray]:
     ]
 
 
-def _read_binary(path: Path, header: Header, vertex: Element, columns: Sequence[str]) -> np.ndarray:
+def _read_binary(path: Path, header: PlyHeader, vertex: Element, columns: Sequence[str]) -> np.ndarray:
     data = np.memmap(path, dtype=np.uint8, mode="r")
     offset = header.start
     table = np.empty((0, len(columns)))
@@ -190,7 +190,7 @@ def row_type(element: Element, order: str, lengths: list[int]) -> np.dtype[np.vo
     return np.dtype(fields)
 
 
-def _read_ascii(path: Path, header: Header, vertex: Element, names: Sequence[str]) -> np.ndarray:
+def _read_ascii(path: Path, header: PlyHeader, vertex: Element, names: Sequence[str]) -> np.ndarray:
     """Return the named properties of all points of an ascii PLY file, (N, len(names)) float64.
 
     The usual layout, a row a line, is read by numpy; any other word by word, which takes longer.
@@ -209,7 +209,7 @@ def _read_ascii(path: Path, header: Header, vertex: Element, names: Sequence[str
     return _read_words(path, header, vertex, names, words)
 
 
-def _open_data(path: Path, header: Header) -> TextIOWrapper:
+def _open_data(path: Path, header: PlyHeader) -> TextIOWrapper:
     file = path.open("rb")
     file.seek(header.start)
     return TextIOWrapper(file, encoding="latin-1")
@@ -238,7 +238,7 @@ def _columns(vertex: Element, wanted: Sequence[str]) -> list[int]:
     return [names.index(name) for name in wanted]
 
 
-def _read_words(path: Path, header: Header, vertex: Element, wanted: Sequence[str], words: list[str]) -> np.ndarray:
+def _read_words(path: Path, header: PlyHeader, vertex: Element, wanted: Sequence[str], words: list[str]) -> np.ndarray:
     """Return the wanted properties of a file whose rows do not keep to lines."""
     place, chosen = 0, np.empty((0, len(wanted)), dtype=np.int64)
     for element in header.elements:

@@ -9,14 +9,14 @@ from pathlib import Path
 from ...errors import FormatError
 from ..units import PATTERN
 
-TYPES = {
+PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "long": "i8", "ulong": "u8",
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "int64": "i8",
     "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
-COUNT_TYPES = {word: code for word, code in TYPES.items() if code[0] != "f"}
+COUNT_TYPES = {word: code for word, code in PLY_TYPES.items() if code[0] != "f"}
 PLY = re.compile(rb"ply[ \t]*[\r\n]")  # how a file starts
-LONGEST_HEADER = 1 << 20  # bytes
+LONGEST_PLY_HEADER = 1 << 20  # bytes
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Header:
+class PlyHeader:
     """The content of the header, and where the data starts."""
 
     order: str  #: "" for ascii, "<" or ">" for binary
@@ -52,10 +52,10 @@ class Header:
     unit: str = ""  #: unit, if a comment names it
 
 
-def read_header(path: Path) -> Header:
+def read_header(path: Path) -> PlyHeader:
     """Return the header of a PLY file; FormatError where it cannot be understood."""
     with path.open("rb") as file:
-        raw = file.read(LONGEST_HEADER)
+        raw = file.read(LONGEST_PLY_HEADER)
     end = re.search(rb"(?:^|[\r\n])end_header[ \t]*(\r\n|\n|\r)", raw)
     if not end:
         raise FormatError(f"{path} ends before its PLY header does; the file is damaged")
@@ -73,9 +73,9 @@ def read_header(path: Path) -> Header:
                 case ["element", name, count, *_]:
                     elements.append((name, int(count), []))
                 case ["property", "list", count_type, type_, name, *_]:
-                    elements[-1][2].append(Property(name, TYPES[type_], COUNT_TYPES[count_type]))
+                    elements[-1][2].append(Property(name, PLY_TYPES[type_], COUNT_TYPES[count_type]))
                 case ["property", type_, name, *_]:
-                    elements[-1][2].append(Property(name, TYPES[type_]))
+                    elements[-1][2].append(Property(name, PLY_TYPES[type_]))
         except (KeyError, ValueError, IndexError):
             raise FormatError(f"{path}: cannot understand {line.strip()[:80]!r} in the PLY header") from None
     if order is None:
@@ -85,7 +85,7 @@ def read_header(path: Path) -> Header:
     unit = re.search(
         rf"(?:^|[\r\n])(?:comment|obj_info)\s[^\r\n]*?\b{PATTERN}", raw[: end.start()].decode("latin-1"), re.I
     )
-    return Header(
+    return PlyHeader(
         order, tuple(Element(name, count, tuple(p)) for name, count, p in elements), start, unit[1] if unit else ""
     )
 

@@ -14,15 +14,15 @@ from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
 from ..units import check_unit
-from .choose import check_attributes, choose, describe, places_in
+from .choose import check_attributes, choose, describe_points, places_in
 from .columns import NORMAL
 from .common_unit import to_common_unit
 from .content import Content
-from .copc import Place
+from .copc import WantedBox
 from .kinds import read_head
 from .las import Places, read_las
 from .packed import unpacked
-from .paths import Source, files_of, name_of_files
+from .paths import FileNames, files_of, name_of_files
 from .table import PACKED, READERS
 
 WITH_NORMALS = (".ply", ".pcd", ".npy", ".npz", ".parquet")  # suffixes of files whose columns of normals are read
@@ -42,7 +42,7 @@ class Part:
     normals: np.ndarray | None = None  #: (N, 3)
 
 
-def read_points(path: Source, unit: str = "", selection: Selection | None = None) -> PointCloud:
+def read_points(path: FileNames, unit: str = "", selection: Selection | None = None) -> PointCloud:
     """Return the points of a scan; the format is that of the suffix.
 
     Parameters
@@ -89,7 +89,7 @@ def read_points(path: Source, unit: str = "", selection: Selection | None = None
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
 
-    def places_of(said: Content) -> list[Place]:
+    def places_of(said: Content) -> list[WantedBox]:
         return places_in_file(path, said, unit, selection, common)
 
     wanted = (*selection.needs, *(NORMAL if path.suffix.lower() in WITH_NORMALS else ()))
@@ -99,7 +99,7 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     return select(path, content, unit, selection, common)
 
 
-def places_in_file(path: Path, said: Content, unit: str, selection: Selection, common: str) -> list[Place]:
+def places_in_file(path: Path, said: Content, unit: str, selection: Selection, common: str) -> list[WantedBox]:
     """Return the boxes around what is cropped in the unit of a file, by what it says."""
     scale, _, _ = to_common_unit(path, replace(said, points=np.ones((1, 3))), unit, selection.z_unit, common)
     return places_in(selection.crop, scale[0])
@@ -125,7 +125,7 @@ def select(
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
     """Return what could be selected, judged by points from all parts of the file, as the first may all be NaN."""
     some = slice(None, None, max(len(points) // most, 1) if most else 1)
-    return describe(points[some], {name: values[some] for name, values in content.attributes.items()})
+    return describe_points(points[some], {name: values[some] for name, values in content.attributes.items()})
 
 
 def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | None = None) -> Content:

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 #: EPSG codes of units -> metres
-CODES = {
+METRES_OF_CODE = {
     9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937, 9005: 0.3047972654, 9036: 1000.0, 9096: 0.9144,
     1025: 0.001, 1033: 0.01, 9070: 0.3048, 9095: 0.3048007491, 9080: 0.3047995102,
 }  # fmt: skip
-PLANE, DEGREES = 1, 2  # GTModelTypeGeoKey
-OWN = 32767  # "user defined"
+DEGREES = 2  # GTModelTypeGeoKey of longitude and latitude
+USER_DEFINED = 32767  # "user defined"
 DEEPEST_BRACKET = 60  # brackets in brackets
 _TOKEN = re.compile(r'"(?:[^"]|"")*"|[A-Za-z_][\w.]*|[-+.\d][\w.+-]*|[\[\](),]')
 
@@ -137,10 +137,10 @@ def _from_keys(directory: bytes, doubles: bytes, texts: bytes) -> System:
         return number if 1e-9 < number < 1e9 else None
 
     code = value(3072)
-    metres = CODES.get(value(3076)) or double(3077)
+    metres = METRES_OF_CODE.get(value(3076)) or double(3077)
     if metres is None and any(low < code <= low + 60 for low in (32600, 32700, 26900, 25800)):  # zones of UTM
         metres = 1.0
     place, length, start = keys.get(1026, (0, 0, 0))
     name = texts[start : start + length].split(b"|")[0].decode("latin-1").strip("\0 ") if place == 34737 else ""
-    name = f"EPSG:{code}" if 0 < code < OWN else name
-    return System(name, metres, CODES.get(value(4099)), value(1024) == DEGREES)
+    name = f"EPSG:{code}" if 0 < code < USER_DEFINED else name
+    return System(name, metres, METRES_OF_CODE.get(value(4099)), value(1024) == DEGREES)

@@ -27,7 +27,7 @@ class Format(NamedTuple):
     write: Writer | None = None  #: None if the format is only read
 
 
-FORMATS = {
+SCAN_FORMATS = {
     ".ply": Format(read_ply, write_ply),
     ".las": Format(read_las, write_las),
     ".laz": Format(read_las, write_las),
@@ -45,6 +45,6 @@ FORMATS = {
     ".stl": Format(read_stl),
     ".off": Format(read_off),
 }
-READERS = {suffix: own.read for suffix, own in FORMATS.items()}
-WRITERS = {suffix: own.write for suffix, own in FORMATS.items() if own.write}
+READERS = {suffix: own.read for suffix, own in SCAN_FORMATS.items()}
+WRITERS = {suffix: own.write for suffix, own in SCAN_FORMATS.items() if own.write}
 PACKED = ".gz"  # behind any of them

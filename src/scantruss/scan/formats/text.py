@@ -22,18 +22,18 @@ from ..units import metres_of_columns
 from .columns import find_attributes, find_columns, fit_columns
 from .content import Cloud, Content, surplus_note
 from .text_fields import COMMENT, header_names, holds_numbers, number_of, split_line
-from .text_layout import BOM, BYTES_LOOKED_AT, LINE_BREAK, Layout, find_layout
+from .text_layout import BOM, BYTES_EXAMINED, LINE_BREAK, Layout, find_layout
 
-EMPTY = "without coordinates"  # words for lines whose fields are empty
-LARGE = 1 << 22  # bytes of text for which importing pyarrow pays
-BYTES_PER_BLOCK = 1 << 24  # bytes read at a time
+EMPTY_LINES = "without coordinates"  # words for lines whose fields are empty
+BYTES_FOR_PYARROW = 1 << 22  # bytes of text for which importing pyarrow pays
+TEXT_BYTES_PER_BLOCK = 1 << 24  # bytes read at a time
 BYTES_PER_THREAD = 1 << 22  # bytes per thread of pyarrow
 ROWS_PER_WRITE = 1 << 16  # rows written at a time
 NAME_IT = "a first line that names the columns (time x y z ...) settles it"
 _WORDS_IN_COMMENT = re.compile(rb"^[ \t]*#[^\r\n]*[A-Za-z][^\r\n]*", re.MULTILINE)
 
 
-class Rows(NamedTuple):
+class TextRows(NamedTuple):
     """The content of lines of text."""
 
     rows: np.ndarray  #: (N, columns) float64
@@ -61,7 +61,7 @@ def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
     notes = first_column_note(path.name, layout, rows[:, 0])
     if layout.promised is not None and held > promised:
         notes = (*notes, surplus_note(path.name, held, promised))
-    left_out = {EMPTY: empty} if empty else {}
+    left_out = {EMPTY_LINES: empty} if empty else {}
     return Content(points, attributes, layout.metres, layout.z_metres, notes=notes, left_out=left_out)
 
 
@@ -88,31 +88,26 @@ def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
         yield 0, "\n".join(lines[layout.skip :]).encode()
         return
     with path.open("rb") as file:
-        head = file.read(2 * BYTES_LOOKED_AT)
+        head = file.read(2 * BYTES_EXAMINED)
         breaks = islice(re.finditer(rb"\r\n|\n|\r", head), layout.skip - 1, None) if layout.skip else ()
         begin = next((end.end() for end in breaks), 0)
         file.seek(begin)
-        while block := file.read(BYTES_PER_BLOCK):
+        while block := file.read(TEXT_BYTES_PER_BLOCK):
             block += file.readline() if not block.endswith(b"\n") else b""
             yield begin, block.removeprefix(BOM) if begin == 0 else block
             begin += len(block)
 
 
-def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> Rows:
+def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int], begin: int) -> TextRows:
     """Return the columns of whole lines after the header.
 
     Parameters
     ----------
-    path : Path
-        For messages.
-    block : bytes
-        Whole lines, UTF-8 where the file is UTF-16.
-    layout : Layout
-        Separator and decimal sign.
-    columns : sequence of int
-        Wanted fields, those of the attributes last.
-    begin : int
-        Byte of the file at which they begin.
+    path : for messages
+    block : whole lines, UTF-8 where the file is UTF-16
+    layout : separator and decimal sign
+    columns : wanted fields, those of the attributes last
+    begin : byte of the file at which they begin
 
     Raises
     ------
@@ -120,12 +115,12 @@ def read_lines(path: Path, block: bytes, layout: Layout, columns: Sequence[int],
         A line holds numbers but not the wanted ones, or names other columns than the header.
     """
     if is_plain(block, layout):
-        if len(block) > LARGE and (rows := _read_by_pyarrow(block, layout, columns)) is not None:
-            return Rows(rows, 0, 0)
+        if len(block) > BYTES_FOR_PYARROW and (rows := _read_by_pyarrow(block, layout, columns)) is not None:
+            return TextRows(rows, 0, 0)
         lines = block.replace(b",", b".") if layout.comma else block
         try:
             rows = np.loadtxt(BytesIO(lines), delimiter=layout.separator, usecols=columns, encoding="latin-1", ndmin=2)
-            return Rows(rows, 0, 0)
+            return TextRows(rows, 0, 0)
         except ValueError:
             pass
     encoding = "latin-1" if layout.encoding == "latin-1" else "utf-8"
@@ -193,14 +188,14 @@ def _lines_before(path: Path, layout: Layout, end: int) -> int:
     """Return how many lines of a file end before a byte."""
     count = 0
     with path.open("rb") as file:
-        while raw := file.read(min(BYTES_PER_BLOCK, end - file.tell())):
+        while raw := file.read(min(TEXT_BYTES_PER_BLOCK, end - file.tell())):
             count += raw.count(b"\n")
     return max(count, layout.skip)  # the skipped ones may end with CR
 
 
 def read_ragged(
     path: Path, lines: Sequence[str], layout: Layout, columns: Sequence[int], count_before: Callable[[], int]
-) -> Rows:
+) -> TextRows:
     """Return the columns of lines that no faster reader can handle; see `read_lines`."""
     values, promised, empty = array("d"), 0, 0
     names: _Names | None = None
@@ -228,7 +223,7 @@ def read_ragged(
             empty += 1
     if names and not names.in_comment:  # its points are in the next block
         _check_names(path, names, names.names, layout, count_before)
-    return Rows(np.array(values).reshape(-1, len(columns)), promised, empty)
+    return TextRows(np.array(values).reshape(-1, len(columns)), promised, empty)
 
 
 def _no_point(path: Path, layout: Layout, number: int, row: Sequence[str]) -> FormatError:

@@ -7,12 +7,12 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 
-ANY = "any"  # blanks, commas and semicolons in one line
+ANY_SEPARATOR = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 NUMBER_COMMA = re.compile(r"[+-]?(?:\d+(?:\.\d*|,\d+)?|[.,]\d+)(?:[eEdD][+-]?\d+)?")
 _BREAKS = re.compile(r"[,;|\s]+")
-MISSING = frozenset(
+MISSING_VALUES = frozenset(
     [
         *(sign + word for sign in ("", "+", "-") for word in ("nan", "nan(ind)", "inf", "infinity")),
         *(sign + word for sign in ("", "-") for word in ("1.#qnan", "1.#ind", "1.#inf")),
@@ -32,7 +32,7 @@ def split_fields(text: str, separator: str | None) -> list[str]:
     """Return the fields of a text, without blanks and quotes around them; [] for an empty text."""
     if not text:
         return []
-    if separator == ANY:
+    if separator == ANY_SEPARATOR:
         fields = re.split(r"[,;\s]+", text.strip(" ,;\t"))
     elif separator is None:
         fields = text.split()
@@ -66,7 +66,7 @@ def number_of(field: str, comma: bool) -> float:
 
 def _is_missing(field: str) -> bool:
     """Whether a field is a word for a missing number, or the stars of a number too wide for its column."""
-    return field.lower() in MISSING or (len(field) > 1 and not field.strip("*"))
+    return field.lower() in MISSING_VALUES or (len(field) > 1 and not field.strip("*"))
 
 
 def count_numbers(row: Sequence[str], comma: bool) -> int:
@@ -86,5 +86,5 @@ def header_names(header: Sequence[str], separator: str | None) -> Iterator[list[
     """Yield the header lines split by every separator in turn, the line nearest to the points first."""
     for line in reversed(header):
         text = line.strip().lstrip("#/%!;* \t").strip()
-        for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY)):
+        for sign in dict.fromkeys((separator, ",", ";", "\t", None, ANY_SEPARATOR)):
             yield split_fields(text, sign)

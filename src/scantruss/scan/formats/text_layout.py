@@ -14,10 +14,10 @@ from ...errors import FormatError
 from ..units import metres_of_columns, metres_of_comments
 from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
-from .text_fields import ANY, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
+from .text_fields import ANY_SEPARATOR, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
 
-BYTES_LOOKED_AT = 1 << 16  # bytes examined at the start and in the middle
-LINES = 1000  # lines examined in each part
+BYTES_EXAMINED = 1 << 16  # bytes examined at the start and in the middle
+LINES_EXAMINED = 1000  # lines examined in each part
 BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
 LINE_BREAK = re.compile(r"\r\n|\n|\r")
 THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
@@ -29,7 +29,7 @@ GRAMMARS: tuple[tuple[str | None, bool], ...] = (
     (None, False),
     (None, True),
     (",", True),  # "1,5","2,5","3,5"
-    (ANY, False),
+    (ANY_SEPARATOR, False),
 )
 _REFUSED = ("a PLY file", "an STL file", "an OFF file", "an OBJ file", "a PCD file", "a web page", "an XML file")
 
@@ -39,7 +39,7 @@ class Layout:
     """Where the coordinates of a text file are."""
 
     encoding: str
-    separator: str | None  #: one character, None for blanks, or ANY
+    separator: str | None  #: one character, None for blanks, or ANY_SEPARATOR
     comma: bool  #: a comma may be the decimal sign
     skip: int  #: lines before the first point
     columns: tuple[int, ...]  #: x, y, z; or four columns of which the first may be a running number
@@ -54,7 +54,7 @@ class Layout:
     @property
     def plain(self) -> bool:
         """Whether numbers are separated by one character that is not also the decimal sign."""
-        return self.separator != ANY and not (self.separator == "," and self.comma)
+        return self.separator != ANY_SEPARATOR and not (self.separator == "," and self.comma)
 
     @property
     def has_unnamed_first(self) -> bool:
@@ -68,12 +68,14 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     kind = kind_of(head)
     if not is_text(head) or kind in _REFUSED or kind.startswith("a raster"):
         raise wrong_kind(path, head, "a text file of points")
-    encoding = _encoding(head)
+    encoding = "utf-8-sig" if head.startswith(BOM) else "latin-1"
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
     start, middle = _parts(path, encoding)
-    start, middle = start[:LINES], middle[:LINES]
-    rows = [row for row in start + middle if split_line(row, ANY)]
+    start, middle = start[:LINES_EXAMINED], middle[:LINES_EXAMINED]
+    rows = [row for row in start + middle if split_line(row, ANY_SEPARATOR)]
     separator, comma = _find_grammar(rows)
-    if separator == ANY:
+    if separator == ANY_SEPARATOR:
         _check_not_grouped(path, rows)
     if (separator, comma) == (",", True):
         _check_not_thousands(path, rows)
@@ -107,22 +109,16 @@ def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequ
     return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=stripped)
 
 
-def _encoding(head: bytes) -> str:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    return "utf-8-sig" if head.startswith(BOM) else "latin-1"
-
-
 def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
     """Return the whole lines of the first part of a file and of a part in its middle."""
     size = path.stat().st_size
     with path.open("rb") as file:
-        raw = file.read(BYTES_LOOKED_AT)
+        raw = file.read(BYTES_EXAMINED)
         file.seek(size // 2)
-        later = file.read(BYTES_LOOKED_AT // 4) if size > 2 * BYTES_LOOKED_AT and encoding != "utf-16" else b""
+        later = file.read(BYTES_EXAMINED // 4) if size > 2 * BYTES_EXAMINED and encoding != "utf-16" else b""
     start = LINE_BREAK.split(raw.decode(encoding, errors="replace"))
     middle = LINE_BREAK.split(later.decode("latin-1"))[1:-1]
-    return (start[:-1] if size > BYTES_LOOKED_AT and len(start) > 1 else start), middle
+    return (start[:-1] if size > BYTES_EXAMINED and len(start) > 1 else start), middle
 
 
 def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
@@ -168,7 +164,7 @@ def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
 def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:
     """Refuse points above the first line with the usual separator: with another one they would be taken for a header."""
     for number, line in enumerate(header, start=1):
-        fields = split_line(line, ANY)
+        fields = split_line(line, ANY_SEPARATOR)
         if len(fields) >= 3 > count_numbers(split_line(line, separator), comma) and all(
             is_number(field, False) for field in fields
         ):

@@ -27,14 +27,12 @@ def write_points(
 
     Parameters
     ----------
-    path : str or Path
-        One of the suffixes in `WRITERS`; `check_cloud_output` says beforehand whether it can be.
+    path : one of the suffixes in `WRITERS`; `check_cloud_output` says beforehand whether it can be
     points : (N, 3) array [unit]
         In the scan's own frame. Doubles are written exactly, in LAS and LAZ to less than a thousandth of the spacing.
     normals : (N, 3) array, optional
         Kept by all formats.
-    unit : str
-        Written if the format can hold it; text files hold it in their column names (CSV) or in a comment.
+    unit : written if the format can hold it; text files hold it in their column names (CSV) or in a comment
     origin : (3,) array, optional
         A place near the points, from which LAS counts.
 

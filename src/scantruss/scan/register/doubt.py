@@ -18,13 +18,13 @@ from .graph import Group, apart, links_of
 from .pairs import Pair, find_pair, judge_views, settled_from
 from .poses import move, small_motion, turn_by
 from .scans import Scan
-from .views import boxes_of, make_view
+from .views import boxes_around, make_view
 
 AS_GOOD = 0.03  # difference in agreement up to which another place is as good
 AS_CLOSE = 1.25  # largest residual there, over the present one
 AS_MUCH = 0.2  # least share of the places that agree now which must agree there
-LEAST = 0.08  # ... and of all places of the scan
-ELSEWHERE = 1.5  # distance beyond which a place is another one [coarse spacings]
+LEAST_OF_ALL = 0.08  # least share of all places of the scan which must agree there
+OTHER_PLACE_DISTANCE = 1.5  # distance beyond which a place is another one [coarse spacings]
 FEWEST_SCANS = 3  # fewest scans that can decide between several ways
 PUSH = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]
 
@@ -84,10 +84,10 @@ def _fits_elsewhere(scans: list[Scan], group: Group, i: int) -> bool:
     def is_rival(pair: Pair) -> bool:
         fit = pair.fit
         return (
-            apart(pair.pose, pose, scan.coarse) > ELSEWHERE * scan.coarse.spacing
+            apart(pair.pose, pose, scan.coarse) > OTHER_PLACE_DISTANCE * scan.coarse.spacing
             and fit.agreement > now.agreement - AS_GOOD
             and fit.residual < AS_CLOSE * now.residual
-            and fit.agreeing > max(AS_MUCH * now.agreeing, 2.0 * LEAST * len(scan.middle.points))
+            and fit.agreeing > max(AS_MUCH * now.agreeing, 2.0 * LEAST_OF_ALL * len(scan.middle.points))
         )
 
     for pushed in _pushed(scan, pose):
@@ -103,7 +103,7 @@ def _all_but(scans: list[Scan], group: Group, i: int) -> Scan:
     coarse = np.concatenate([move(group.poses[j], scans[j].coarse.points) for j in members])
     normals = np.concatenate([group.turns[j] * turn_by(group.poses[j], scans[j].coarse.normals) for j in members])
     spacing = scans[i].coarse.spacing
-    facing = replace(scans[i].coarse, points=coarse, normals=normals, boxes=boxes_of(coarse, 1.5 * spacing))
+    facing = replace(scans[i].coarse, points=coarse, normals=normals, boxes=boxes_around(coarse, 1.5 * spacing))
     points = np.concatenate([move(group.poses[j], scans[j].fine.points) for j in members])
     wide = make_view(points, spacing, facing)
     middle = replace(make_view(points, scans[i].middle.spacing, facing), strict=scans[i].middle.strict)

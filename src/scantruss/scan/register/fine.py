@@ -1,4 +1,4 @@
-"""Fine alignment: generalized ICP of one scan onto another, and how a right pose is told from a wrong one."""
+"""Fine alignment: generalized ICP of one scan onto another, and how a right pose differs from a wrong one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ from ...kernels.scan import overlap as kernels
 from .poses import invert, small_motion
 from .views import View
 
-SHARP = 1000.0  # stiffness across the surface over that along it
+PLANE_STIFFNESS = 1000.0  # stiffness across the surface over that along it
 MOST_STEPS = 10  # most steps with one reach
-STILL = 5e-3  # a step that moves no place farther than this share of the spacing is the last
-AGREEING_DISTANCE = 0.5  # distance across the surface within which two scans agree, in spacings
-DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond they may be two sides of a body
+LAST_STEP = 5e-3  # a step that moves no place farther than this share of the spacing is the last
 DAMPING = 1e-6  # share of the stiffness added, so that directions that slide freely stay at rest
 
 
@@ -72,9 +70,9 @@ def align(
             count = add_pairs(sums, first, second, pose, np.eye(4), turn, reach, centre, every)
             if count < 6:
                 return pose
-            step = solve(sums[:6, :6], sums[:6, 6], 0.5 * size)
+            step = solve_step(sums[:6, :6], sums[:6, 6], 0.5 * size)
             pose = small_motion(step[:3], step[3:], centre[0]) @ pose
-            if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < STILL * first.spacing:
+            if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < LAST_STEP * first.spacing:
                 break
     return pose
 
@@ -101,7 +99,7 @@ def add_pairs(
         count += kernels.step_sums(
             a.points, a.normals, a.on_boundary, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(one), np.ascontiguousarray(invert(other) @ one),
-            turn, every, reach, soft, SHARP, centre, part,
+            turn, every, reach, soft, PLANE_STIFFNESS, centre, part,
         )  # fmt: skip
         part[6, :6] *= sign
         part[:6, 6] *= sign
@@ -109,7 +107,7 @@ def add_pairs(
     return count
 
 
-def solve(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
+def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarray:
     """Return the step (6 K,) that removes the residual, rotations [radian] before translations; what slides freely stays.
 
     arm : length that makes rotations comparable to translations [scan unit]

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .fine import Fit, add_pairs, judge, solve
+from .fine import Fit, add_pairs, judge, solve_step
 from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
 from .scans import Scan
 from .views import View
 
-SURE = 0.88  # agreement of two groups at which they belong together
+SURE_AGREEMENT = 0.88  # agreement of two groups at which they belong together
 AGREEING_SHARE = 0.08  # share of the smaller group's places that must agree
 CONTRADICTION = 0.6  # agreement of two overlapping scans below which they contradict a pair of groups
 CONTRADICTED = 0.08  # least share of the places of the smaller one for that to count
@@ -46,9 +46,8 @@ def assemble(
     """
     group_of = {i: Group([i], {i: np.eye(4)}, {i: 1.0}) for i in range(len(scans))}
     waiting = sorted(pairs, key=lambda pair: (-pair.fit.score, pair.first, pair.second))
-    tried: dict[
-        tuple[int, ...], bool
-    ] = {}  # pairs of groups that could not be joined, and whether because of too many ways
+    # pairs of groups that could not be joined, and whether because of too many ways
+    tried: dict[tuple[int, ...], bool] = {}
     at = 0
     while at < len(waiting):
         progress("assemble", 1.0 - len({id(group) for group in group_of.values()}) / len(scans))
@@ -132,7 +131,7 @@ def _join(scans: list[Scan], one: Group, other: Group, pair: Pair) -> tuple[Fit,
     whole = Group(sorted(one.members + other.members), poses, turns)
     if _fit_between(scans, whole, one, other, loose=True) is None:
         return None
-    settle(scans, whole, [scan.middle for scan in scans], (2.0, 1.0), steps=4)
+    settle_poses(scans, whole, [scan.middle for scan in scans], (2.0, 1.0), steps=4)
     fit = _fit_between(scans, whole, one, other, loose=False)
     return None if fit is None else (fit, whole)
 
@@ -157,7 +156,7 @@ def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, l
     smaller = min(
         sum(len(scans[i].middle.points) for i in group.members) / len(group.members) for group in (one, other)
     )
-    if agreeing <= 2.0 * AGREEING_SHARE * smaller or all_of_them.agreement < (0.6 if loose else SURE):
+    if agreeing <= 2.0 * AGREEING_SHARE * smaller or all_of_them.agreement < (0.6 if loose else SURE_AGREEMENT):
         return None
     return all_of_them
 
@@ -193,7 +192,7 @@ def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:
     return found
 
 
-def settle(
+def settle_poses(
     scans: list[Scan],
     group: Group,
     views: list[View],
@@ -260,5 +259,5 @@ def _step(
         load[q] -= sums[:6, 6]
     moves = np.zeros((count, 6))
     if count > 1:
-        moves[1:] = solve(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)
+        moves[1:] = solve_step(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)
     return moves

@@ -12,22 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .features import flip
+from .features import features_from_behind
 from .poses import make_pose, move, turn_by
 from .views import View
 
 ALIKE_PLACES = 3  # most similar places of the other scan for each place
 MOST_PAIRS = 800  # most pairs of similar places
 DISTANCE_TOLERANCE = 1.2  # largest difference of distances of two agreeing pairs, in spacings
-ANGLE = 0.30  # the same for the cosines of the normals
+COSINE_TOLERANCE = 0.30  # largest difference of the cosines between normals of two agreeing pairs
 PAIR_DISTANCE = 3.0  # least distance between the places of two agreeing pairs, in spacings
-SEEDS = 60  # groups that become candidates
-GROUP = 24  # pairs in a group
+GROUPS_KEPT = 60  # groups that become candidates
+PAIRS_IN_GROUP = 24  # pairs in a group
 FEWEST_PAIRS = 5  # fewest pairs of a group that count
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class LikelyPose:
     """A pose that may bring a scan onto another."""
 
     pose: np.ndarray  #: (4, 4) from the frame of the first scan to that of the second
@@ -37,14 +37,14 @@ class Candidate:
 
 def find_candidates(
     first: View, second: View, first_features: np.ndarray, second_features: np.ndarray, turn: float, most: int
-) -> list[Candidate]:
+) -> list[LikelyPose]:
     """Return up to `most` different candidates, those with most support first.
 
     Parameters
     ----------
     turn : 1, or -1 if the normals of the two views are taken to face opposite sides
     """
-    features = first_features if turn > 0 else flip(first_features)
+    features = first_features if turn > 0 else features_from_behind(first_features)
     pairs = _alike(features, second_features)
     if len(pairs) < FEWEST_PAIRS:
         return []
@@ -78,21 +78,21 @@ def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return kept
 
 
-def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> list[Candidate]:
+def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> list[LikelyPose]:
     """Return the candidates that groups of agreeing pairs give."""
     p, n = first.points[pairs[:, 0]], turn * first.normals[pairs[:, 0]]
     q, m = second.points[pairs[:, 1]], second.normals[pairs[:, 1]]
     agree = _agree(p, n, q, m, first.spacing)
     shared = agree * (agree @ agree)
     weight = shared.sum(axis=1)
-    found: list[Candidate] = []
+    found: list[LikelyPose] = []
     free = np.ones(len(pairs), bool)
     for seed in np.argsort(-weight, kind="stable"):
-        if len(found) >= SEEDS or weight[seed] <= 0.0:
+        if len(found) >= GROUPS_KEPT or weight[seed] <= 0.0:
             break
         if not free[seed]:
             continue
-        group = np.argsort(-shared[seed], kind="stable")[:GROUP]
+        group = np.argsort(-shared[seed], kind="stable")[:PAIRS_IN_GROUP]
         group = np.append(group[shared[seed, group] > 0.0], seed)
         if len(group) < FEWEST_PAIRS:
             continue
@@ -106,7 +106,7 @@ def _from_pairs(first: View, second: View, pairs: np.ndarray, turn: float) -> li
                 break
             group = np.flatnonzero(inside)
         if inside.sum() >= FEWEST_PAIRS:
-            found.append(Candidate(pose, turn, int(inside.sum())))
+            found.append(LikelyPose(pose, turn, int(inside.sum())))
             free[inside] = False
         free[seed] = False
     return found
@@ -118,7 +118,7 @@ def _agree(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray, spacing: 
     length = one[0]
     agree = (np.abs(length - two[0]) < DISTANCE_TOLERANCE * spacing) & (length > PAIR_DISTANCE * spacing)
     for a, b in zip(one[1:], two[1:], strict=True):
-        agree &= np.abs(a - b) < ANGLE
+        agree &= np.abs(a - b) < COSINE_TOLERANCE
     agree &= agree.T
     return agree.astype(np.float32)
 
@@ -151,10 +151,10 @@ def _products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a[:, :, None] * b[:, None, :]).sum(axis=0)
 
 
-def _different(found: list[Candidate], view: View, most: int) -> list[Candidate]:
+def _different(found: list[LikelyPose], view: View, most: int) -> list[LikelyPose]:
     """Return the first `most` candidates with different poses."""
     corners = _corners(view.points)
-    kept: list[Candidate] = []
+    kept: list[LikelyPose] = []
     places: list[np.ndarray] = []
     for candidate in found:
         place = move(candidate.pose, corners)

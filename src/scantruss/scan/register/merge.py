@@ -15,10 +15,10 @@ from ...kernels.scan import blend as kernels
 from .graph import Group
 from .poses import invert, move
 from .scans import Scan
-from .views import View, boxes_of
+from .views import View, boxes_around
 
 DEEPEST_INSIDE = 20.0  # depth inside a scan beyond which it makes no difference, in spacings
-FULL = 6.0  # depth beyond which a layer has its full weight
+FULL_DEPTH = 6.0  # depth beyond which a layer has its full weight
 SEEN_REACH = 2.2  # reach in which a scan sees a point, in spacings
 SAME_LAYER = 2.0  # distance across the surface up to which two layers are the same, in spacings
 
@@ -42,7 +42,7 @@ def _depth(view: View) -> np.ndarray:
     boundary_points = np.ascontiguousarray(view.points[view.on_boundary])
     depth = np.full(len(view.points), most)
     if len(boundary_points):
-        kernels.depths(view.points, boundary_points, boxes_of(boundary_points, 0.5 * most), most, depth)
+        kernels.depths(view.points, boundary_points, boxes_around(boundary_points, 0.5 * most), most, depth)
     return depth
 
 
@@ -50,7 +50,7 @@ def _points_of(scans: list[Scan], group: Group, i: int, depth: dict[int, np.ndar
     """Return the points that scan i contributes, moved to the mean layer, in the frame of the group."""
     points, view = scans[i].cloud.points, scans[i].fine
     own, deep = np.empty(len(points), np.int64), np.empty(len(points))
-    beside, full = SEEN_REACH * view.spacing, FULL * view.spacing
+    beside, full = SEEN_REACH * view.spacing, FULL_DEPTH * view.spacing
     kernels.own_places(points, view.points, view.boxes, depth[i], beside, own, deep)
     shift, weight = np.zeros_like(points), np.minimum(deep / full, 1.0)
     kept = np.ones(len(points), np.int64)

@@ -15,21 +15,23 @@ from .matching import find_candidates
 from .scans import Scan
 from .views import View
 
-CANDIDATES = 40  # poses from the features that are judged without alignment
-ALIGNED = 10  # the best of them, which are aligned
-TRIED = 4  # the best of these, which are aligned closely
-WORSE = 0.2  # least score of those, as a share of the best
+POSES_JUDGED = 40  # poses from the features that are judged without alignment
+POSES_ALIGNED = 10  # poses that are aligned, the best of those
+POSES_REFINED = 4  # poses that are aligned closely, the best of these
+LEAST_SCORE_SHARE = 0.2  # least score of a pose that is aligned closely, as a share of the best
 PLACES_FOR_ALIGNMENT = 800  # places of a scan that suffice to align it
-KEPT = 3  # poses of a pair that are handed on
-GOOD = 0.9  # agreement above which the other side of the normals is not tried
-BULGE = 0.6  # certainty that normals face outwards above which the other side is not tried
+POSES_KEPT = 3  # poses of a pair that are handed on
+GOOD_AGREEMENT = 0.9  # agreement above which the other side of the normals is not tried
+SURE_SIDE = 0.6  # certainty that normals face outwards above which the other side is not tried
 LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
-AGREEMENT = 0.6  # agreement below which it is not
-NOISE = 3.0  # distance within which two scans agree, in the noise of both together
-LEAST = 0.15  # least such distance, in spacings of the view; scanners distort slightly
-LARGEST_OVERLAP = 0.5  # the largest
-WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
-STRICTEST = 0.35  # least share to which that reduces the distance
+LEAST_AGREEMENT = 0.6  # agreement below which a pair is not considered
+NOISES_WITHIN = 3.0  # distance within which two scans agree, in the noise of both together
+LEAST_AGREEING_DISTANCE = (
+    0.15  # least distance within which two scans agree, in spacings of the view; scanners distort slightly
+)
+LARGEST_AGREEING_DISTANCE = 0.5  # largest distance within which two scans agree, in spacings of the view
+RESIDUALS_WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
+LEAST_DISTANCE_SHARE = 0.35  # least share of their usual distance to which the residuals reduce it
 DISAGREEING_DISTANCE = 3.0  # distance up to which they disagree, in spacings; beyond, they may be two sides of a body
 
 
@@ -46,8 +48,10 @@ class Pair:
 
 def nearness(first: View, second: View) -> float:
     """Return the distance across the surface within which two scans agree [scan unit]."""
-    noise = NOISE * math.hypot(first.noise, second.noise)
-    return min(max(noise, LEAST * first.spacing), LARGEST_OVERLAP * first.spacing) * min(first.strict, second.strict)
+    noise = NOISES_WITHIN * math.hypot(first.noise, second.noise)
+    return min(max(noise, LEAST_AGREEING_DISTANCE * first.spacing), LARGEST_AGREEING_DISTANCE * first.spacing) * min(
+        first.strict, second.strict
+    )
 
 
 def judge_views(first: View, second: View, pose: np.ndarray, turn: float) -> Fit:
@@ -61,7 +65,7 @@ def find_pairs(
     wanted: Iterable[tuple[int, int]],
     progress: Callable[[str, float], None],
 ) -> list[Pair]:
-    """Return the plausible pairs, up to `KEPT` for two scans; `wanted` selects the two."""
+    """Return the plausible pairs, up to `POSES_KEPT` for two scans; `wanted` selects the two."""
     todo = list(wanted)
     found: list[Pair] = []
     pool = ThreadPoolExecutor(processors())
@@ -84,17 +88,20 @@ def find_pair(
     """
     one, other = scans[first], scans[second]
     found: list[Pair] = []
-    sure = not thorough and min(one.coarse.bulge, other.coarse.bulge) > BULGE  # then the normals of both face outside
+    # then the normals of both face outside
+    sure = not thorough and min(one.coarse.bulge, other.coarse.bulge) > SURE_SIDE
     for turn in (1.0,) if sure else (1.0, -1.0):
-        candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, CANDIDATES)
-        poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:ALIGNED]
+        candidates = find_candidates(one.coarse, other.coarse, features[first], features[second], turn, POSES_JUDGED)
+        poses = _best(one, other, [candidate.pose for candidate in candidates], turn, 0.8)[:POSES_ALIGNED]
         poses = [_roughly(one, other, pose, turn) for pose in poses]
-        for pose in _best(one, other, poses, turn, 0.35)[: None if thorough else TRIED]:
+        for pose in _best(one, other, poses, turn, 0.35)[: None if thorough else POSES_REFINED]:
             found += closer(one, other, first, second, pose, turn)
-        if not thorough and any(pair.fit.agreement > GOOD and pair.fit.share > 3.0 * LEAST_OVERLAP for pair in found):
+        if not thorough and any(
+            pair.fit.agreement > GOOD_AGREEMENT and pair.fit.share > 3.0 * LEAST_OVERLAP for pair in found
+        ):
             break
     found.sort(key=lambda pair: -pair.fit.score)
-    return _different(found, one.coarse)[: None if thorough else KEPT]
+    return _different(found, one.coarse)[: None if thorough else POSES_KEPT]
 
 
 def _roughly(one: Scan, other: Scan, pose: np.ndarray, turn: float) -> np.ndarray:
@@ -116,7 +123,7 @@ def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: fl
         for pose in poses
     ]
     order = sorted(range(len(poses)), key=lambda k: -scores[k])
-    return [poses[k] for k in order if scores[k] > WORSE * scores[order[0]]]
+    return [poses[k] for k in order if scores[k] > LEAST_SCORE_SHARE * scores[order[0]]]
 
 
 def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
@@ -130,7 +137,7 @@ def with_strictness(scans: list[Scan], pairs: list[Pair]) -> list[Scan]:
             for k in (pair.first, pair.second):
                 best[k] = max(best.get(k, (0.0, 0.0)), (pair.fit.score, pair.fit.residual / pair.fit.near))
     ratios = sorted(ratio for _, ratio in best.values())
-    strict = min(max(WITHIN * ratios[(len(ratios) - 1) // 3], STRICTEST), 1.0) if ratios else 1.0
+    strict = min(max(RESIDUALS_WITHIN * ratios[(len(ratios) - 1) // 3], LEAST_DISTANCE_SHARE), 1.0) if ratios else 1.0
     return [replace(scan, middle=replace(scan.middle, strict=strict)) for scan in scans]
 
 
@@ -139,7 +146,7 @@ def rejudge(pairs: list[Pair], scans: list[Scan]) -> list[Pair]:
     found = []
     for pair in pairs:
         fit = judge_views(scans[pair.first].middle, scans[pair.second].middle, pair.pose, pair.turn)
-        if fit.share >= LEAST_OVERLAP and fit.agreement >= AGREEMENT:
+        if fit.share >= LEAST_OVERLAP and fit.agreement >= LEAST_AGREEMENT:
             found.append(replace(pair, fit=fit))
     return found
 
@@ -149,7 +156,7 @@ def closer(one: Scan, other: Scan, first: int, second: int, pose: np.ndarray, tu
     reach = one.middle.spacing
     pose = align(one.middle, other.middle, pose, turn, (2.0 * reach, reach), 2 * PLACES_FOR_ALIGNMENT)
     fit = judge_views(one.middle, other.middle, pose, turn)
-    if fit.share < LEAST_OVERLAP or fit.agreement < AGREEMENT:
+    if fit.share < LEAST_OVERLAP or fit.agreement < LEAST_AGREEMENT:
         return []
     return [Pair(first, second, pose, turn, fit)]
 

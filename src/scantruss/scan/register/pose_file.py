@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,8 +67,3 @@ def pose_values(pose: np.ndarray) -> dict[str, Any]:
         "quaternion": [float(value) for value in quaternion_of(pose)],
         "translation": [float(value) for value in pose[:3, 3]],
     }
-
-
-def poses_for(names: Sequence[str], poses: dict[str, np.ndarray]) -> list[np.ndarray | None]:
-    """Return the pose of each scan, found by the name given or by its last part; None if there is none."""
-    return [poses.get(name, poses.get(Path(name).name)) for name in names]

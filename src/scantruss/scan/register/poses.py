@@ -42,13 +42,6 @@ def small_motion(turning: np.ndarray, moving: np.ndarray, centre: np.ndarray) ->
     return make_pose(rotation, centre + moving - rotation @ centre)
 
 
-def angle_between(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the angle [degree] of the rotation between two poses."""
-    between = one[:3, :3].T @ other[:3, :3]
-    sine = np.linalg.norm(between - between.T) / np.sqrt(8.0)
-    return float(np.degrees(np.arctan2(sine, 0.5 * (np.trace(between) - 1.0))))
-
-
 def quaternion_of(pose: np.ndarray) -> np.ndarray:
     """Return the unit quaternion (x, y, z, w), w not negative, of the rotation of a pose."""
     r = pose[:3, :3]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -23,11 +24,10 @@ from .graph import (
     fit_of,
     links_of,
     pairs_as_they_lie,
-    settle,
+    settle_poses,
 )
 from .merge import merge_scans
 from .pairs import Pair, closer, find_pairs, rejudge, with_strictness
-from .pose_file import poses_for
 from .poses import invert, make_pose
 from .scans import Scan, prepare_scans
 
@@ -87,16 +87,12 @@ def splice_scans(
 
     Parameters
     ----------
-    clouds : sequence of PointCloud
-        Scans in frames of their own, in one unit, in any order.
-    names : sequence of str, optional
-        Their names, all different; by default those of the clouds.
+    clouds : scans in frames of their own, in one unit, in any order
+    names : their names, all different; by default those of the clouds; optional
     poses : mapping of str to (4, 4) array, optional
         Poses by name to start from, for all scans or some.
-    use_poses : bool
-        Take these poses as they are; all scans need one then.
-    progress : callable
-        Called with the stage and its share done, 0 to 1.
+    use_poses : take these poses as they are; all scans need one then
+    progress : called with the stage and its share done, 0 to 1
 
     Returns
     -------
@@ -109,13 +105,17 @@ def splice_scans(
         Fewer than two scans, or most of them fit nowhere.
     """
     names = _checked_names(clouds, names)
-    given = poses_for(names, dict(poses or {}))
+    poses = poses or {}
+    given = [poses.get(name, poses.get(Path(name).name)) for name in names]  # a pose is found by the last part too
     if use_poses and any(pose is None for pose in given):
         missing = ", ".join(name for name, pose in zip(names, given, strict=True) if pose is None)
         raise InputError(f"no pose is given for {missing}; a pose for every scan is needed to use them as they are")
     order = sorted(range(len(clouds)), key=lambda k: _digest(clouds[k]))
     scans = prepare_scans([clouds[k] for k in order], [names[k] for k in order], progress)
-    local = [_into_local(given[k], clouds[k]) for k in order]
+    own = [
+        pose if pose is None else pose @ make_pose(np.eye(3), c.origin) for pose, c in zip(given, clouds, strict=True)
+    ]
+    local = [own[k] for k in order]  # for points that count from the origin of their cloud
     doubtful: tuple[str, ...] = ()
     if use_poses:
         group = _as_given(scans, [pose for pose in local if pose is not None])
@@ -144,11 +144,6 @@ def _digest(cloud: PointCloud) -> bytes:
     return hashlib.sha256(cloud.points.tobytes() + cloud.origin.tobytes()).digest()
 
 
-def _into_local(pose: np.ndarray | None, cloud: PointCloud) -> np.ndarray | None:
-    """Return a pose for points that count from the origin of their cloud."""
-    return None if pose is None else pose @ make_pose(np.eye(3), cloud.origin)
-
-
 def _put_together(
     scans: list[Scan], names: list[str], given: list[np.ndarray | None], progress: Progress
 ) -> tuple[list[Scan], Group, tuple[str, ...]]:
@@ -169,8 +164,8 @@ def _put_together(
     doubtful |= elsewhere
     if 2 * len(group.members) <= len(scans):
         raise InputError(_why_not(scans, names, groups, doubtful))
-    settle(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
-    settle(
+    settle_poses(scans, group, [scan.middle for scan in scans], (1.5, 1.0), steps=12)
+    settle_poses(
         scans, group, [scan.fine for scan in scans], (2.0, 1.0, 1.0), steps=8, few=6000,
         progress=lambda share: progress("align", share),
     )  # fmt: skip
@@ -249,7 +244,8 @@ def _result(
         poses[scans[i].name] = make_pose(np.eye(3), origin) @ group.poses[i] @ local
     if not as_given:
         poses[scans[first].name] = np.eye(4)
-    scans = _judged_as_they_lie(scans, group)
+    scans = with_strictness(scans, [])  # from how the group agrees now: the same for poses found and given
+    scans = with_strictness(scans, pairs_as_they_lie(scans, group))
     links = {pair: fine_fit_of(scans, group, *pair) for pair in links_of(scans, group, against=as_given)}
     points, kept = merge_scans(scans, group, progress)
     whole = PointCloud.from_array(points, unit=scans[first].cloud.unit)
@@ -265,12 +261,6 @@ def _result(
         spacing=float(np.median([scan.cloud.spacing for scan in scans])),
         unit=scans[first].cloud.unit,
     )
-
-
-def _judged_as_they_lie(scans: list[Scan], group: Group) -> list[Scan]:
-    """Return the scans with a strictness from the agreement of a group: the same for poses found and given."""
-    scans = with_strictness(scans, [])
-    return with_strictness(scans, pairs_as_they_lie(scans, group))
 
 
 def _pair_fit(scans: list[Scan], names: list[str], pair: tuple[int, int], fit: Fit) -> PairFit:

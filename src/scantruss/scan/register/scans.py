@@ -11,14 +11,13 @@ from ..checks import bulk_of
 from ..cloud import PointCloud
 from .views import View, make_view
 
-PARTS = 75.0  # coarse spacings along the diagonal of a typical scan
-MIDDLE = 2.5  # middle spacings in a coarse one
-FINEST = 400.0  # most fine spacings along the diagonal of a typical scan
+COARSE_SPACINGS = 75.0  # coarse spacings along the diagonal of a typical scan
+MIDDLE_SPACINGS = 2.5  # middle spacings in a coarse one
+MOST_FINE_SPACINGS = 400.0  # most fine spacings along the diagonal of a typical scan
 FINE_SPACING = 1.2  # fine spacing, in distances between points
-COARSEST = 1.2  # least coarse spacing, in distances between points
-EVEN_GAP = (
-    1.4  # distance of the sixth neighbour in points as even as those of a range grid, in distances between points
-)
+LEAST_COARSE_SPACING = 1.2  # least coarse spacing, in distances between points
+# distance of the sixth neighbour in points as even as those of a range grid, in distances between points
+EVEN_GAP = 1.4
 FEWEST_PLACES = 60  # coarse places below which a scan is too small for features
 
 
@@ -53,9 +52,9 @@ def prepare_scans(
     """Return the scans with their views, all at the same three spacings."""
     diagonal = typical_diagonal(clouds)
     apart = float(np.median([max(cloud.spacing, cloud.gap / EVEN_GAP) for cloud in clouds]))
-    coarse = max(diagonal / PARTS, COARSEST * apart)
-    middle = max(coarse / MIDDLE, FINE_SPACING * apart)
-    fine = min(max(FINE_SPACING * apart, diagonal / FINEST), middle)
+    coarse = max(diagonal / COARSE_SPACINGS, LEAST_COARSE_SPACING * apart)
+    middle = max(coarse / MIDDLE_SPACINGS, FINE_SPACING * apart)
+    fine = min(max(FINE_SPACING * apart, diagonal / MOST_FINE_SPACINGS), middle)
     scans = []
     for place, (cloud, name) in enumerate(zip(clouds, names, strict=True)):
         progress("prepare", place / len(clouds))

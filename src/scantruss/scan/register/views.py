@@ -10,7 +10,7 @@ from ...kernels.geometry.boxes import SearchBoxes, new_boxes
 from ...kernels.scan import overlap as kernels_of_overlap
 from ...kernels.surface import normals as normal_kernels
 from ...kernels.surface import samples as kernels
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ...surface.linked_samples import samples_of_points
 from ..given_normals import NO_NORMALS
 from ..normals import face_one_side, mean_normals
@@ -18,7 +18,7 @@ from ..normals import face_one_side, mean_normals
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal
 FEWEST_NEIGHBORS = 5  # neighbours below which a place is left out, as it lies on no surface
 BOUNDARY_OFFSET = 0.32  # offset of the mean of its neighbours from a place at the boundary, as a share of their reach
-PIECE = 0.02  # least share of the places of a piece whose normals count for the side that it faces
+LEAST_PIECE_SHARE = 0.02  # least share of the places of a piece whose normals count for the side that it faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +49,12 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
     View
         Without the places that have too few neighbours to lie on a surface.
     """
-    places = thin(points, spacing)
-    neighbors = link(places, spacing)
+    places = thin_to_places(points, spacing)
+    neighbors = link_places(places, spacing)
     sound = neighbors[:, FEWEST_NEIGHBORS - 1] >= 0
     if not sound.all():
         places = np.ascontiguousarray(places[sound])
-        neighbors = link(places, spacing)
+        neighbors = link_places(places, spacing)
     normals, thickness = np.zeros_like(places), np.zeros(len(places))
     normal_kernels.sample_normals(places, neighbors, normals, thickness, 0, len(places))
     if coarse is None:
@@ -69,14 +69,14 @@ def make_view(points: np.ndarray, spacing: float, coarse: View | None = None) ->
         places,
         normals_around,
         aside > BOUNDARY_OFFSET,
-        boxes_of(places, 1.5 * spacing),
+        boxes_around(places, 1.5 * spacing),
         spacing,
         noise,
         abs(_bulge(places, normals_around)),
     )
 
 
-def thin(points: np.ndarray, spacing: float) -> np.ndarray:
+def thin_to_places(points: np.ndarray, spacing: float) -> np.ndarray:
     """Return places (S, 3) about one spacing apart: means of the points around the first of each neighbourhood."""
     owner, chosen, samples, boxes = samples_of_points(points, spacing)
     kernels_of_overlap.first_places(points, boxes, samples, spacing, owner)
@@ -87,7 +87,7 @@ def thin(points: np.ndarray, spacing: float) -> np.ndarray:
     return mean
 
 
-def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
+def boxes_around(points: np.ndarray, size: float) -> SearchBoxes:
     """Return search boxes that hold all points (N, 3)."""
     count = len(points)
     lower, upper = (points.min(axis=0), points.max(axis=0)) if count else (np.zeros(3), np.ones(3))
@@ -96,19 +96,15 @@ def boxes_of(points: np.ndarray, size: float) -> SearchBoxes:
     return boxes
 
 
-def link(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Return the nearest neighbours (N, AROUND) of each point within a few spacings, -1 where there are fewer."""
+def link_places(points: np.ndarray, spacing: float) -> np.ndarray:
+    """Return the nearest neighbours (N, NEIGHBORS_FOR_NORMAL) of each point within a few spacings, -1 where there are fewer."""
     neighbors = np.full((len(points), NEIGHBORS_FOR_NORMAL), -1, np.int64)
-    boxes = boxes_of(points, 2.2 * spacing)
-    in_parts(
-        len(points),
-        3000,
-        lambda _, begin, end: kernels.nearest_samples(
-            points, boxes, 2.2 * spacing, 3.3 * spacing, neighbors, NO_NORMALS, begin, end
-        ),
-    )
-    far = 3.3 * spacing  # the kernel searches farther if there are few; here those are outliers
-    off = np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
+    boxes = boxes_around(points, 2.2 * spacing)
+    near, far = 2.2 * spacing, 3.3 * spacing
+    run_in_parts(len(points), 3000, kernels.nearest_samples, points, boxes, near, far, neighbors, NO_NORMALS)
+    off = (
+        np.linalg.norm(points[neighbors] - points[:, None], axis=2) > far
+    )  # where there are few, it searches farther: outliers here
     neighbors[off] = -1
     return neighbors
 
@@ -119,7 +115,7 @@ def _face_as_seen(places: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
     counts = np.bincount(piece)
     sums = np.stack([np.bincount(piece, normals[:, c]) for c in range(3)], axis=1)
     sign = np.ones(len(counts))
-    votes = np.flatnonzero(counts >= PIECE * len(places))
+    votes = np.flatnonzero(counts >= LEAST_PIECE_SHARE * len(places))
     view = sums[np.argmax(counts)] if len(counts) else np.zeros(3)
     for _ in range(5):
         sign = np.where(sums @ view < 0.0, -1.0, 1.0)

@@ -9,24 +9,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...errors import FormatError, ScanTrussError
+from ...errors import FormatError
 from ...selection import Selection
 from ..formats.columns import find_attributes
 from ..formats.content import Content
-from ..formats.copc import Place
-from ..formats.kinds import unreadable
-from ..formats.las import check_count, fields_for, fields_of, records_near, take
+from ..formats.copc import WantedBox
+from ..formats.kinds import reading_as
+from ..formats.las import POINTS_PER_CHUNK, check_count, content_of_records, fields_for, fields_of, records_near
 from ..formats.reading import places_in_file, read_content, select
-from ..formats.text import EMPTY, NAME_IT, is_number_of_point, read_lines
+from ..formats.text import EMPTY_LINES, NAME_IT, is_number_of_point, read_lines
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from .source import Source, Tile
 
-POINTS_PER_CHUNK = 1_000_000  # points
+
 POINTS_DESCRIBED = 10_000  # points that are described if none is taken
-TEXT_BYTES_PER_BLOCK = 1 << 24  # bytes of text
+CHUNK_BYTES = 1 << 24  # bytes of text
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,10 @@ def read_chunks(
 
     Parameters
     ----------
-    tile : Tile
-        A part of a file.
-    reading : Reading, optional
-        Unit and selection; all points in the file's own unit by default.
-    size : int
-        Most points of a chunk, where the file can be read in chunks.
-    alone : bool
-        No other tile is read at the same time, so that a reader may use all processors.
+    tile : a part of a file
+    reading : unit and selection; all points in the file's own unit by default; optional
+    size : most points of a chunk, where the file can be read in chunks
+    alone : no other tile is read at the same time, so that a reader may use all processors
 
     Raises
     ------
@@ -110,34 +106,32 @@ def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Conte
     names = fields_of(reading.selection.needs)
     backend = (laspy.LazBackend.LazrsParallel,) if alone else (laspy.LazBackend.Lazrs,)
     begin, short = tile.begin, False
-    try:
-        with laspy.open(path, laz_backend=backend, decompression_selection=fields_for(names)) as file:
-            if near := records_near(path, file.header, _places_of(tile.source, reading), names, size):
-                yield from _near(tile.source, names, *near)
-                return
-            if begin:
-                file.seek(begin)
-            while begin < tile.end and not short:
-                expected = min(size, tile.end - begin)
-                record: Any = file.read_points(expected)
-                short = len(record) < expected
-                begin += len(record)
-                yield tile.source.said_of(take(record, names))
-    except (GeneratorExit, KeyboardInterrupt, ScanTrussError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
+    with (
+        reading_as(path, "LAS or LAZ"),
+        laspy.open(path, laz_backend=backend, decompression_selection=fields_for(names)) as file,
+    ):
+        if near := records_near(path, file.header, _places_of(tile.source, reading), names, size):
+            yield from _near(tile.source, names, *near)
+            return
+        if begin:
+            file.seek(begin)
+        while begin < tile.end and not short:
+            expected = min(size, tile.end - begin)
+            record: Any = file.read_points(expected)
+            short = len(record) < expected
+            begin += len(record)
+            yield tile.source.said_of(content_of_records(record, names))
     if short:
         check_count(path, tile.source.points, begin)
 
 
 def _near(source: Source, names: Sequence[str], records: Iterator[Any], unread: dict[str, int]) -> Iterator[Content]:
     for record in records:
-        yield replace(source.said_of(take(record, names)), unread=unread)
+        yield replace(source.said_of(content_of_records(record, names)), unread=unread)
         unread = {}
 
 
-def _places_of(source: Source, reading: Reading) -> list[Place]:
+def _places_of(source: Source, reading: Reading) -> list[WantedBox]:
     """Return the boxes around what is cropped in the unit of a file that may be COPC; none of others."""
     if not (source.in_one and reading.selection.crop):
         return []
@@ -192,7 +186,7 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
             file.seek(tile.begin - 1)
             file.readline()  # the rest of a line that belongs to the previous tile
         while (at := file.tell()) < tile.end:
-            block = file.read(min(TEXT_BYTES_PER_BLOCK, tile.end - at))
+            block = file.read(min(CHUNK_BYTES, tile.end - at))
             if not block.endswith(b"\n"):
                 block += file.readline()
             if block.strip():
@@ -205,5 +199,5 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
                         )
                     rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
-                left_out = {EMPTY: empty} if empty else {}
+                left_out = {EMPTY_LINES: empty} if empty else {}
                 yield source.said_of(Content(rows[:, :3], more, left_out=left_out))

@@ -10,8 +10,7 @@ from ...selection import Selection
 from ..formats.common_unit import to_common_unit
 from ..formats.content import Content
 from ..formats.las import note_on_heights
-from ..formats.paths import Source as Names
-from ..formats.paths import files_of
+from ..formats.paths import FileNames, files_of
 from ..formats.reading import check_systems, joint_notes
 from ..units import check_unit
 from .chunks import Reading
@@ -27,17 +26,14 @@ class OpenScan(NamedTuple):
     notes: tuple[str, ...]  #: notes on their units
 
 
-def open_scan(names: Names, unit: str = "", selection: Selection | None = None) -> OpenScan:
+def open_scan(names: FileNames, unit: str = "", selection: Selection | None = None) -> OpenScan:
     """Return the headers of the files of a scan, how their points are read, and notes on both.
 
     Parameters
     ----------
-    names : str, Path or several of them
-        Files or patterns.
-    unit : str
-        The unit given by the user.
-    selection : Selection, optional
-        Which points are taken; all by default.
+    names : files or patterns
+    unit : the unit given by the user
+    selection : which points are taken; all by default; optional
     """
     check_unit(unit)
     selection = selection or Selection()

@@ -12,21 +12,29 @@ from ...errors import FormatError, InputError
 from ...runtime.cluster import Workers
 from ...runtime.progress import Progress
 from ...selection import Selection
-from ..checks import extent_note, extent_of, joined
+from ..checks import extent_note, extent_of, joint_extent
 from ..formats.content import surplus_note
-from ..formats.paths import Source as Names
-from ..formats.paths import name_of_files
+from ..formats.paths import FileNames, name_of_files
 from ..formats.reading import add_counts, left_out_note
 from .chunks import Chunk, Reading, read_ahead, read_chunks
 from .opened import OpenScan, open_scan
 from .source import Source, Tile
-from .thinning import Nearest, Rows, Thinning, check_spacing, means_of, nearest_in, nearest_points, points_at_boundary
-from .tiles import TILE, tiles_of
+from .thinning import (
+    BoxRows,
+    Nearest,
+    Thinning,
+    check_spacing,
+    means_of,
+    nearest_in,
+    nearest_of_parts,
+    points_at_boundary,
+)
+from .tiles import POINTS_PER_TILE, tiles_of
 
-KEEP = ("mean", "nearest")
-SMALLEST = 500_000  # fewest points of a tile that are worth a worker
-FEWEST = 24  # fewest points of a surface
-TILES = 4  # for each worker at least, so that all end at about the same time
+KEEP_CHOICES = ("mean", "nearest")
+FEWEST_POINTS_OF_TILE = 500_000  # fewest points of a tile that are worth a worker
+FEWEST_POINTS_OF_SURFACE = 24  # fewest points of a surface
+TILES_PER_WORKER = 4  # for each worker at least, so that all end at about the same time
 
 
 @dataclass(frozen=True)
@@ -51,14 +59,14 @@ def check_enough(thinned: Thinned, spacing: float, option: str) -> None:
         Fewer points are left than a surface needs, of more that were read.
     """
     left, read = len(thinned.points), thinned.read - thinned.dropped
-    if left < FEWEST <= read:
+    if left < FEWEST_POINTS_OF_SURFACE <= read:
         raise InputError(
             f"{option} {spacing:g} leaves {left} of {read:,} points, too few for a surface; give a smaller spacing, in the unit of the scan"
         )
 
 
 def thin_scan(
-    names: Names,
+    names: FileNames,
     spacing: float,
     *,
     keep: str = "mean",
@@ -74,20 +82,14 @@ def thin_scan(
 
     Parameters
     ----------
-    names : str, Path or several of them
-        Files, or patterns as ``tiles/*.laz``; all in one frame.
-    spacing : float
-        Side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame.
-    keep : str
-        "mean" of the points in a box, or the one "nearest" to it (the scan is read twice).
-    boundary : bool
-        Also keep the outermost points of boxes at the boundary.
+    names : files, or patterns as ``tiles/*.laz``; all in one frame
+    spacing : side of a box [unit of the scan]; the boxes are a lattice through the zero of the scan's frame
+    keep : "mean" of the points in a box, or the one "nearest" to it (the scan is read twice)
+    boundary : also keep the outermost points of boxes at the boundary
     unit, selection
         As for `scan.formats.reading.read_points`: unit of the coordinates, and which points are taken.
-    workers : Workers, optional
-        The workers to use; this process by default.
-    progress : callable, optional
-        ``progress(stage, share)``.
+    workers : the workers to use; this process by default; optional
+    progress : ``progress(stage, share)``; optional
 
     Raises
     ------
@@ -111,15 +113,15 @@ def thin_open_scan(
 ) -> Thinned:
     """Return one point for each box of a scan whose headers are read; see `thin_scan`."""
     check_spacing(spacing)
-    if keep not in KEEP:
-        raise InputError(f"keep must be one of {' '.join(KEEP)}, got {keep!r}")
+    if keep not in KEEP_CHOICES:
+        raise InputError(f"keep must be one of {' '.join(KEEP_CHOICES)}, got {keep!r}")
     workers = workers or Workers()
     sources, reading, notes = scan
-    rows, summary = _all_rows(sources, reading, spacing, boundary, workers, Share(progress, "read", sources))
+    rows, summary = _all_rows(sources, reading, spacing, boundary, workers, ShareDone(progress, "read", sources))
     if rows.points == rows.dropped:
         raise _nothing(sources, rows, summary)
     if keep == "nearest":
-        chosen = _all_nearest(sources, reading, rows, spacing, workers, Share(progress, "read again", sources))
+        chosen = _all_nearest(sources, reading, rows, spacing, workers, ShareDone(progress, "read again", sources))
     else:
         chosen = means_of(rows.rows, spacing)
     added = points_at_boundary(rows, spacing) if boundary else chosen[:0]
@@ -128,7 +130,7 @@ def thin_open_scan(
     return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
 
 
-class Share:
+class ShareDone:
     """Report the share of points that are done."""
 
     def __init__(self, progress: Progress | None, stage: str, sources: Sequence[Source]) -> None:
@@ -161,13 +163,13 @@ class ReadSummary:
         self.left_out = add_counts([self.left_out, other.left_out])
         self.notes = (*self.notes, *other.notes)
         self.promised += other.promised
-        self.extent = joined(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
+        self.extent = joint_extent(self.extent, extent_of(other.points) if isinstance(other, Chunk) else other.extent)
         self.held = self.held or other.held
 
 
 def _all_rows(
-    sources: Sequence[Source], reading: Reading, spacing: float, boundary: bool, workers: Workers, report: Share
-) -> tuple[Rows, ReadSummary]:
+    sources: Sequence[Source], reading: Reading, spacing: float, boundary: bool, workers: Workers, report: ShareDone
+) -> tuple[BoxRows, ReadSummary]:
     """Return the boxes of all points that are taken."""
     thinning = Thinning(spacing, boundary=boundary)
     summary = {source.path.absolute(): ReadSummary() for source in sources}
@@ -222,10 +224,10 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
     """Return tiles for several workers, which may run on other machines."""
     there = [replace(source, path=source.path.absolute()) for source in sources]
     total = sum(source.points for source in sources)
-    return _Tiles(there, min(max(total // (TILES * workers.count), SMALLEST), TILE))
+    return _Tiles(there, min(max(total // (TILES_PER_WORKER * workers.count), FEWEST_POINTS_OF_TILE), POINTS_PER_TILE))
 
 
-def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, ReadSummary]:
+def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[BoxRows, ReadSummary]:
     """Return the boxes of a tile and what its chunks tell: the work of a worker."""
     reading, spacing, boundary = shared
     thinning, summary = Thinning(spacing, boundary=boundary), ReadSummary()
@@ -236,7 +238,7 @@ def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[Rows, Rea
 
 
 def _all_nearest(
-    sources: Sequence[Source], reading: Reading, rows: Rows, spacing: float, workers: Workers, report: Share
+    sources: Sequence[Source], reading: Reading, rows: BoxRows, spacing: float, workers: Workers, report: ShareDone
 ) -> np.ndarray:
     """Return the points nearest to the means of all boxes."""
     if workers.alone:
@@ -247,7 +249,7 @@ def _all_nearest(
                     report(chunk.read)
                     yield chunk.points
 
-        return nearest_points(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
+        return nearest_of_parts(len(rows.rows), [nearest_in(chunks(), rows.rows, spacing)])
     tiles = _tiles_for(sources, workers)
 
     def parts() -> Iterator[Nearest]:
@@ -255,7 +257,7 @@ def _all_nearest(
             report(tiles.taken[number].points)
             yield part
 
-    return nearest_points(len(rows.rows), parts())
+    return nearest_of_parts(len(rows.rows), parts())
 
 
 def _nearest_of(tile: Tile, shared: tuple[Reading, np.ndarray, float]) -> Nearest:
@@ -272,7 +274,7 @@ def _chunks_there(tile: Tile, reading: Reading) -> Iterator[Chunk]:
     return read_chunks(tile, reading, alone=False)
 
 
-def _nothing(sources: Sequence[Source], rows: Rows, summary: ReadSummary) -> Exception:
+def _nothing(sources: Sequence[Source], rows: BoxRows, summary: ReadSummary) -> Exception:
     """Return why there is no point to keep."""
     where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
     if rows.points or not summary.read:

@@ -20,12 +20,12 @@ from ...kernels.scan.thinning import (
     BoxTable,
     add_points,
     add_rows,
-    boundary_points,
+    choose_boundary_points,
     fill_slots,
     middles,
     take_nearest,
 )
-from ...runtime.parallel import in_parts
+from ...runtime.parallel import run_in_parts
 from ..checks import CAUSE
 
 FIRST_ROWS = 4096  # rows of a new table
@@ -33,7 +33,7 @@ GROWTH = 1.5  # factor by which a full table grows
 BOXES_PER_THREAD = 20_000  # fewest boxes that are worth a thread
 
 
-class Rows(NamedTuple):
+class BoxRows(NamedTuple):
     """The boxes of a part of a scan, in the order of their numbers; the result of a worker."""
 
     rows: np.ndarray  #: (C, 7) int64, see `BoxTable`
@@ -91,7 +91,7 @@ class Thinning:
             )
         self.points += len(points)
 
-    def add_rows(self, part: Rows) -> None:
+    def add_rows(self, part: BoxRows) -> None:
         """Add the boxes of another worker."""
         begin = 0
         while (begin := add_rows(self._table, part.rows, part.extremes, begin)) < len(part.rows):
@@ -114,14 +114,14 @@ class Thinning:
             fill_slots(slots, rows, count)
         self._table = BoxTable(slots, rows, extremes, counters)
 
-    def take_rows(self) -> Rows:
+    def take_rows(self) -> BoxRows:
         """Return all boxes sorted by their numbers i, j, k, the same for any order of the points; none are left here."""
         table, count = self._table, int(self._table.counters[ROWS])
         rows, extremes = table.rows[:count], table.extremes[:count]
         order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
         for column in (*rows.T, *extremes.T):  # in place: they may fill the memory
             column[:] = column[order] if len(column) else 0
-        found = Rows(rows, extremes, self.points, self.dropped)
+        found = BoxRows(rows, extremes, self.points, self.dropped)
         self._table, self.points = _new_table(FIRST_ROWS, self.boundary), 0
         return found
 
@@ -133,12 +133,9 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", bound
     ----------
     points : (N, 3) array [scan unit]
         In the frame whose zero is a corner of the boxes.
-    spacing : float
-        Side of a box [scan unit].
-    keep : str
-        "mean" of the points in a box, or the one "nearest" to it.
-    boundary : bool
-        Also keep the outermost points of boxes at the boundary.
+    spacing : side of a box [scan unit]
+    keep : "mean" of the points in a box, or the one "nearest" to it
+    boundary : also keep the outermost points of boxes at the boundary
     """
     thinning = Thinning(spacing, boundary=boundary)
     thinning.add(points)
@@ -146,7 +143,7 @@ def thin_points(points: np.ndarray, spacing: float, *, keep: str = "mean", bound
     chosen = means_of(rows.rows, spacing)
     if keep == "nearest":
         found = nearest_in([np.ascontiguousarray(points, np.float64)], rows.rows, spacing)
-        chosen = nearest_points(len(rows.rows), [found])
+        chosen = nearest_of_parts(len(rows.rows), [found])
     return np.concatenate([chosen, points_at_boundary(rows, spacing)]) if boundary else chosen
 
 
@@ -164,7 +161,7 @@ def means_of(rows: np.ndarray, spacing: float) -> np.ndarray:
     return means
 
 
-def points_at_boundary(rows: Rows, spacing: float) -> np.ndarray:
+def points_at_boundary(rows: BoxRows, spacing: float) -> np.ndarray:
     """Return the points that represent the boundary of the scan, each once, (R, 3) [scan unit].
 
     The mean of a box at the boundary lies up to half a box inside; its outermost points do not.
@@ -173,9 +170,7 @@ def points_at_boundary(rows: Rows, spacing: float) -> np.ndarray:
     counters = np.array([len(rows.rows), 0, 0])
     table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counters)
     means = means_of(rows.rows, spacing)
-    in_parts(
-        len(kept), BOXES_PER_THREAD, lambda _, begin, end: boundary_points(table, means, spacing, kept, begin, end)
-    )
+    run_in_parts(len(kept), BOXES_PER_THREAD, choose_boundary_points, table, means, spacing, kept)
     several = rows.rows[:, 3] > 1  # a single point is its own mean
     return np.unique(rows.extremes.reshape(-1, 6, 3)[kept.astype(bool) & several[:, None]], axis=0)
 
@@ -189,8 +184,7 @@ def nearest_in(chunks: Iterable[np.ndarray], rows: np.ndarray, spacing: float) -
         The part.
     rows : (C, 7) int64 array
         All boxes of the whole scan.
-    spacing : float
-        Side of a box [scan unit].
+    spacing : side of a box [scan unit]
     """
     best = np.full((len(rows), 4), np.inf)
     slots, means = _filled_slots(rows), means_of(rows, spacing)
@@ -200,7 +194,7 @@ def nearest_in(chunks: Iterable[np.ndarray], rows: np.ndarray, spacing: float) -
     return Nearest(found, best[found])
 
 
-def nearest_points(count: int, parts: Iterable[Nearest]) -> np.ndarray:
+def nearest_of_parts(count: int, parts: Iterable[Nearest]) -> np.ndarray:
     """Return the nearest point of each of `count` boxes, (count, 3), from those of the parts of a scan.
 
     Raises

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import FormatError
-from ..formats.columns import NAMES, find_attributes
-from ..formats.kinds import kind_of, read_head, unreadable, wrong_kind
+from ..formats.columns import COLUMN_NAMES, find_attributes
+from ..formats.kinds import kind_of, read_head, reading_as, wrong_kind
 from ..formats.las_header import LASZIP, check_header
 from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
 from ..formats.packed import unpacked
@@ -26,15 +26,15 @@ from ..formats.ply_header import PLY, read_header
 from ..formats.systems import system_of
 from ..formats.table import PACKED, READERS
 from ..formats.text import first_column_note, is_number_of_point, read_lines
-from ..formats.text_fields import ANY
+from ..formats.text_fields import ANY_SEPARATOR
 from ..formats.text_layout import Layout, find_layout
 from ..units import metres_of
 from .source import Source, Tile
 
-TILE = 8_000_000  # points of a tile
+POINTS_PER_TILE = 8_000_000  # points of a tile
 TEXT_POINT = 24  # bytes of a line of a text file, about, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
-BYTES_LOOKED_AT = 1 << 14  # bytes looked at, at the start, in the middle and at the end
+BYTES_SAMPLED = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
 TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
@@ -86,7 +86,7 @@ def _metres(path: Path) -> tuple[float | None, float | None]:
     return (1.0, 1.0) if suffix == ".e57" else (None, None)
 
 
-def tiles_of(sources: Sequence[Source], points: int = TILE) -> Iterator[Tile]:
+def tiles_of(sources: Sequence[Source], points: int = POINTS_PER_TILE) -> Iterator[Tile]:
     """Yield the tiles of some files, of about `points` points each."""
     for source in sources:
         if source.whole or source.in_one:
@@ -105,7 +105,7 @@ def _las(path: Path, head: bytes) -> Source:
         raise wrong_kind(path, head, "a LAS or LAZ file")
     import laspy
 
-    try:
+    with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
         with laspy.open(path) as file:
             header = file.header
@@ -121,10 +121,6 @@ def _las(path: Path, head: bytes) -> Source:
                 in_one=_has_uneven_chunks(header),
                 notes=notes,
             )
-    except (KeyboardInterrupt, FormatError):
-        raise
-    except BaseException as error:
-        raise unreadable(path, "LAS or LAZ", error) from None
 
 
 def _has_uneven_chunks(header: Any) -> bool:
@@ -162,7 +158,7 @@ def _npy(path: Path) -> Source | None:
     except Exception:  # a damaged header raises many kinds of errors; reading the file reports which
         return None
     if kind.names and len(shape) == 1 and {"x", "y", "z"} <= set(kind.names):
-        needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(NAMES)).values())]
+        needed = [*"xyz", *(kind.names[place] for place in find_attributes(kind.names, list(COLUMN_NAMES)).values())]
         if all(kind[name].kind in "fiu" and not kind[name].shape for name in needed):
             return _rows(path, shape[0], start, kind)
         return None
@@ -182,7 +178,7 @@ def _rows(path: Path, count: int, start: int, rows: np.dtype[np.void]) -> Source
 def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
     """Return a text file that can be entered at any line."""
     layout = find_layout(path, wanted)
-    if layout.encoding == "utf-16" or layout.separator == ANY or b"\r" in head.replace(b"\r\n", b""):
+    if layout.encoding == "utf-16" or layout.separator == ANY_SEPARATOR or b"\r" in head.replace(b"\r\n", b""):
         return None
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -217,13 +213,13 @@ def _text(path: Path, head: bytes, wanted: Sequence[str]) -> Source | None:
 def _first_column(path: Path, layout: Layout, start: int, size: int) -> list[np.ndarray]:
     """Return the first of the columns at the start, in the middle and at the end of a text."""
     parts, end = [], start
-    for place in (start, size // 2, size - BYTES_LOOKED_AT):
+    for place in (start, size // 2, size - BYTES_SAMPLED):
         with path.open("rb") as file:
             file.seek(max(place, end))
             if place > end:
                 file.readline()
             begin = file.tell()
-            lines = file.read(BYTES_LOOKED_AT) + file.readline()
+            lines = file.read(BYTES_SAMPLED) + file.readline()
             end = file.tell()
         if lines.strip():
             parts.append(read_lines(path, lines, layout, layout.columns, begin).rows[:, 0])
