@@ -79,7 +79,7 @@ def run() -> None:
     """Run the commands one after the other, in this process."""
     import numpy as np
 
-    from scantruss.cli.demo_files import SCAN
+    from scantruss.cli.demo_files import DEMOS
     from scantruss.cli.main import main
 
     rng = np.random.default_rng(1)
@@ -87,7 +87,7 @@ def run() -> None:
     x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
     np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + rng.normal(0.0, 0.02, len(x))]))
     for command in COMMANDS:
-        words = [word.format(bust=SCAN) for word in command.split()]
+        words = [word.format(bust=DEMOS["bust"].scan) for word in command.split()]
         if status := main(words):
             sys.exit(status)
 
