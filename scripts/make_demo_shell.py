@@ -130,7 +130,7 @@ def scan(seed: int = 7) -> np.ndarray:
         )  # none where it stands
         error[mixed] += rng.exponential(BEHIND, mixed.sum())
         parts.append(places[which] + rng.normal(0.0, STATION_NOISE, 3) + error[:, None] * ray)
-    return np.concatenate([*parts, rng.uniform(*AIR, (OUTLIERS, 3))])
+    return np.concatenate([*parts, rng.uniform(AIR[0], AIR[1], (OUTLIERS, 3))])
 
 
 def write_ply(points: np.ndarray, path: Path) -> None:

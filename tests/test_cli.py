@@ -566,7 +566,7 @@ def test_the_demo_makes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert report["topology"]["manifold"] and report["topology"]["orientable"]
     assert report["topology"]["boundary_loops"] == loops
     found = st.read_grid(tmp_path / "deep" / "demo" / "grid.json").certificate
-    assert found is not None and found.passed and found.missing < 0.001
+    assert found is not None and found.passed and found.missing < 0.005
     assert {part.kind for part in found.left_out} <= {"outliers"}
 
 
