@@ -47,7 +47,7 @@ SCANS: dict[str, Callable[[], np.ndarray]] = {
     "stadium.npy": lambda: make("stadium").points,
 }
 PICTURES = {
-    "shell": "grid {shell} shell.png --length 0.8 --effort best --view=-20,30",
+    "shell": "grid {shell} shell.png --length 1.2 --effort best --view=-20,30",
     "roof": "grid roof.npy roof.png --length 1.2 --unit m --effort best",
     "stadium": "grid stadium.npy stadium.png --length 3.9 --unit mm",
     "cloth": "grid cloth.npy cloth.png --length 2.75 --unit mm --effort best",
