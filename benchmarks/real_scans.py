@@ -123,11 +123,17 @@ def run(cloud: st.PointCloud, settings: st.Settings) -> Run:
     except st.FrontError as error:
         grid, words = error.grid, str(error).partition(";")[0]
         large, plain = encode_refusal(error, cloud), encode_refusal(error, cloud, style=PLAIN)
+        if grid is not None and len(grid.triangles):
+            plain = encode_picture(grid, cloud, caption=False, style=PLAIN)
     found = None if grid is None else grid.certificate
     verdict = f"refused: {words}" if words else "passed with warnings" if found and found.warnings else "passed"
     image = Image.open(io.BytesIO(plain)).convert("RGB").resize(SIZE, Image.Resampling.LANCZOS)
-    small = io.BytesIO()
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(small, "PNG", optimize=True)
+    colours: list[int] = []
+    for method in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE):  # the second keeps few dots in strong colours
+        colours += (image.quantize(COLOURS, method).getpalette() or [])[: 3 * COLOURS]
+    small, palette = io.BytesIO(), Image.new("P", (1, 1))
+    palette.putpalette(colours)
+    image.quantize(palette=palette, dither=Image.Dither.NONE).save(small, "PNG", optimize=True)
     return Run(
         settings.length, cloud.unit, large, small.getvalue(), 0 if grid is None else len(grid.nodes), verdict, found
     )
