@@ -31,7 +31,7 @@ from .page import parts
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PICTURES = "real-scans"  # folder of the pictures, and name of the page
-SIZE, COLOURS = (480, 360), 16  # of a picture on the page; as many colours again for what is rare
+SIZE, COLOURS = (480, 360), 12  # of a picture on the page; as many colours again for what is rare
 WIDE = 320  # of a picture as it is shown [pixel]
 PLAIN = PictureStyle(size=(960, 720))
 LEAST_SHARE = 0.0005  # of the scan, from which what is left out is told
