@@ -20,6 +20,7 @@ PLACE = Path("scantruss") / "machine_code"
 PATIENCE = 600.0  # most that the commands may take [s]
 COMMANDS = (
     "info shell.npy",
+    "grid {shell} demo.obj --length 1",
     "grid {bust} bust.obj --length 24",
     "grid shell.npy shell.obj --length 1",
     "clean shell.npy clean.ply",
@@ -79,7 +80,7 @@ def run() -> None:
     """Run the commands one after the other, in this process."""
     import numpy as np
 
-    from scantruss.cli.demo_files import SCAN
+    from scantruss.cli.demo_files import DEMOS
     from scantruss.cli.main import main
 
     rng = np.random.default_rng(1)
@@ -87,7 +88,7 @@ def run() -> None:
     x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
     np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + rng.normal(0.0, 0.02, len(x))]))
     for command in COMMANDS:
-        words = [word.format(bust=SCAN) for word in command.split()]
+        words = [word.format(**{name: demo.scan for name, demo in DEMOS.items()}) for word in command.split()]
         if status := main(words):
             sys.exit(status)
 

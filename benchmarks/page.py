@@ -43,7 +43,7 @@ class Section:
         return f"{self.finding}\n\n`{call}` on {machine(self.packages)}.\n\n{self.text.strip()}"
 
 
-def _parts(text: str, mark: str) -> dict[str, str]:
+def parts(text: str, mark: str) -> dict[str, str]:
     """Return the bodies by their headings; what stands before the first one has the heading "" ."""
     pieces = re.split(rf"^{mark} (.+)$", text, flags=re.MULTILINE)
     return {title.strip(): body.strip() for title, body in zip(["", *pieces[1::2]], pieces[::2], strict=True)}
@@ -56,9 +56,9 @@ def _in_order(titles: Iterable[str]) -> list[str]:
 
 def with_section(page: str, section: Section) -> str:
     """Return the page with a section and its losses put in or written anew."""
-    sections = _parts(page, "##")
+    sections = parts(page, "##")
     sections.pop("", None)
-    lost = _parts(sections.get(LOST, ""), "###")
+    lost = parts(sections.get(LOST, ""), "###")
     lost.pop("", None)
     lost[section.title] = "\n".join(f"- {loss}" for loss in section.losses) or "Nothing."
     sections[LOST] = "\n\n".join(f"### {title}\n\n{lost[title]}" for title in _in_order(lost))

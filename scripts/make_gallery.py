@@ -17,7 +17,7 @@ sys.path.append(str(ROOT / "examples"))
 
 from clouds import make  # noqa: E402
 
-from scantruss.cli.demo_files import SCAN  # noqa: E402
+from scantruss.cli.demo_files import DEMOS  # noqa: E402
 from scantruss.cli.main import main  # noqa: E402
 
 
@@ -47,6 +47,7 @@ SCANS: dict[str, Callable[[], np.ndarray]] = {
     "stadium.npy": lambda: make("stadium").points,
 }
 PICTURES = {
+    "shell": "grid {shell} shell.png --length 1.2 --effort best --view=-20,30",
     "roof": "grid roof.npy roof.png --length 1.2 --unit m --effort best",
     "stadium": "grid stadium.npy stadium.png --length 3.9 --unit mm",
     "cloth": "grid cloth.npy cloth.png --length 2.75 --unit mm --effort best",
@@ -65,7 +66,7 @@ def run() -> None:
             np.save(folder / scan, points())
         for title, command in PICTURES.items():
             words = [str(folder / word) if word.endswith((".npy", ".png")) else word for word in command.split()]
-            if main([word.format(bust=SCAN) for word in words]):
+            if main([word.format(shell=DEMOS["shell"].scan, bust=DEMOS["bust"].scan) for word in words]):
                 sys.exit(f"{title} failed")
             picture = Image.open(io.BytesIO((folder / f"{title}.png").read_bytes())).convert("RGB").resize((800, 600))
             picture.quantize(128).save(PLACE / f"{title}.png", optimize=True)

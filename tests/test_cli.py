@@ -557,13 +557,17 @@ def test_places_of_national_grids_are_told_to_a_thousandth() -> None:
     assert words_of_place((0.00012345678, -12.5, -1000.0)) == "0.000123457, -12.5, -1000"
 
 
-def test_the_demo_makes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", str(tmp_path / "deep" / "demo")]) == 0
+@pytest.mark.parametrize(("scan", "loops"), [("shell", 3), ("bust", 0)])
+def test_the_demo_makes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str], scan: str, loops: int) -> None:
+    assert main(["demo", str(tmp_path / "deep" / "demo"), "--scan", scan]) == 0
     names = ["grid.json", "grid.obj", "grid.png", "grid.settings.json", "model.3mf", "report.json"]
     assert sorted(entry.name for entry in (tmp_path / "deep" / "demo").iterdir()) == names
     report = json.loads((tmp_path / "deep" / "demo" / "report.json").read_text())
     assert report["topology"]["manifold"] and report["topology"]["orientable"]
-    assert report["topology"]["boundary_loops"] == 0
+    assert report["topology"]["boundary_loops"] == loops
+    found = st.read_grid(tmp_path / "deep" / "demo" / "grid.json").certificate
+    assert found is not None and found.passed and found.missing < 0.005
+    assert {part.kind for part in found.left_out} <= {"outliers"}
 
 
 def test_a_demo_that_fails_takes_its_folder_away(

@@ -13,7 +13,7 @@ import trimesh
 from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_pieces
 
 import scantruss as st
-from scantruss.cli.demo_files import save_demo
+from scantruss.cli.demo_files import DEMOS, save_demo
 from scantruss.export.solid import build_solid, is_watertight
 from scantruss.export.solid_files import Solid, encode_3mf, encode_stl, lattice_step, put_on_lattice
 from scantruss.grid.certificate import Certificate, Fault
@@ -42,7 +42,7 @@ def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path: Path) -> N
     """They differ from those asked for where no grid of the default method passes its certificate."""
     made = st.Settings(length=24.0, unit="mm", method="paper")
     grid = dome(4, 24.0, settings=made)
-    save_demo(tmp_path, grid, cloud_over(grid))
+    save_demo(DEMOS["bust"], tmp_path, grid, cloud_over(grid))
     assert st.Settings.from_dict(json.loads((tmp_path / "grid.settings.json").read_text())) == made
 
 

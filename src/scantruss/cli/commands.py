@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from .clean import clean, clean_parser
 from .completion import completion_parser, print_completion
-from .demo import demo, demo_parser
+from .demo import demo_parser, make_demo
 from .grid import grid, grid_parser
 from .info import info, info_parser
 from .print import print_parser, print_solid
@@ -36,6 +36,6 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
     "splice": (splice_parser, splice),
-    "demo": (demo_parser, demo),
+    "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),
 }

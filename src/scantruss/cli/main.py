@@ -31,7 +31,7 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
                                            turn a grid saved as .json into one watertight solid
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
-  scantruss demo  [FOLDER]                 do all of it on a bundled scan
+  scantruss demo  [FOLDER]                 do all of it on a bundled scan, a shell or (--scan bust) a bust
   scantruss completion bash|zsh|fish       print a script with which a shell completes commands and options
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.

@@ -154,8 +154,17 @@ def caption_of(grid: Grid) -> str:
     )
 
 
-def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: np.ndarray, path: str | Path) -> Path:
-    """Draw scan, grid and printed model side by side.
+def draw_panels(
+    cloud: PointCloud,
+    grid: Grid,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    path: str | Path,
+    *,
+    view: str = "auto",
+    beside: tuple[Grid, str, str] | None = None,
+) -> Path:
+    """Draw scan, grid and printed model side by side; with another grid beside them, two by two.
 
     Parameters
     ----------
@@ -167,6 +176,10 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
         (N, 3) and (M, 3), the solid of `build_solid`; any scale.
     path : str or Path
         File ending in .png.
+    view : str
+        See `choose_camera`.
+    beside : (Grid, str, str), optional
+        Another grid, its own view and its name.
 
     Returns
     -------
@@ -174,21 +187,29 @@ def draw_panels(cloud: PointCloud, grid: Grid, vertices: np.ndarray, triangles: 
         The file written.
     """
     path = check_place(path, (".png",))
-    wide, tall = PANELS_SIZE
-    camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud))
-    boxes = [(wide / 3 * k + 40, 80, wide / 3 * (k + 1) - 40, tall - 40) for k in range(3)]
+    rows, columns = (1, 3) if beside is None else (2, 2)
+    size, (wide, tall) = (PANELS_SIZE[0], rows * PANELS_SIZE[1]), (PANELS_SIZE[0] / columns, PANELS_SIZE[1])
+    corners = [(wide * column, tall * row) for row in reversed(range(rows)) for column in range(columns)]
+    boxes = [(x + 40, y + 80, x + wide - 40, y + tall - 40) for x, y in corners]
+    camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud), view)
     eyes = [framed(grid.nodes, grid.triangles, camera, box) for box in boxes[:2]]
-    scan, net = (look(grid.nodes, grid.triangles, eye, PANELS_SIZE) for eye in eyes)
+    scan, net = (look(grid.nodes, grid.triangles, eye, size) for eye in eyes)
     own = framed(vertices, triangles, camera.around(vertices), boxes[2])
     strokes = [
         dot_strokes(placed(cloud, grid), float(np.mean(grid.lengths)), scan, over=False),
         *grid_strokes(grid, None, net),
         shadow_strokes(vertices, triangles, own),
-        solid_strokes(look(vertices, triangles, own, PANELS_SIZE, mapped=False)),
+        solid_strokes(look(vertices, triangles, own, size, mapped=False)),
     ]
-    titles = (f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model")
-    texts = [Text(wide / 3 * (k + 0.5), 40.0, title, 17.0) for k, title in enumerate(titles)]
-    return write_files({path: paint(PANELS_SIZE, strokes, texts)})[0]
+    titles = [f"scan: {len(cloud.points):,} points", f"grid: {len(grid.edges):,} members", "printed model"]
+    if beside is not None:
+        other, its_view, name = beside
+        camera = choose_camera(other.nodes, other.triangles, known_upward(other, None), its_view)
+        eye = framed(other.nodes, other.triangles, camera, boxes[3])
+        strokes += grid_strokes(other, None, look(other.nodes, other.triangles, eye, size))
+        titles.append(f"{name}: {len(other.edges):,} members")
+    texts = [Text(x + wide / 2, y + 40.0, title, 17.0) for (x, y), title in zip(corners, titles, strict=True)]
+    return write_files({path: paint(size, strokes, texts)})[0]
 
 
 def paint(
