@@ -8,7 +8,7 @@ import trimesh
 
 import scantruss as st
 from scantruss.scan.formats.faces import normals_from_faces
-from scantruss.scan.given_normals import GivenNormals
+from scantruss.surface.given_normals import GivenNormals, given_normals
 from scantruss.surface.samples import sample_surface
 
 GAP = 0.03  # between the two blocks, a third of the spacing of their points
@@ -45,7 +45,7 @@ def outward(points: np.ndarray) -> np.ndarray:
 
 def test_a_mesh_gives_its_points_the_normals_of_its_faces(file: Path) -> None:
     cloud = st.read_points(file)
-    assert cloud.normals is not None and cloud.given_normals is not None
+    assert cloud.normals is not None and given_normals(cloud) is not None
     assert ((cloud.normals * outward(cloud.points + cloud.origin)).sum(axis=1) > 0.97).all()
 
 

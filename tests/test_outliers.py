@@ -14,7 +14,7 @@ from scantruss.kernels.surface import samples as kernels
 from scantruss.scan.clean import outliers
 from scantruss.scan.clean.nearby import Nearby
 from scantruss.scan.cloud import measure_gap
-from scantruss.scan.given_normals import NO_NORMALS
+from scantruss.surface.given_normals import NO_NORMALS
 from scantruss.surface.samples import sample_surface
 
 

@@ -24,8 +24,8 @@ from scantruss.kernels.surface.normals import (
 )
 from scantruss.kernels.surface.samples import choose_samples, group_points, nearest_samples, put_all, settle_points
 from scantruss.scan.cloud import bounds_of
-from scantruss.scan.given_normals import NO_NORMALS
 from scantruss.surface import linked_samples as module
+from scantruss.surface.given_normals import NO_NORMALS
 from scantruss.surface.samples import sample_surface
 
 

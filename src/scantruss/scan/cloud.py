@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,9 +21,6 @@ from .checks import (
     usual_extent,
 )
 from .units import check_unit
-
-if TYPE_CHECKING:
-    from .given_normals import GivenNormals
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
@@ -64,13 +60,6 @@ class PointCloud:
     def bounds(self) -> Bounds:
         """Smallest and largest coordinates, (3,) each [scan unit]."""
         return bounds_of(self.points)
-
-    @cached_property
-    def given_normals(self) -> GivenNormals | None:
-        """The normals that came with the points, by place; None where there are none or they face both ways."""
-        from .given_normals import GivenNormals
-
-        return None if self.normals is None else GivenNormals.of(self.points, self.normals)
 
     @property
     def z_is_up(self) -> bool:

@@ -11,8 +11,8 @@ from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
 from ..runtime.parallel import run_in_parts
 from ..scan.cloud import Bounds, bounds_of
-from ..scan.given_normals import NO_NORMALS, GivenNormals
 from ..scan.normals import NORMALS_PER_THREAD
+from .given_normals import NO_NORMALS, GivenNormals
 from .streamline import is_dense, streamlined
 
 LINKS_OF_A_SAMPLE = 12  # most links of a sample

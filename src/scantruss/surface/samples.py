@@ -17,10 +17,10 @@ from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
-from ..scan.given_normals import GivenNormals
 from ..scan.normals import STEEP_SINE, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
+from .given_normals import GivenNormals, given_normals
 from .linked_samples import (
     LINK_BOX,
     LINKED_POINTS_PER_THREAD,
@@ -178,7 +178,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
-        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, cloud.given_normals)
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud))
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)

@@ -29,7 +29,7 @@ COLUMN_NAMES = {
     "ny": ("ny", "normaly", "scalarny", "ynormal"),
     "nz": ("nz", "normalz", "scalarnz", "znormal"),
 }
-NORMAL = ("nx", "ny", "nz")  # attributes that are a normal together
+NORMAL_COLUMNS = ("nx", "ny", "nz")  # attributes that are a normal together
 
 
 def clean_name(name: str) -> str:

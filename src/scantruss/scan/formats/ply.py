@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import FormatError
 from ...runtime.ours import CLOUD_MARK
 from ..units import metres_of
-from .columns import NORMAL, find_attributes
+from .columns import NORMAL_COLUMNS, find_attributes
 from .content import Cloud, Content
 from .faces import normals_from_faces
 from .kinds import read_head, wrong_kind
@@ -50,7 +50,7 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
         table = _read_binary(path, header, vertex, columns)
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
     points, normals = np.ascontiguousarray(table[:, :3]), None
-    if not all(name in attributes for name in NORMAL):
+    if not all(name in attributes for name in NORMAL_COLUMNS):
         normals = normals_from_faces(points, _faces(path, header))
     return Content(points, attributes, metres=metres_of(header.unit), normals=normals)
 

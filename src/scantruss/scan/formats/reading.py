@@ -15,7 +15,7 @@ from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
 from ..units import check_unit
 from .choose import check_attributes, choose, describe_points, places_in
-from .columns import NORMAL
+from .columns import NORMAL_COLUMNS
 from .common_unit import to_common_unit
 from .content import Content
 from .copc import WantedBox
@@ -92,10 +92,10 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     def places_of(said: Content) -> list[WantedBox]:
         return places_in_file(path, said, unit, selection, common)
 
-    wanted = (*selection.needs, *(NORMAL if path.suffix.lower() in WITH_NORMALS else ()))
+    wanted = (*selection.needs, *(NORMAL_COLUMNS if path.suffix.lower() in WITH_NORMALS else ()))
     content = read_content(path, wanted, places_of if selection.crop else None)
-    if all(name in content.attributes for name in NORMAL):
-        content = replace(content, normals=np.column_stack([content.attributes[name] for name in NORMAL]))
+    if all(name in content.attributes for name in NORMAL_COLUMNS):
+        content = replace(content, normals=np.column_stack([content.attributes[name] for name in NORMAL_COLUMNS]))
     return select(path, content, unit, selection, common)
 
 

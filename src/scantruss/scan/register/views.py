@@ -11,8 +11,8 @@ from ...kernels.scan import overlap as kernels_of_overlap
 from ...kernels.surface import normals as normal_kernels
 from ...kernels.surface import samples as kernels
 from ...runtime.parallel import run_in_parts
+from ...surface.given_normals import NO_NORMALS
 from ...surface.linked_samples import samples_of_points
-from ..given_normals import NO_NORMALS
 from ..normals import face_one_side, mean_normals
 
 NEIGHBORS_FOR_NORMAL = 14  # neighbours of a place, for its normal

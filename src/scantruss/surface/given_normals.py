@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels.geometry.kd_tree import KDTree, nearest_of_places
 from ..runtime.parallel import in_parts
-from .clean.nearby import SEARCHES_PER_THREAD, build_kd_tree
+from ..scan.clean.nearby import SEARCHES_PER_THREAD, build_kd_tree
+from ..scan.cloud import PointCloud
 
 NO_NORMALS = np.empty((0, 3))  # where none are given
 POINTS_TO_JUDGE = 2000  # points by which it is judged whether normals can be trusted
 BESIDE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
 MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
-SAME_PLACE = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
+AT_A_POINT = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
+
+_NORMALS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, GivenNormals | None] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +35,7 @@ class GivenNormals:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         known = (lengths[:, 0] > 0.0) & np.isfinite(lengths[:, 0])
         unit = np.where(known[:, None], normals / np.where(known[:, None], lengths, 1.0), 0.0)
-        given = cls(build_kd_tree(points), unit, SAME_PLACE * float(np.ptp(points, axis=0).max()))
+        given = cls(build_kd_tree(points), unit, AT_A_POINT * float(np.ptp(points, axis=0).max()))
         some = np.linspace(0, len(points) - 1, min(len(points), POINTS_TO_JUDGE)).astype(np.int64)
         other, _ = given._nearest(points[some], 2)
         apart = points[other] - points[some]
@@ -53,3 +57,12 @@ class GivenNormals:
 
         in_parts(len(places), SEARCHES_PER_THREAD, look_up)
         return which, squares
+
+
+def given_normals(cloud: PointCloud) -> GivenNormals | None:
+    """Return the normals that came with a cloud, None where there are none or they face both ways; kept as long as the cloud lives."""
+    if cloud.normals is None:
+        return None
+    if cloud not in _NORMALS_OF_CLOUDS:
+        _NORMALS_OF_CLOUDS[cloud] = GivenNormals.of(cloud.points, cloud.normals)
+    return _NORMALS_OF_CLOUDS[cloud]
