@@ -22,9 +22,14 @@ MOST_PLACES = 5  # places of a kind that are listed one by one; the others are o
 
 
 def parts_left_out(
-    samples: SurfaceSamples, boundary: Boundary, found: Distances, members: np.ndarray, reach: np.ndarray
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    gaps: list[LeftOut],
+    found: Distances,
+    members: np.ndarray,
+    reach: np.ndarray,
 ) -> tuple[LeftOut, ...]:
-    """Return what a grid leaves out, the most points first; what the settings asked for and holes that are closed come last.
+    """Return what a grid leaves out, the most points first; what the settings asked for, closed holes and bridged gaps come last.
 
     Parameters
     ----------
@@ -34,7 +39,8 @@ def parts_left_out(
     return (
         *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
         *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
-        *_closed_holes(samples, boundary),
+        *_first_and_more(_closed_holes(samples, boundary)),
+        *_first_and_more(gaps),
     )
 
 
@@ -113,11 +119,16 @@ def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
     holes = [_hole(places, samples, asked=True) for places in filled]
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged]
-    holes.sort(key=lambda hole: -(hole.size or 0.0))
-    if len(more := holes[MOST_PLACES:]) < 2:
-        return holes
-    rest = replace(more[0], where=None, number=len(more), asked=all(hole.asked for hole in more))
-    return [*holes[:MOST_PLACES], rest]
+    return sorted(holes, key=lambda hole: -(hole.size or 0.0))
+
+
+def _first_and_more(parts: list[LeftOut]) -> list[LeftOut]:
+    """Return the first of some entries of one kind, and one for the others."""
+    if len(more := parts[MOST_PLACES:]) < 2:
+        return parts
+    size = max(part.size or 0.0 for part in more)
+    asked = all(part.asked for part in more)
+    return [*parts[:MOST_PLACES], replace(more[0], where=None, size=size, number=len(more), asked=asked)]
 
 
 def _hole(places: np.ndarray, samples: SurfaceSamples, *, asked: bool) -> LeftOut:
