@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-#: places in a triangle that are looked at, by its corners: no place is farther than a fifth of a member from one of them
+#: places in a triangle that are looked at, by its corners; with its corners and the middles of its members none is farther than a sixth
+#: of a member from one of them
 PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
 UNEVEN = (
@@ -46,24 +47,24 @@ def bridged_gaps(
     """
     points = samples.measured_points
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
-    places = np.einsum("pc,tcx->tpx", PLACES, grid.nodes[grid.triangles]).reshape(-1, 3)
+    places, owner = _places(grid)
     away = np.empty(len(places))
     nearest_distances(places, points, boxes, 0.25 * length, away)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    least = HALF_WIDTH * members[grid.triangles].mean(axis=1).repeat(len(PLACES))
-    far = np.flatnonzero(away > np.maximum(least, UNEVEN * np.median(away)))
+    least = np.maximum(HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner], UNEVEN * np.median(away))
+    far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:MOST_LOOKED_AT]]
     if not len(far):
         return [], []
     points = points[np.argsort(points[:, 0], kind="stable")]
-    triangle = far // len(PLACES)
+    triangle = owner[far]
     a, b, c = grid.nodes[grid.triangles[triangle].T]
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     half = np.array([empty_disc(*each, points) for each in zip(places[far], normal, away[far], strict=True)])
     empty = half > least[far]
     far, triangle, half = far[empty], triangle[empty], half[empty]
-    group = _groups(grid, triangle)
+    group = _groups(grid, triangle)[triangle]
     open_ended = np.zeros(len(grid.triangles), bool)
     open_ended[grid.edge_triangles[grid.edge_triangles[:, 1] < 0, 0]] = True
     found: list[tuple[float, LeftOut, bool]] = []
@@ -100,13 +101,22 @@ def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.nd
     return radius if (level <= 2.0 * radius).sum() >= POINTS_AROUND else 0.0
 
 
+def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Return places all over the triangles of a grid (P, 3), and a triangle in which each is (P,)."""
+    of_node = np.full(len(grid.nodes), -1)
+    of_node[grid.triangles] = np.arange(len(grid.triangles))[:, None]
+    used = np.flatnonzero(of_node >= 0)
+    inside = np.einsum("pc,tcx->tpx", PLACES, grid.nodes[grid.triangles]).reshape(-1, 3)
+    places = np.concatenate([inside, grid.nodes[grid.edges].mean(axis=1), grid.nodes[used]])
+    numbers = np.arange(len(grid.triangles)).repeat(len(PLACES))
+    return places, np.concatenate([numbers, grid.edge_triangles[:, 0], of_node[used]])
+
+
 def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:
-    """Return a number (K,) for each of some triangles (K,): the same for those that have a member in common."""
-    one, other = grid.edge_triangles.T
-    is_chosen = np.zeros(len(grid.triangles), bool)
-    is_chosen[chosen] = True
-    both = (other >= 0) & is_chosen[one] & is_chosen[other]
-    return component_labels(len(grid.triangles), one[both], other[both])[chosen]
+    """Return a number (T,) for each triangle: the same for those of some (K,) that have a node in common."""
+    a, b, c = grid.triangles[np.unique(chosen)].T
+    label = component_labels(len(grid.nodes), np.concatenate([a, b]), np.concatenate([b, c]))
+    return label[grid.triangles[:, 0]]
 
 
 def _is_known(place: np.ndarray, samples: SurfaceSamples, boundary: Boundary) -> bool:
