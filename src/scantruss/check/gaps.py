@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, LeftOut, place_of
+from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.mesh.coverage import nearest_distances
 from .distances import POINT_BOX, boxes_of
@@ -20,12 +21,9 @@ if TYPE_CHECKING:
 #: of a member from one of them
 PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
-UNEVEN = (
-    4.0  # ... and in median distances: at random points no place is farther, between lines of a scanner half as far
-)
-POINTS_AROUND = (
-    45  # points between that distance and twice it from which on a place without any is no accident, as exp(-n/3) tells
-)
+UNEVEN = 4.0  # ... and in median distances: at random points none is farther, between lines of a scanner half as far
+POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
+OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 MOST_PLACES = 30  # places of a warning that are kept
 MOST_LOOKED_AT = 1000  # places that are looked at closely, those farthest from all points first
 
@@ -60,13 +58,12 @@ def bridged_gaps(
     triangle = owner[far]
     a, b, c = grid.nodes[grid.triangles[triangle].T]
     normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     half = np.array([empty_disc(*each, points) for each in zip(places[far], normal, away[far], strict=True)])
     empty = half > least[far]
     far, triangle, half = far[empty], triangle[empty], half[empty]
     group = _groups(grid, triangle)[triangle]
-    open_ended = np.zeros(len(grid.triangles), bool)
-    open_ended[grid.edge_triangles[grid.edge_triangles[:, 1] < 0, 0]] = True
+    is_open = _open_triangles(grid, samples.measured_points, boxes, length)
     found: list[tuple[float, LeftOut, bool]] = []
     for each in np.unique(group):
         own = np.flatnonzero(group == each)
@@ -75,10 +72,10 @@ def bridged_gaps(
         if not _is_known(middle, samples, boundary):
             size = float(np.ptp(places[far[own]], axis=0).max()) + width
             gap = LeftOut("gap", 0, 0.0, place_of(middle + samples.origin), size)
-            found.append((width, gap, bool(open_ended[triangle[own]].any())))
+            found.append((width, gap, bool(is_open[triangle[own]].any())))
     found.sort(key=lambda each: -each[0])
     unit = f" {samples.unit}" if samples.unit else ""
-    wide = [(width, gap.where) for width, gap, is_open in found if is_open]
+    wide = [(width, gap.where) for width, gap, reaches_boundary in found if reaches_boundary]
     more = f" ({len(wide)} such places)" if len(wide) > 1 else ""
     words = f"bridges a gap {wide[0][0]:.3g}{unit} wide{more}" if wide else ""
     warnings = (
@@ -102,14 +99,26 @@ def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.nd
 
 
 def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return places all over the triangles of a grid (P, 3), and a triangle in which each is (P,)."""
+    """Return places all over the triangles of a grid but not on its boundary (P, 3), and a triangle in which each is (P,)."""
+    inner = grid.edge_triangles[:, 1] >= 0
     of_node = np.full(len(grid.nodes), -1)
     of_node[grid.triangles] = np.arange(len(grid.triangles))[:, None]
-    used = np.flatnonzero(of_node >= 0)
+    of_node[grid.edges[~inner]] = -1
+    nodes = np.flatnonzero(of_node >= 0)
     inside = np.einsum("pc,tcx->tpx", PLACES, grid.nodes[grid.triangles]).reshape(-1, 3)
-    places = np.concatenate([inside, grid.nodes[grid.edges].mean(axis=1), grid.nodes[used]])
+    places = np.concatenate([inside, grid.nodes[grid.edges[inner]].mean(axis=1), grid.nodes[nodes]])
     numbers = np.arange(len(grid.triangles)).repeat(len(PLACES))
-    return places, np.concatenate([numbers, grid.edge_triangles[:, 0], of_node[used]])
+    return places, np.concatenate([numbers, grid.edge_triangles[inner, 0], of_node[nodes]])
+
+
+def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: float) -> np.ndarray:
+    """Return which triangles (T,) bool have a node where the boundary of the grid leaves the scan."""
+    members = grid.edges[grid.edge_triangles[:, 1] < 0]
+    places = np.concatenate([grid.nodes[members].mean(axis=1), grid.nodes[members[:, 0]]])
+    away = np.empty(len(places))
+    nearest_distances(places, points, boxes, 0.25 * length, away)
+    ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
+    return np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1)
 
 
 def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:

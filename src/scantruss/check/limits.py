@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,6 +108,17 @@ def places_to_look_at(found: Certificate, missed_at: Place) -> list[Fault]:
     if found.judged_out > WARN_LEFT_OUT:
         warnings.append(Fault("left out", f"leaves out {found.judged_out:.1%} of the points that were read"))
     return warnings
+
+
+def with_ridges_given_up(grid: Grid, places: Sequence[Place]) -> Grid:
+    """Return a grid with a warning of the places at which it gives up ridges; as it is where there are none."""
+    found = grid.certificate
+    if found is None or not places:
+        return grid
+    more = f" ({len(places)} such places)" if len(places) > 1 else ""
+    words = f"gives up the ridge where no grid passes with it{more}"
+    warning = Fault("ridge", words, place_of(places[0]), tuple(map(place_of, places[1:])))
+    return grid.replace(certificate=replace(found, warnings=(*found.warnings, warning)))
 
 
 def widened_limits(settings: Settings) -> tuple[str, ...]:
