@@ -88,8 +88,9 @@ def test_a_triangle_off_a_sharp_fold_is_over_no_gap() -> None:
 
 def test_many_gaps_are_five_lines_and_one_for_the_others() -> None:
     middles = [(x, y) for y in (-1.7, 1.7) for x in np.array([-3.0, -1.0, 1.0, 3.0]) + y / 3**0.5]
-    away = lambda x, y: np.min([np.hypot(x - a, y - b) for a, b in middles], axis=0)  # noqa: E731
-    points = sheet(13, 8, 0.07, keep=lambda x, y: away(x, y) > 0.42)
+    points = sheet(13, 8, 0.07)
+    away = np.linalg.norm(points[:, None, :2] - middles, axis=2).min(axis=1)
+    points = points[away > 0.42]
     samples, grid = scanned(points, lattice())
     found = certify(grid, samples, NOTHING, SETTINGS)
     lines = [line for line in left_out_lines(found) if "gap" in line]

@@ -33,12 +33,11 @@ def faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> li
     if not found.orientable:
         faults.append(Fault("orientable", "is not orientable"))
     if found.pieces != found.scan_pieces:
-        pieces = "piece" if found.pieces == 1 else "pieces"
-        words = f"is in {found.pieces} {pieces} where the scan has {found.scan_pieces}"
+        words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}".replace(" 1 pieces", " 1 piece")
         faults.append(Fault("pieces", words, _smallest_piece(grid)))
     if found.boundary_loops != found.scan_loops:
-        loops = "boundary loop" if found.boundary_loops == 1 else "boundary loops"
-        words = f"has {found.boundary_loops} {loops} where the scan has {found.scan_loops}"
+        words = f"has {found.boundary_loops} boundary loops where the scan has {found.scan_loops}"
+        words = words.replace(" 1 boundary loops", " 1 boundary loop")
         faults.append(Fault("loops", words, _odd_loop(grid, boundary)))
     return faults
 

@@ -118,7 +118,8 @@ def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: 
     away = np.empty(len(places))
     nearest_distances(places, points, boxes, 0.25 * length, away)
     ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
-    return np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1)
+    found: np.ndarray = np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1)
+    return found
 
 
 def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:
