@@ -9,7 +9,7 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.samples import DUPLICATE, KEPT
-from .gaps import empty_disc
+from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -83,7 +83,4 @@ def _kind_of_hole(around: np.ndarray, samples: SurfaceSamples, length: float) ->
     inside = (level <= 0.7 * radius) & (np.abs(height) <= 0.25 * length)
     if (inside & ~np.isin(judged, (KEPT, DUPLICATE))).any():
         return "left out"
-    kept = points[judged == KEPT]
-    kept = kept[np.argsort(kept[:, 0], kind="stable")]
-    away = float(np.linalg.norm(kept - middle, axis=1).min(initial=radius))
-    return "" if empty_disc(middle, normal, away, kept) > 0.0 else "sparse"
+    return "" if is_empty_within(around, by_x(points[judged == KEPT])) else "sparse"

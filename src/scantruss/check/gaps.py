@@ -23,6 +23,7 @@ PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
 UNEVEN = 4.0  # ... and in median distances: at random points none is farther, between lines of a scanner half as far
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
+ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(-1, 2)  # places in a loop [radius]
 OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 MOST_PLACES = 30  # places of a warning that are kept
 MOST_LOOKED_AT = 1000  # places that are looked at closely, those farthest from all points first
@@ -54,7 +55,7 @@ def bridged_gaps(
     far = far[np.argsort(-away[far], kind="stable")[:MOST_LOOKED_AT]]
     if not len(far):
         return [], []
-    points = points[np.argsort(points[:, 0], kind="stable")]
+    points = by_x(points)
     triangle = owner[far]
     a, b, c = grid.nodes[grid.triangles[triangle].T]
     normal = np.cross(b - a, c - a)
@@ -82,6 +83,25 @@ def bridged_gaps(
         [Fault("gap", words, wide[0][1], tuple(where for _, where in wide[1:MOST_PLACES] if where))] if wide else []
     )
     return [gap for _, gap, _ in found], warnings
+
+
+def by_x(points: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) by ascending x."""
+    ordered: np.ndarray = points[np.argsort(points[:, 0], kind="stable")]
+    return ordered
+
+
+def is_empty_within(curve: np.ndarray, points: np.ndarray) -> bool:
+    """Whether a closed curve (M, 3) is around a place that is no accident to be empty; points : (N, 3) by ascending x."""
+    middle = curve.mean(axis=0)
+    axes = np.linalg.svd(curve - middle)[2]
+    reach = float(np.linalg.norm(curve - middle, axis=1).max())
+    begin, end = np.searchsorted(points[:, 0], [middle[0] - 2.0 * reach, middle[0] + 2.0 * reach])
+    around = points[begin:end][((points[begin:end] - middle) ** 2).sum(axis=1) <= 4.0 * reach * reach]
+    places = middle + reach * ACROSS @ axes[:2]  # a curve of few samples is not around the middle of its hole
+    away = np.array([np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places])
+    best = int(away.argmax())
+    return empty_disc(places[best], axes[2], float(away[best]), points) > 0.0
 
 
 def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> float:

@@ -11,6 +11,7 @@ from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.owners import owners_of
 from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
+from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -113,12 +114,16 @@ def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:
 
 
 def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
-    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them."""
+    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them.
+
+    Of the latter, places between sparse points are left out that are empty by accident.
+    """
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
     filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
     holes = [_hole(places, samples, asked=True) for places in filled]
-    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged]
+    points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
+    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
     return sorted(holes, key=lambda hole: -(hole.size or 0.0))
 
 

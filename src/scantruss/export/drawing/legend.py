@@ -102,11 +102,12 @@ def marks_of(grid: Grid) -> list[Mark]:
     for kind, colour in ((found.faults, FAULT), (found.warnings, WARNING)):
         placed = [Mark(fault.words, fault.where, colour, fault.also) for fault in kind if fault.where is not None]
         marks += placed[:MOST_MARKS]
+    warned = {mark.where for mark in marks}
     unit = f" {grid.unit}" if grid.unit else ""
     marks += [
         Mark(f"{part.words}, {part.size:.3g}{unit} across", part.where, INK)
         for part in found.left_out
-        if part.kind in ("hole", "gap") and part.where is not None
+        if part.kind in ("hole", "gap") and part.where is not None and part.where not in warned
     ]
     worst = (
         ("shortest member", found.shortest_member, unit),
