@@ -278,7 +278,12 @@ def test_the_legend_lies_beside_or_above_what_is_shown(
     )
     found = replace(Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0), faults=faults, warnings=faults)
     painted: list[tuple[Any, ...]] = []
-    monkeypatch.setattr("scantruss.export.drawing.picture.paint", lambda *given: painted.append(given) or b"")
+
+    def paint(*given: Any) -> bytes:
+        painted.append(given)
+        return b""
+
+    monkeypatch.setattr("scantruss.export.drawing.picture.paint", paint)
     encode_picture(grid.replace(certificate=found), cloud_over(grid), style=PictureStyle(views=views, size=size))
     (_, strokes, texts, _, _), *_ = painted
     lines = [text for text in texts if text.align == "left"]

@@ -21,12 +21,15 @@ if TYPE_CHECKING:
 #: of a member from one of them
 PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
-UNEVEN = 4.0  # ... and in median distances: at random points none is farther, between lines of a scanner half as far
+UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
+SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
-ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(-1, 2)  # places in a loop [radius]
+ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
+    -1, 2
+)  # places around another [reach]
 OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 MOST_PLACES = 30  # places of a warning that are kept
-MOST_LOOKED_AT = 1000  # places that are looked at closely, those farthest from all points first
+MOST_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
 
 
 def bridged_gaps(
@@ -50,18 +53,18 @@ def bridged_gaps(
     away = np.empty(len(places))
     nearest_distances(places, points, boxes, 0.25 * length, away)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    least = np.maximum(HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner], UNEVEN * np.median(away))
+    least = HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner]
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:MOST_LOOKED_AT]]
     if not len(far):
         return [], []
     points = by_x(points)
     triangle = owner[far]
-    a, b, c = grid.nodes[grid.triangles[triangle].T]
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    half = np.array([empty_disc(*each, points) for each in zip(places[far], normal, away[far], strict=True)])
-    empty = half > least[far]
+    normals = _normals(grid)
+    some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
+    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
+    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points) for at in far])
+    empty = half > np.maximum(least[far], UNEVEN * usual)
     far, triangle, half = far[empty], triangle[empty], half[empty]
     group = _groups(grid, triangle)[triangle]
     is_open = _open_triangles(grid, samples.measured_points, boxes, length)
@@ -94,14 +97,28 @@ def by_x(points: np.ndarray) -> np.ndarray:
 def is_empty_within(curve: np.ndarray, points: np.ndarray) -> bool:
     """Whether a closed curve (M, 3) is around a place that is no accident to be empty; points : (N, 3) by ascending x."""
     middle = curve.mean(axis=0)
-    axes = np.linalg.svd(curve - middle)[2]
+    normal = np.linalg.svd(curve - middle)[2][2]
     reach = float(np.linalg.norm(curve - middle, axis=1).max())
-    begin, end = np.searchsorted(points[:, 0], [middle[0] - 2.0 * reach, middle[0] + 2.0 * reach])
-    around = points[begin:end][((points[begin:end] - middle) ** 2).sum(axis=1) <= 4.0 * reach * reach]
-    places = middle + reach * ACROSS @ axes[:2]  # a curve of few samples is not around the middle of its hole
-    away = np.array([np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places])
-    best = int(away.argmax())
-    return empty_disc(places[best], axes[2], float(away[best]), points) > 0.0
+    place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
+    away = float(np.linalg.norm(_within(place, reach, points) - place, axis=1).min(initial=reach))
+    return empty_disc(place, normal, away, points) > 0.0
+
+
+def _within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Return the points (K, 3) of those by ascending x (N, 3) that lie within reach of a place."""
+    begin, end = np.searchsorted(points[:, 0], [place[0] - reach, place[0] + reach])
+    around = points[begin:end]
+    near: np.ndarray = around[((around - place) ** 2).sum(axis=1) <= reach * reach]
+    return near
+
+
+def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Return the place (3,) in the plane around another that is farthest from all points (N, 3) by ascending x."""
+    axes = np.linalg.svd(normal[None])[2][1:]
+    around = _within(middle, 2.0 * reach, points)
+    places: np.ndarray = middle + reach * ACROSS @ axes
+    away = [np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places]
+    return places[int(np.argmax(away))]
 
 
 def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> float:
@@ -109,13 +126,24 @@ def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.nd
 
     away : distance of the nearest point; points : (N, 3) by ascending x.
     """
-    begin, end = np.searchsorted(points[:, 0], [place[0] - 3.0 * away, place[0] + 3.0 * away])
-    around = points[begin:end] - place
-    around = around[(around**2).sum(axis=1) <= 9.0 * away * away]
-    height = around @ normal
-    level = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
+    level = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
     return radius if (level <= 2.0 * radius).sum() >= POINTS_AROUND else 0.0
+
+
+def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
+    """Return the distances in the plane at a place of the points near it (K,); parameters as of `empty_disc`."""
+    around = _within(place, 3.0 * away, points) - place
+    height = around @ normal
+    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
+    return level
+
+
+def _normals(grid: Grid) -> np.ndarray:
+    """Return the unit normals of the triangles (T, 3), zero where they have none."""
+    a, b, c = grid.nodes[grid.triangles.T]
+    normal: np.ndarray = np.cross(b - a, c - a)
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
 def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -138,8 +166,7 @@ def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: 
     away = np.empty(len(places))
     nearest_distances(places, points, boxes, 0.25 * length, away)
     ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
-    found: np.ndarray = np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1)
-    return found
+    return np.asarray(np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1))
 
 
 def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:
