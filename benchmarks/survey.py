@@ -1,20 +1,22 @@
 """`grid` as a user calls it, on every scan at several lengths: python -m benchmarks.survey FOLDER_OR_SCAN... --out DIR [--lengths 10].
 
-Each line of DIR/survey.jsonl is a run: the verdict, the line of a refusal, and what an independent measure finds. With `--check FILE`
-that measure is a program that is called as `FILE GRID.obj --cloud SCAN --length L --json`. At the end a table, and what a grid that
-passed must not have. Runs that are there already are not done again.
+The lengths lie evenly over the range that `info` names, on a scale of ratios; all scans have their turn at one before any has a
+second. Each line of DIR/survey.jsonl is a run: the verdict, the line of a refusal, and what an independent measure finds. With
+`--check FILE` that measure is a program that is called as `FILE GRID.obj --cloud SCAN --length L --json`. At the end a table, what a
+grid that passed must not have, the lines of all refusals, and sheets of the pictures of all that passed (DIR/sheet_*.png). Runs that
+are there already are not done again.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
+import re
 import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -24,13 +26,13 @@ from scipy.spatial import cKDTree
 
 import scantruss as st
 from scantruss.check.limits import NOISES_OFF
-from scantruss.cli.main import main as scantruss_main
-from scantruss.scan.member_length import length_range, round_length, suggest_length
+from scantruss.export.drawing.sheet import encode_sheet
+from scantruss.scan.member_length import length_range, round_length
 
 SUFFIXES = {".ply", ".xyz", ".csv", ".las", ".laz", ".e57", ".pcd", ".obj"}
-WIDEST = 3.0  # the longest length tried is so many times the usual one, the shortest as small a part of it
-MOST_MEMBERS = 60_000  # of a run, estimated by the square of the extent
+MOST_MEMBERS = 30_000  # of a run, estimated by the square of the extent
 LEAST_ANGLE, SHORTEST, LONGEST, FARTHEST, MOST_MISSED = 15.0, 0.5, 1.8, 0.1, 0.05  # what a grid that can be built keeps
+ON_A_SHEET = 12  # pictures
 ROUNDING = 1e-3  # of the figures of a text file
 
 
@@ -44,36 +46,40 @@ def scans_in(places: Iterable[Path]) -> list[Path]:
 
 
 def lengths_of(cloud: st.PointCloud, count: int) -> list[float]:
-    """Return lengths that the scan carries, the usual one first and then ever farther from it [scan unit]."""
+    """Return lengths from the largest to the least that the scan carries, every third first [scan unit]."""
     low, high = length_range(cloud)
-    usual = suggest_length(cloud)
     least = float(np.sqrt(np.prod(np.sort(np.ptp(cloud.points, axis=0))[1:]) * 3.5 / MOST_MEMBERS))
-    shares = np.exp(np.linspace(-np.log(WIDEST), np.log(WIDEST), count))
-    wished = usual * shares[np.argsort(np.abs(np.log(shares)), kind="stable")]
-    kept = (min(max(round_length(length, "nearest"), low, round_length(least, "up")), high) for length in wished)
-    return list(dict.fromkeys(kept))
+    low = max(low, round_length(least, "up"))
+    order = np.concatenate([np.arange(count - 1 - first, -1, -3) for first in range(3)])
+    wished = low * (high / low) ** (order / max(count - 1, 1)) if low <= high else np.array([low])
+    return list(dict.fromkeys(min(max(round_length(length, "nearest"), low), high) for length in wished.tolist()))
 
 
-def run(scan: Path, length: float, folder: Path, effort: str) -> dict[str, Any]:
+def run(scan: Path, length: float, folder: Path, effort: str, seconds: float) -> dict[str, Any]:
     """Make a grid by the command line and return what it says."""
     stem = folder / f"{scan.stem}_{length:g}"
+    files = [f"{stem}.json", f"{stem}.obj", f"{stem}.png"]
     words = [
+        sys.executable,
+        "-m",
+        "scantruss",
         "grid",
         str(scan),
-        f"{stem}.json",
-        f"{stem}.obj",
-        f"{stem}.png",
+        *files,
         "--length",
         f"{length:g}",
         "--effort",
         effort,
     ]
-    said, noted, started = io.StringIO(), io.StringIO(), perf_counter()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(noted):
-        status = scantruss_main([*words, "--force"])
-    lines = noted.getvalue().strip().splitlines()
-    row: dict[str, Any] = {"scan": scan.name, "length": length, "status": status, "seconds": perf_counter() - started}
-    if status:
+    row: dict[str, Any] = {"scan": scan.name, "length": length}
+    started = perf_counter()
+    try:
+        ended = subprocess.run([*words, "--force"], capture_output=True, text=True, check=False, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return row | {"verdict": "stopped", "seconds": seconds, "line": f"not done after {seconds:g} s"}
+    lines = ended.stderr.strip().splitlines()
+    row |= {"status": ended.returncode, "seconds": perf_counter() - started}
+    if ended.returncode:
         return row | {"verdict": "refused", "line": lines[-1] if lines else "", "notes": lines[:-1]}
     grid = st.read_grid(f"{stem}.json")
     assert grid.certificate is not None
@@ -153,14 +159,33 @@ def table(rows: Iterable[dict[str, Any]]) -> str:
     by_scan: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         by_scan.setdefault(row["scan"], []).append(row)
-    lines, below = ["scan  passed  warnings  refused"], []
+    lines, below = ["scan  passed  warnings  refused  stopped"], []
     for name, own in by_scan.items():
         count = Counter(row["verdict"] for row in own)
-        lines.append(f"{name}  {count['passed']}  {count['warnings']}  {count['refused']}")
+        lines.append("  ".join([name, *(str(count[word]) for word in ("passed", "warnings", "refused", "stopped"))]))
         for row in own:
-            words = row["line"] if row["verdict"] == "refused" else "; ".join(objections(row))
+            words = row["line"] if is_without_grid(row) else "; ".join(objections(row))
             below += [f"{name} {row['length']:g} {row['verdict']}: {words}"] if words else []
-    return "\n".join([*lines, "", *below])
+    kinds = Counter(
+        re.sub(r"[-+]?\d[\d.,e%-]*", "#", row["line"]) for row in chain(*by_scan.values()) if is_without_grid(row)
+    )
+    return "\n".join([*lines, "", *below, "", *(f"{count} x {words}" for words, count in kinds.most_common())])
+
+
+def is_without_grid(row: dict[str, Any]) -> bool:
+    """Whether a run gave no grid."""
+    return row["verdict"] in ("refused", "stopped")
+
+
+def write_sheets(rows: Iterable[dict[str, Any]], folder: Path) -> None:
+    """Write the pictures of all grids that passed, some on a sheet."""
+    made = [row for row in rows if not is_without_grid(row)]
+    for begin in range(0, len(made), ON_A_SHEET):
+        some = made[begin : begin + ON_A_SHEET]
+        files = [folder / f"{Path(row['scan']).stem}_{row['length']:g}.png" for row in some]
+        titles = [f"{row['scan']} {row['length']:g}: {row['verdict']}" for row in some]
+        shown = [(title, file.read_bytes()) for title, file in zip(titles, files, strict=True)]
+        (folder / f"sheet_{begin // ON_A_SHEET:03}.png").write_bytes(encode_sheet(shown))
 
 
 def main() -> int:
@@ -170,28 +195,31 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True, help="folder of grids, pictures and survey.jsonl")
     parser.add_argument("--lengths", type=int, default=10, help="lengths for each scan (default 10)")
     parser.add_argument("--effort", default="quick")
+    parser.add_argument("--seconds", type=float, default=120.0, help="time after which a run is stopped (default 120)")
     parser.add_argument("--check", type=Path, help="program that measures a grid against its scan")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     kept = options.out / "survey.jsonl"
     done = {(row["scan"], row["length"]) for row in rows_so_far(kept)}
+    wished = []
     for scan in scans_in(options.places):
         try:
-            wished = lengths_of(st.read_points(scan), options.lengths)
+            each = lengths_of(st.read_points(scan), options.lengths)
+            wished += [(turn, scan, length) for turn, length in enumerate(each)]
         except st.ScanTrussError as error:
-            wished, line = [], str(error)
-            print(f"{scan.name}: {line}", flush=True)
-        for length in wished:
-            if (scan.name, length) in done:
-                continue
-            row = run(scan, length, options.out, options.effort)
-            if options.check and row["verdict"] != "refused":
-                row["check"] = measured(row, scan, options.out, options.check)
-            with kept.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            print(f"{scan.name}: {error}", flush=True)
+    for _, scan, length in sorted(wished, key=lambda each: each[0]):
+        if (scan.name, length) in done:
+            continue
+        row = run(scan, length, options.out, options.effort, options.seconds)
+        if options.check and not is_without_grid(row):
+            row["check"] = measured(row, scan, options.out, options.check)
+        with kept.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
     rows = list(rows_so_far(kept))
     print(table(rows))
-    return int(any(row["verdict"] != "refused" and objections(row) for row in rows))
+    write_sheets(rows, options.out)
+    return int(any(not is_without_grid(row) and objections(row) for row in rows))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import sys
 import time
 from dataclasses import fields, replace
 from pathlib import Path
-from textwrap import indent
+from textwrap import indent, wrap
 from typing import Any, Never
 
 import numpy as np
@@ -410,12 +410,19 @@ def test_where_no_grid_came_out_the_picture_shows_the_place_on_the_scan(
     monkeypatch.setattr("scantruss.pipeline.make_grid", fails)
     for name, size in (("a.png", "800x600"), ("b.png", "400x700")):
         assert main(["grid", "scan.xyz", name, "--length", LENGTH, "--size", size, "--no-clean"]) == 2
-        assert f"wrote {name}" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert f"wrote {name}" in said
         picture = np.asarray(Image.open(name).convert("RGB")).astype(float)
+        high, wide, _ = picture.shape
+        lines = len(wrap(said.splitlines()[-1].removeprefix("scantruss: ").rpartition(" (near ")[0], 110))
+        top = high - round(
+            high - (2 + 1.6 * lines) * 22.0 * min(wide / 1600, high / 1200)
+        )  # of the scan, below the words
         red = np.argwhere(np.abs(picture - 255 * FAULT).max(axis=2) < 60)
         low = red[red[:, 0] > 120]  # below the words
         at = (low.min(axis=0) + low.max(axis=0)) / 2
-        assert np.linalg.norm(at[::-1] - _seen(np.loadtxt("scan.xyz"), where, picture.shape)) < 3
+        seen = _seen(np.loadtxt("scan.xyz"), where, (high - top, wide, 3)) + [0, top]
+        assert np.linalg.norm(at[::-1] - seen) < 3
 
 
 def _seen(points: np.ndarray, where: tuple[float, float, float], shape: tuple[int, ...]) -> np.ndarray:

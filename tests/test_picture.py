@@ -265,6 +265,38 @@ def test_places_of_faults_and_warnings_are_marked_with_their_words() -> None:
     assert has_colour(marked, FAULT) > 20 + has_colour(plain, FAULT)
 
 
+@pytest.mark.parametrize("make", [icosahedron, dome])
+@pytest.mark.parametrize(
+    "views, size", [(("auto",), PICTURE_SIZE), (("top", "front"), PANELS_SIZE), (("auto",), (600, 900))]
+)
+def test_the_legend_lies_beside_or_above_what_is_shown(
+    make: Callable[[], st.Grid], views: tuple[str, ...], size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many lines it has, no triangle, member or point lies where they are written."""
+    grid = make()
+    places = [xyz(node) for node in grid.nodes[:5]]
+    faults = tuple(
+        Fault("angle", f"has an angle of {k} degrees and more words", place) for k, place in enumerate(places)
+    )
+    found = replace(Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0), faults=faults, warnings=faults)
+    painted: list[tuple[Any, ...]] = []
+
+    def paint(*given: Any) -> bytes:
+        painted.append(given)
+        return b""
+
+    monkeypatch.setattr("scantruss.export.drawing.picture.paint", paint)
+    encode_picture(grid.replace(certificate=found), cloud_over(grid), style=PictureStyle(views=views, size=size))
+    (_, strokes, texts, _, _), *_ = painted
+    lines = [text for text in texts if text.align == "left"]
+    assert len(lines) == 21
+    right = max(text.x + 0.62 * text.size * len(text.words) for text in lines)
+    low, high = min(text.y for text in lines) - lines[0].size, max(text.y for text in lines) + lines[0].size
+    for each in strokes[1:]:  # the first is the shadow
+        x, y = each.shape.reshape(-1, 2).T
+        assert not ((x < right) & (y > low) & (y < high)).any()
+
+
 def test_a_grid_plots_itself_as_an_image() -> None:
     image = dome().plot(view=("top", "front"), size=(600, 400))
     assert image.size == (600, 400) and hasattr(image, "_repr_png_")

@@ -10,6 +10,7 @@ import numpy as np
 
 from .boundary.find import find_boundary
 from .candidates import Attempt, Hope, advance_fronts, attempts, best_that_passes, improve_fronts
+from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
@@ -139,12 +140,12 @@ def first_that_passes(
 
 
 def make_grid_with_most_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
-    """Return the grid of one attempt; where it fails, ridges are given up near the faults, a few times."""
+    """Return the grid of one attempt; where it fails, ridges are given up near the faults, a few times, and a warning says so."""
     first: FrontError | None = None
     later: Attempt | None = attempt
     while later is not None:  # each turn gives up ridges at one more place at least, and there are not many
         try:
-            return make_grid(cloud, later, progress=progress)
+            return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:
             first, later = first or error, later.after(error)
     assert first is not None

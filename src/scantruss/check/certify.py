@@ -5,19 +5,22 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import CertificateError
-from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
+from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.samples import KEPT
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances
+from .doubtful import doubtful_places
 from .folds import fold_angles
+from .gaps import bridged_gaps
 from .irregular import count_irregular
 from .left_out import OTHER_PIECES, parts_left_out
 from .limits import limits_of, places_to_look_at, widened_limits
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
 COVER_REACH = 0.5
 
 FAULTS_NAMED = 3  # faults that a refusal names
+MOST_ACCEPTED = 0.3  # share of the scan that is missed above which no refusal names the setting that accepts it
 
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -61,17 +65,20 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
         return replace(_topology(grid, samples, boundary, settings), faults=(fault,))
     length = settings.length
     found = measure_distances(grid, samples, length)
-    nearest, cuts, certificate = side_by_side(
+    nearest, cuts, certificate, (gaps, bridged), doubtful = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
         lambda: find_crossings(grid.nodes, grid.triangles),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
+        lambda: bridged_gaps(grid, samples, boundary, length),
+        lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
     )
-    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, found, length))
+    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, gaps, found, length))
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
     faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
-    warnings = (*poor, *places_to_look_at(certificate))
+    missed_at = place_of(samples.scan[_missed(grid, samples, found, length)] + samples.origin)
+    warnings = (*poor, *bridged, *doubtful, *places_to_look_at(certificate, missed_at))
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 
@@ -87,11 +94,26 @@ def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     grid = grid.replace(certificate=certificate)
     if certificate.passed:
         return grid
-    words = " and ".join(fault.words for fault in certificate.faults[:FAULTS_NAMED])
+    words = _listed([fault.words for fault in certificate.faults[:FAULTS_NAMED]])
     more = len(certificate.faults) - FAULTS_NAMED
-    words += f" and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
+    words += f", and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
-    raise CertificateError(f"the grid {words}; --keep-failed gives it all the same", grid, where)
+    raise CertificateError(f"the grid {words}; {_way_out(certificate)}", grid, where)
+
+
+def _listed(words: list[str]) -> str:
+    """Return what is wrong as one part of a sentence."""
+    return ", ".join(words[:-1]) + f" and {words[-1]}" if len(words) > 1 else words[0]
+
+
+def _way_out(found: Certificate) -> str:
+    """Return what gives a grid all the same: the setting that accepts what is wrong if that alone is, else `--keep-failed`."""
+    kinds = {fault.kind for fault in found.faults}
+    if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
+        return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
+    if kinds == {"cover"} and found.missing > 0.0:
+        return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
+    return "--keep-failed gives it all the same"
 
 
 def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -112,15 +134,17 @@ def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     )
 
 
-def _apart(grid: Grid, samples: SurfaceSamples, boundary: Boundary, found: Distances, length: float) -> dict[str, Any]:
+def _apart(
+    grid: Grid, samples: SurfaceSamples, boundary: Boundary, gaps: list[LeftOut], found: Distances, length: float
+) -> dict[str, Any]:
     """Return how far the scan lies from the grid and the grid from the scan, and what is left out."""
-    at_nodes = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    at_nodes = _desired(grid, length)
     at_triangles = at_nodes[grid.triangles].mean(axis=1)
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     beyond = (samples.judged == KEPT) & (found.scan > COVER_REACH * members)
-    left_out = parts_left_out(samples, boundary, found, members, COVER_REACH * members)
+    left_out = parts_left_out(samples, boundary, gaps, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
         "left_out": left_out,
@@ -134,6 +158,17 @@ def _apart(grid: Grid, samples: SurfaceSamples, boundary: Boundary, found: Dista
         "node_distance": _spread(found.nodes, grid.nodes, grid, length / at_nodes),
         "noise": float(np.median(found.noise)),
     }
+
+
+def _desired(grid: Grid, length: float) -> np.ndarray:
+    """Return the desired length at each node (V,)."""
+    return np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+
+
+def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> int:
+    """Return which point is the farthest from the grid of those that are not named otherwise: kept and within a member."""
+    members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
+    return int(np.where((samples.judged == KEPT) & (found.scan <= members), found.scan / members, -1.0).argmax())
 
 
 def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:

@@ -34,10 +34,11 @@ def faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> li
     if not found.orientable:
         faults.append(Fault("orientable", "is not orientable"))
     if found.pieces != found.scan_pieces:
-        words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}"
+        words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}".replace(" 1 pieces", " 1 piece")
         faults.append(Fault("pieces", words, _smallest_piece(grid)))
     if found.boundary_loops != found.scan_loops:
         words = f"has {found.boundary_loops} boundary loops where the scan has {found.scan_loops}"
+        words = words.replace(" 1 boundary loops", " 1 boundary loop")
         faults.append(Fault("loops", words, _odd_loop(grid, boundary)))
     return faults
 
@@ -93,7 +94,7 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
     if found.scan_distance and found.missing > settings.allow_missing:
-        words = f"leaves out {found.missing:.1%} of the scan; --allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
+        words = f"leaves out {found.missing:.1%} of the scan"
         faults.append(Fault("cover", words, found.scan_distance.largest.where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     worst = found.triangle_distance.largest if found.triangle_distance else None

@@ -11,6 +11,7 @@ from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.owners import owners_of
 from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
+from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -22,9 +23,14 @@ PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are
 
 
 def parts_left_out(
-    samples: SurfaceSamples, boundary: Boundary, found: Distances, members: np.ndarray, reach: np.ndarray
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    gaps: list[LeftOut],
+    found: Distances,
+    members: np.ndarray,
+    reach: np.ndarray,
 ) -> tuple[LeftOut, ...]:
-    """Return what a grid leaves out, the most points first; what the settings asked for and holes that are closed come last.
+    """Return what a grid leaves out, the most points first; what the settings asked for, closed holes and bridged gaps come last.
 
     Parameters
     ----------
@@ -34,7 +40,8 @@ def parts_left_out(
     return (
         *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
         *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
-        *_closed_holes(samples, boundary),
+        *_first_and_more(_closed_holes(samples, boundary)),
+        *_first_and_more(gaps),
     )
 
 
@@ -107,17 +114,26 @@ def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:
 
 
 def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
-    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them."""
+    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them.
+
+    Of the latter, places between sparse points are left out that are empty by accident.
+    """
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
     filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
     holes = [_hole(places, samples, asked=True) for places in filled]
-    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged]
-    holes.sort(key=lambda hole: -(hole.size or 0.0))
-    if len(more := holes[PLACES_LISTED:]) < 2:
-        return holes
-    rest = replace(more[0], where=None, number=len(more), asked=all(hole.asked for hole in more))
-    return [*holes[:PLACES_LISTED], rest]
+    points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
+    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
+    return sorted(holes, key=lambda hole: -(hole.size or 0.0))
+
+
+def _first_and_more(parts: list[LeftOut]) -> list[LeftOut]:
+    """Return the first of some entries of one kind, and one for the others."""
+    if len(more := parts[PLACES_LISTED:]) < 2:
+        return parts
+    size = max(part.size or 0.0 for part in more)
+    asked = all(part.asked for part in more)
+    return [*parts[:PLACES_LISTED], replace(more[0], where=None, size=size, number=len(more), asked=asked)]
 
 
 def _hole(places: np.ndarray, samples: SurfaceSamples, *, asked: bool) -> LeftOut:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import Place
 from ..grid.certificate import Certificate, Fault, place_of
 from ..settings import CheckSettings
 from .folds import fold_angles
@@ -22,7 +24,7 @@ WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
-WARN_LEFT_OUT = 0.01  # share of the points that ScanTruss may leave out by itself without a word
+WARN_LEFT_OUT = 0.01  # share of the points that a grid may miss, and ScanTruss may leave out by itself, without a word
 
 
 @dataclass(frozen=True)
@@ -90,17 +92,34 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     ]  # fmt: skip
 
 
-def places_to_look_at(found: Certificate) -> list[Fault]:
-    """Return warnings of what a grid leaves out: each place farther than a member, and much that ScanTruss left out itself."""
+def places_to_look_at(found: Certificate, missed_at: Place) -> list[Fault]:
+    """Return warnings of what a grid leaves out: each place farther than a member, and much that it misses or ScanTruss left out.
+
+    missed_at : the worst place that it misses by less than a member
+    """
     unit = f" {found.unit}" if found.unit else ""
     warnings = [
         Fault("far", f"misses {part.points:,} points ({part.share:.2%}) by up to {part.farthest:.3g}{unit}", part.where)
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]
+    if found.missing > WARN_LEFT_OUT:
+        words = f"misses {found.missing:.1%} of the points by more than half a member"
+        warnings.append(Fault("missed", words, missed_at))
     if found.judged_out > WARN_LEFT_OUT:
         warnings.append(Fault("left out", f"leaves out {found.judged_out:.1%} of the points that were read"))
     return warnings
+
+
+def with_ridges_given_up(grid: Grid, places: Sequence[Place]) -> Grid:
+    """Return a grid with a warning of the places at which it gives up ridges; as it is where there are none."""
+    found = grid.certificate
+    if found is None or not places:
+        return grid
+    more = f" ({len(places)} such places)" if len(places) > 1 else ""
+    words = f"gives up the ridge where no grid passes with it{more}"
+    warning = Fault("ridge", words, place_of(places[0]), tuple(map(place_of, places[1:])))
+    return grid.replace(certificate=replace(found, warnings=(*found.warnings, warning)))
 
 
 def widened_limits(settings: Settings) -> tuple[str, ...]:

@@ -198,7 +198,7 @@ def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
     unit = f" {cloud.unit}" if cloud.unit else ""
     if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
         return f"; a grid passes with --length {length:g}{unit} (tried with --effort quick)"
-    return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either"
+    return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: clean or crop the scan where it fails"
 
 
 def draw_refusal(

@@ -23,7 +23,9 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    kind: str  #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed
+    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed; angle short long offset as fault or
+    #: warning; of a warning far, left out, gap, hole, zigzag, missed, ridge
+    kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
     also: tuple[Place, ...] = ()  #: more such places
@@ -43,20 +45,20 @@ class Spread:
 class LeftOut:
     """Points of the scan that the grid does not follow, or a hole that it closes."""
 
-    kind: str  #: duplicates outliers sparse rods floor pieces far hole, or why points were not read
+    kind: str  #: duplicates outliers sparse rods floor pieces far hole gap, or why points were not read
     points: int
     share: float  #: of all points that were read
     where: Place | None = None  #: middle, in the scan's own frame
     size: float | None = None  #: longest side of the box around it [scan unit]
     farthest: float | None = None  #: largest distance from the grid [scan unit]
     asked: bool = False  #: a setting asked for it; else it was ScanTruss's own judgement
-    number: int = 1  #: holes, where it is several
+    number: int = 1  #: holes or gaps, where it is several
 
     @property
     def words(self) -> str:
         """Say what it is."""
         if self.number > 1:
-            return f"{self.number:,} more holes closed"
+            return f"{self.number:,} more holes closed" if self.kind == "hole" else f"{self.number:,} more gaps bridged"
         return KINDS_LEFT_OUT.get(self.kind, self.kind)
 
 
@@ -71,6 +73,7 @@ KINDS_LEFT_OUT = {
     "pieces": "in pieces too small for this length",
     "far": "farther than a member from the grid",
     "hole": "hole closed",
+    "gap": "gap bridged",
 }
 
 

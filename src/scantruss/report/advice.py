@@ -38,6 +38,7 @@ NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths th
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
+RUNS_USUAL = 4.0  # quick runs that are made at the usual length where no length nearby passes and it is far away
 RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
@@ -159,7 +160,7 @@ class Advice:
         return abs(float(np.log(length / self._usual)))
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not; None where none of those tried does."""
+        """Return the nearest length that passes in place of one that does not, or the usual one; None where none of those tried does."""
         low, high = length_range(self._cloud)
         at = min(max(length, low), high)
         lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY)} - {length}
@@ -171,6 +172,10 @@ class Advice:
                 trial = self.try_length(each, briefly=briefly)
                 if trial is not None and trial.passed:
                     return trial.length
+        if not min(lengths, default=at) <= self._usual <= max(lengths, default=at):  # then this is cheap, or worth it
+            self._runs, self._run_length = RUNS_USUAL, self._usual
+            trial = self.try_length(self._usual, briefly=True)
+            return trial.length if trial is not None and trial.passed else None
         return None
 
     def next_above(self, length: float) -> float:

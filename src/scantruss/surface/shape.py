@@ -60,7 +60,8 @@ def check_is_surface(samples: SurfaceSamples) -> None:
         )
     if volumes > VOLUME_PLACES * looked:
         raise InputError(
-            "the points fill a volume and lie on no surface; a grid needs the points of a surface alone, such as the outermost"
+            "the points fill a volume and lie on no surface; a grid needs the points of a surface alone, such as the outermost:"
+            " clean or crop the scan, or use a shorter length"
         )
 
 

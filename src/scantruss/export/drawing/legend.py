@@ -15,6 +15,8 @@ from .strokes import INK
 
 FAULT, WARNING = np.array([0.78, 0.05, 0.10]), np.array([0.80, 0.45, 0.00])  # colours of marks
 MOST_MARKS = 5  # marks of a kind in a picture
+LINE, SIGN, LETTER = 1.6, 1.4, 0.62  # of a legend: from line to line, of a sign, of a letter on average at most [em]
+LEAST = 0.2  # share of the width and height of a picture that is left to the grid however long the legend is
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
 
 
@@ -27,6 +29,48 @@ class Text(NamedTuple):
     size: float  #: [pixel]
     align: str = "center"
     colour: np.ndarray = INK  #: (3,)
+
+
+class Row(NamedTuple):
+    """A line of a legend."""
+
+    words: str
+    sign: str = ""  #: before them; without it the line is a heading or a remark
+    colour: np.ndarray = INK  #: (3,) of the sign, or of a line without one
+
+
+@dataclass(frozen=True, eq=False)
+class Legend:
+    """What colours and numbers mean, from the upper left corner of a picture downwards."""
+
+    rows: list[Row]
+    corner: tuple[float, float]  #: (x, y) of the first line [pixel]
+    em: float  #: height of the letters [pixel]
+
+    @property
+    def texts(self) -> list[Text]:
+        """The legend as words in the picture."""
+        (x, y), em, texts = self.corner, self.em, []
+        for number, row in enumerate(self.rows):
+            at = y - number * LINE * em
+            words = Text(x + SIGN * em, at, row.words, em, "left")
+            texts += [Text(x, at, row.sign, em, "left", row.colour), words] if row.sign else []
+            texts += [] if row.sign else [Text(x, at, row.words, em, "left", row.colour)]
+        return texts
+
+    def boxes_beside(
+        self, box: tuple[float, float, float, float], *, alone: bool
+    ) -> list[tuple[float, float, float, float]]:
+        """Return the parts of a box (left, bottom, right, top) [pixel] below the legend, and to its right if that view is `alone`."""
+        if not self.rows:
+            return [box]
+        left, bottom, right, top = box
+        wide = SIGN + LETTER * max(len(row.words) for row in self.rows)
+        end = self.corner[1] - (len(self.rows) * LINE + 0.4) * self.em
+        below = (left, bottom, right, max(min(top, end), bottom + LEAST * (top - bottom)))
+        beside = (self.corner[0] + (wide + 2.0) * self.em, bottom, right, top)
+        fits = alone and right - beside[0] > LEAST * (right - left)
+        return [below, beside] if fits else [below]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +102,12 @@ def marks_of(grid: Grid) -> list[Mark]:
     for kind, colour in ((found.faults, FAULT), (found.warnings, WARNING)):
         placed = [Mark(fault.words, fault.where, colour, fault.also) for fault in kind if fault.where is not None]
         marks += placed[:MOST_MARKS]
+    warned = {mark.where for mark in marks}
     unit = f" {grid.unit}" if grid.unit else ""
     marks += [
         Mark(f"{part.words}, {part.size:.3g}{unit} across", part.where, INK)
         for part in found.left_out
-        if part.kind == "hole" and part.where is not None
+        if part.kind in ("hole", "gap") and part.where is not None and part.where not in warned
     ]
     worst = (
         ("shortest member", found.shortest_member, unit),

@@ -19,7 +19,7 @@ from ...runtime.ours import MARK
 from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
-from .legend import FAULT, Ring, Text, marks_of, scale_bar
+from .legend import FAULT, Legend, Ring, Row, Text, marks_of, scale_bar
 from .strokes import (
     INK,
     MOST_POINTS,
@@ -71,6 +71,7 @@ def encode_picture(
     lines: list[np.ndarray] = []
     if len(grid.triangles):
         shown = shown_points(grid, cloud) if cloud is not None else None
+        legend = Legend(_legend_rows(grid, shown) if caption else [], (6 * em, tall - 3.7 * em), em)
         width = wide / len(style.views)
         for number, name in enumerate(style.views):
             camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud), name)
@@ -81,7 +82,12 @@ def encode_picture(
                 tall - 5.5 * em,
             )
             more = None if shown is None else some_of(shown.framed, MOST_POINTS[True])
-            view = look(grid.nodes, grid.triangles, framed(grid.nodes, grid.triangles, camera, box, more), (wide, tall))
+            fitted = [
+                (framed(grid.nodes, grid.triangles, camera, each, more), each)
+                for each in legend.boxes_beside(box, alone=len(style.views) == 1)
+            ]
+            camera, box = max(fitted, key=lambda each: each[0].zoom)  # with room for the legend
+            view = look(grid.nodes, grid.triangles, camera, (wide, tall))
             strokes += grid_strokes(grid, None if shown is None else shown.followed, view)
             strokes += [missed_strokes(part.points, part.colour, view, box) for part in (shown.missed if shown else ())]
             if caption:
@@ -90,8 +96,7 @@ def encode_picture(
                 rings += _rings(grid, view.camera, em, texts)
                 if len(style.views) > 1:
                     texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
-        if caption:
-            _legend(grid, shown, texts, (6 * em, tall - 3.7 * em), em)
+        texts += legend.texts
     return paint((wide, tall), strokes, texts, rings, lines)
 
 
@@ -124,19 +129,13 @@ def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Rin
     return rings
 
 
-def _legend(grid: Grid, shown: Shown | None, texts: list[Text], corner: tuple[float, float], em: float) -> None:
-    """Add what colours and numbers mean, from a corner downwards."""
-    x, y = corner
-    if grid.certificate is not None and not grid.certificate.passed:
-        texts.append(Text(x, y, "This grid fails its certificate:", 1.2 * em, "left", FAULT))
-        y -= 2.0 * em
-    rows = [(part.words, part.colour, "\u25cf") for part in (shown.missed if shown else ())]
-    rows += [(words, INK, "") for words in (shown.unread if shown else ())]
-    rows += [(mark.words, mark.colour, str(number)) for number, mark in enumerate(marks_of(grid), 1)]
-    for words, colour, sign in rows:
-        texts.append(Text(x, y, sign, em, "left", colour))
-        texts.append(Text(x + 1.4 * em, y, words, em, "left"))
-        y -= 1.6 * em
+def _legend_rows(grid: Grid, shown: Shown | None) -> list[Row]:
+    """Return what colours and numbers mean, line by line."""
+    failed = grid.certificate is not None and not grid.certificate.passed
+    rows = [Row("This grid fails its certificate:", "", FAULT)] * failed
+    rows += [Row(part.words, "\u25cf", part.colour) for part in (shown.missed if shown else ())]
+    rows += [Row(words) for words in (shown.unread if shown else ())]
+    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(marks_of(grid), 1)]
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:

@@ -34,9 +34,10 @@ def encode_refusal(error: FrontError, cloud: PointCloud, *, style: PictureStyle 
     em = 22.0 * min(size[0] / PICTURE_SIZE[0], size[1] / PICTURE_SIZE[1])  # height of the letters
     lines = wrap(str(error), LINE)
     texts = [Text(2 * em, size[1] - (2 + 1.6 * k) * em, words, em, "left", FAULT) for k, words in enumerate(lines)]
+    below = size[0], round(size[1] - (2 + 1.6 * len(lines)) * em)
     rings = []
     if error.where is not None:
         place = np.array([error.where]) - cloud.origin
-        ((x, y),), _ = oblique_view(cloud, size)(place)
+        ((x, y),), _ = oblique_view(cloud, below)(place)
         rings = [Ring(float(x), float(y), 1.6 * em, FAULT), Ring(float(x), float(y), 3.2 * em, FAULT)]
-    return paint(size, [cloud_strokes(cloud, size)], texts, rings)
+    return paint(size, [cloud_strokes(cloud, below)], texts, rings)

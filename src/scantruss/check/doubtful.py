@@ -1,0 +1,86 @@
+"""Places at which the boundary of a grid may not be that of the scanned object: zigzags, and holes that may be none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Fault, place_of
+from ..kernels.geometry.components import component_labels
+from ..surface.samples import DUPLICATE, KEPT
+from .gaps import by_x, is_empty_within
+from .limits import PLACES_KEPT
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+
+WINDOW = 6  # nodes along a boundary in which turns are summed
+ZIGZAG = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
+SMALL_HOLE = 12  # nodes around a hole up to which it may be none
+
+
+def doubtful_places(grid: Grid, samples: SurfaceSamples, length: float) -> list[Fault]:
+    """Return warnings of boundaries that run zigzag and of small holes that may be none; desired member length given [scan unit]."""
+    label = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    loops = sorted(grid.boundary_loops, key=len, reverse=True)
+    pieces = [int(label[loop[0]]) for loop in loops]
+    holes = [loop for at, loop in enumerate(loops) if pieces[at] in pieces[:at] and len(loop) <= SMALL_HOLE]
+    kinds = [_kind_of_hole(grid.nodes[loop], samples, length) for loop in holes] if holes else []
+    left_out = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "left out"]
+    sparse = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "sparse"]
+    found = (
+        _warning("zigzag", "runs zigzag at its boundary", grid.nodes[zigzags(grid)], grid.origin),
+        _warning("hole", "has a hole where points were left out", np.array(left_out), grid.origin),
+        _warning("hole", "has a hole that may be none, so far apart are the points", np.array(sparse), grid.origin),
+    )
+    return [warning for warning in found if warning is not None]
+
+
+def _warning(kind: str, words: str, places: np.ndarray, origin: np.ndarray) -> Fault | None:
+    """Return a warning of all places (K, 3); None of none."""
+    if not len(places):
+        return None
+    more = f" ({len(places)} such places)" if len(places) > 1 else ""
+    first, *others = (place_of(place + origin) for place in places[:PLACES_KEPT])
+    return Fault(kind, words + more, first, tuple(others))
+
+
+def zigzags(grid: Grid) -> np.ndarray:
+    """Return the nodes (K,) in the middle of zigzags: on a few members around them a boundary turns much to both sides."""
+    a, b, c = grid.nodes[grid.triangles.T]
+    upward = np.zeros_like(grid.nodes)
+    for corner in grid.triangles.T:
+        np.add.at(upward, corner, np.cross(b - a, c - a))
+    found = [np.zeros(0, np.int64)]
+    for loop in grid.boundary_loops:
+        if len(loop) <= 2 * WINDOW:
+            continue
+        ahead = grid.nodes[np.roll(loop, -1)] - grid.nodes[loop]
+        behind = np.roll(ahead, 1, axis=0)
+        across = np.cross(behind, ahead)
+        turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), (behind * ahead).sum(axis=1)))
+        turn *= np.sign((across * upward[loop]).sum(axis=1))
+        around = np.array([np.roll(turn, WINDOW // 2 - k) for k in range(WINDOW)])
+        least = np.minimum(np.maximum(around, 0.0).sum(axis=0), np.maximum(-around, 0.0).sum(axis=0))
+        highest = least >= np.max([np.roll(least, k) for k in range(-WINDOW, WINDOW + 1)], axis=0)
+        found.append(loop[(least > ZIGZAG) & highest & (least > np.roll(least, 1))])
+    return np.concatenate(found)
+
+
+def _kind_of_hole(around: np.ndarray, samples: SurfaceSamples, length: float) -> str:
+    """Return why a hole with nodes around it (K, 3) may be none: "left out", "sparse", or "" where it is one."""
+    middle = around.mean(axis=0)
+    normal = np.linalg.svd(around - middle)[2][2]
+    radius = float(np.linalg.norm(around - middle, axis=1).max())
+    near = samples.scan[:, 0] - middle[0]
+    which = np.flatnonzero(np.abs(near) <= 3.0 * radius)
+    points, judged = samples.scan[which], samples.judged[which]
+    off = points - middle
+    height = off @ normal
+    level = np.sqrt(np.maximum((off**2).sum(axis=1) - height**2, 0.0))
+    inside = (level <= 0.7 * radius) & (np.abs(height) <= 0.25 * length)
+    if (inside & ~np.isin(judged, (KEPT, DUPLICATE))).any():
+        return "left out"
+    return "" if is_empty_within(around, by_x(points[judged == KEPT])) else "sparse"

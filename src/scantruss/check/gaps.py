@@ -1,0 +1,189 @@
+"""Gaps of a scan that its grid bridges: where a triangle covers a place that has points all around, none of them near."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Fault, LeftOut, place_of
+from ..kernels.geometry.boxes import SearchBoxes
+from ..kernels.geometry.components import component_labels
+from ..kernels.mesh.coverage import nearest_distances
+from .distances import POINT_BOX, boxes_of
+from .limits import PLACES_KEPT
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+
+#: places in a triangle that are looked at, by its corners; with its corners and the middles of its members none is farther than a sixth
+#: of a member from one of them
+PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
+HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
+UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
+SOME_PLACES = 50  # places from which the usual distance is taken
+POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
+ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
+    -1, 2
+)  # places around another [reach]
+OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
+
+MOST_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
+
+
+def bridged_gaps(
+    grid: Grid, samples: SurfaceSamples, boundary: Boundary, length: float
+) -> tuple[list[LeftOut], list[Fault]]:
+    """Return the gaps that a grid bridges and that are not known as closed holes, the widest first, and a warning.
+
+    The warning is of those that are open at the boundary of the grid: there it joins what is apart, or covers a bay.
+
+    Points at random leave a disc of radius d free with a probability of exp(-pi d^2 density), and the ring from d to twice d, of three
+    times its area, tells the density there: n points around an empty disc mean that it would hold n / 3. Discs lie in the planes of
+    the triangles, so that a triangle off a bent surface is none over a gap.
+
+    Parameters
+    ----------
+    length : desired member length [scan unit]
+    """
+    points = samples.measured_points
+    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
+    places, owner = _places(grid)
+    away = np.empty(len(places))
+    nearest_distances(places, points, boxes, 0.25 * length, away)
+    members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    least = HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner]
+    far = np.flatnonzero(away > least)
+    far = far[np.argsort(-away[far], kind="stable")[:MOST_LOOKED_AT]]
+    if not len(far):
+        return [], []
+    points = by_x(points)
+    triangle = owner[far]
+    normals = _normals(grid)
+    some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
+    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
+    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points) for at in far])
+    empty = half > np.maximum(least[far], UNEVEN * usual)
+    far, triangle, half = far[empty], triangle[empty], half[empty]
+    group = _groups(grid, triangle)[triangle]
+    is_open = _open_triangles(grid, samples.measured_points, boxes, length)
+    found: list[tuple[float, LeftOut, bool]] = []
+    for each in np.unique(group):
+        own = np.flatnonzero(group == each)
+        widest = own[half[own].argmax()]
+        middle, width = places[far[widest]], 2.0 * float(half[widest])
+        if not _is_known(middle, samples, boundary):
+            size = float(np.ptp(places[far[own]], axis=0).max()) + width
+            gap = LeftOut("gap", 0, 0.0, place_of(middle + samples.origin), size)
+            found.append((width, gap, bool(is_open[triangle[own]].any())))
+    found.sort(key=lambda each: -each[0])
+    unit = f" {samples.unit}" if samples.unit else ""
+    wide = [(width, gap.where) for width, gap, reaches_boundary in found if reaches_boundary]
+    more = f" ({len(wide)} such places)" if len(wide) > 1 else ""
+    words = f"bridges a gap {wide[0][0]:.3g}{unit} wide{more}" if wide else ""
+    warnings = (
+        [Fault("gap", words, wide[0][1], tuple(where for _, where in wide[1:PLACES_KEPT] if where))] if wide else []
+    )
+    return [gap for _, gap, _ in found], warnings
+
+
+def by_x(points: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) by ascending x."""
+    ordered: np.ndarray = points[np.argsort(points[:, 0], kind="stable")]
+    return ordered
+
+
+def is_empty_within(curve: np.ndarray, points: np.ndarray) -> bool:
+    """Whether a closed curve (M, 3) is around a place that is no accident to be empty; points : (N, 3) by ascending x."""
+    middle = curve.mean(axis=0)
+    normal = np.linalg.svd(curve - middle)[2][2]
+    reach = float(np.linalg.norm(curve - middle, axis=1).max())
+    place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
+    away = float(np.linalg.norm(_within(place, reach, points) - place, axis=1).min(initial=reach))
+    return empty_disc(place, normal, away, points) > 0.0
+
+
+def _within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Return the points (K, 3) of those by ascending x (N, 3) that lie within reach of a place."""
+    begin, end = np.searchsorted(points[:, 0], [place[0] - reach, place[0] + reach])
+    around = points[begin:end]
+    near: np.ndarray = around[((around - place) ** 2).sum(axis=1) <= reach * reach]
+    return near
+
+
+def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Return the place (3,) in the plane around another that is farthest from all points (N, 3) by ascending x."""
+    axes = np.linalg.svd(normal[None])[2][1:]
+    around = _within(middle, 2.0 * reach, points)
+    places: np.ndarray = middle + reach * ACROSS @ axes
+    away = [np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places]
+    return places[int(np.argmax(away))]
+
+
+def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> float:
+    """Return the radius of the disc around a place (3,) that is free of points, 0 where that may be an accident.
+
+    away : distance of the nearest point; points : (N, 3) by ascending x.
+    """
+    level = _level(place, normal, away, points)
+    radius = float(level.min(initial=away))
+    return radius if (level <= 2.0 * radius).sum() >= POINTS_AROUND else 0.0
+
+
+def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
+    """Return the distances in the plane at a place of the points near it (K,); parameters as of `empty_disc`."""
+    around = _within(place, 3.0 * away, points) - place
+    height = around @ normal
+    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
+    return level
+
+
+def _normals(grid: Grid) -> np.ndarray:
+    """Return the unit normals of the triangles (T, 3), zero where they have none."""
+    a, b, c = grid.nodes[grid.triangles.T]
+    normal: np.ndarray = np.cross(b - a, c - a)
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+
+
+def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Return places all over the triangles of a grid but not on its boundary (P, 3), and a triangle in which each is (P,)."""
+    inner = grid.edge_triangles[:, 1] >= 0
+    of_node = np.full(len(grid.nodes), -1)
+    of_node[grid.triangles] = np.arange(len(grid.triangles))[:, None]
+    of_node[grid.edges[~inner]] = -1
+    nodes = np.flatnonzero(of_node >= 0)
+    inside = np.einsum("pc,tcx->tpx", PLACES, grid.nodes[grid.triangles]).reshape(-1, 3)
+    places = np.concatenate([inside, grid.nodes[grid.edges[inner]].mean(axis=1), grid.nodes[nodes]])
+    numbers = np.arange(len(grid.triangles)).repeat(len(PLACES))
+    return places, np.concatenate([numbers, grid.edge_triangles[inner, 0], of_node[nodes]])
+
+
+def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: float) -> np.ndarray:
+    """Return which triangles (T,) bool have a node where the boundary of the grid leaves the scan."""
+    members = grid.edges[grid.edge_triangles[:, 1] < 0]
+    places = np.concatenate([grid.nodes[members].mean(axis=1), grid.nodes[members[:, 0]]])
+    away = np.empty(len(places))
+    nearest_distances(places, points, boxes, 0.25 * length, away)
+    ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
+    return np.asarray(np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1))
+
+
+def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:
+    """Return a number (T,) for each triangle: the same for those of some (K,) that have a node in common."""
+    a, b, c = grid.triangles[np.unique(chosen)].T
+    label = component_labels(len(grid.nodes), np.concatenate([a, b]), np.concatenate([b, c]))
+    return label[grid.triangles[:, 0]]
+
+
+def _is_known(place: np.ndarray, samples: SurfaceSamples, boundary: Boundary) -> bool:
+    """Whether a place (3,) lies over a hole that was filled, or in the curve around one that is bridged."""
+    mean = samples.surface.mean
+    away = ((mean - place) ** 2).sum(axis=1)
+    if away.argmin() >= samples.measured:
+        return True
+    around = ((curve, curve.mean(axis=0)) for curve in boundary.bridged)
+    return any(
+        np.linalg.norm(place - middle) <= np.linalg.norm(curve - middle, axis=1).max() for curve, middle in around
+    )

@@ -1,0 +1,187 @@
+"""What the certificate warns of: bridged gaps, holes that may be none, boundaries that run zigzag, and what is nearly missed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_clouds import sheet
+from small_grids import make_grid
+from steps import steps_of
+from typed import known
+
+import scantruss as st
+from scantruss.boundary.find import Boundary
+from scantruss.check.certify import certified, certify
+from scantruss.check.doubtful import doubtful_places, zigzags
+from scantruss.check.gaps import bridged_gaps
+from scantruss.check.limits import places_to_look_at
+from scantruss.errors import CertificateError
+from scantruss.grid.certificate import Certificate, Fault, LeftOut
+from scantruss.report.figures import left_out_lines
+from scantruss.surface.samples import OUTLIER, sample_surface
+
+SETTINGS = st.Settings(length=1.0)
+NOTHING = Boundary(())
+
+
+def lattice(columns: int = 8, rows: int = 8) -> st.Grid:
+    """A rhombus of equilateral triangles of length 1 around the origin."""
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij"))
+    nodes = np.column_stack([i + j / 2 - columns / 2 - rows / 4, (j - rows / 2) * 0.75**0.5, 0 * i])
+    number = np.arange(len(i)).reshape(columns + 1, rows + 1)
+    corners = [
+        (number[a, b], number[a + 1, b], number[a, b + 1], number[a + 1, b + 1]) for a, b in np.ndindex(columns, rows)
+    ]
+    return make_grid(nodes, [triangle for a, b, c, d in corners for triangle in ((a, b, c), (b, d, c))])
+
+
+def scanned(points: np.ndarray, grid: st.Grid) -> tuple[st.SurfaceSamples, st.Grid]:
+    """Return the samples of some points, and the grid in their frame."""
+    cloud = st.PointCloud.from_array(points)
+    return sample_surface(cloud, SETTINGS), grid.replace(nodes=grid.nodes - cloud.origin, origin=cloud.origin)
+
+
+def gaps_at(points: np.ndarray) -> tuple[list[LeftOut], list[Fault]]:
+    """Return the gaps that a plate bridges in a scan."""
+    samples, grid = scanned(points, lattice())
+    return bridged_gaps(grid, samples, NOTHING, 1.0)
+
+
+def test_a_slit_that_joins_two_parts_is_listed_and_a_warning_with_its_width_and_place() -> None:
+    """Two patches that a long member reaches over: points to grid cannot see it, no point is far."""
+    listed, warnings = gaps_at(sheet(13, 8, 0.08, keep=lambda x, _: abs(x) > 0.3))
+    (gap,) = listed
+    assert gap.kind == "gap" and known(gap.size) > 5.0 and abs(known(gap.where)[0]) < 0.3
+    (warning,) = warnings
+    assert warning.where == gap.where
+    assert float(warning.words.split(" gap ")[1].split()[0]) == pytest.approx(0.6, abs=0.15)
+
+
+def test_a_hole_inside_is_listed_without_a_warning_and_a_narrow_one_is_nothing() -> None:
+    listed, warnings = gaps_at(sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - 0.4, y) > 0.4))
+    assert [gap.kind for gap in listed] == ["gap"] and not warnings
+    assert np.hypot(known(listed[0].where)[0] - 0.4, known(listed[0].where)[1]) < 0.2
+    assert gaps_at(sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - 0.4, y) > 0.15)) == ([], [])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_points_at_random_on_lines_or_ever_sparser_have_no_gaps(seed: int) -> None:
+    """A grid of members as short as the points allow: their discs are empty by accident."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform([-6.5, -4], [6.5, 4], (3300, 2))
+    lines = np.column_stack([rng.uniform(-6.5, 6.5, 9000), 0.45 * rng.integers(-9, 10, 9000)])
+    sparser = places[rng.random(len(places)) < np.exp(0.25 * places[:, 0] - 1.7)]
+    for flat in (places, lines, sparser):
+        assert gaps_at(np.column_stack([flat, 0.01 * rng.normal(size=len(flat))])) == ([], []), seed
+
+
+def test_a_triangle_off_a_sharp_fold_is_over_no_gap() -> None:
+    points = sheet(13, 8, 0.08)
+    points[:, 2] = 0.9 - 0.9 * abs(points[:, 0])
+    samples, grid = scanned(points, lattice())
+    nodes = grid.nodes.copy()
+    nodes[:, 2] = np.where(abs(nodes[:, 0] + grid.origin[0]) < 0.7, 0.3, 0.9 - 0.9 * abs(nodes[:, 0] + grid.origin[0]))
+    assert bridged_gaps(grid.replace(nodes=nodes), samples, NOTHING, 1.0) == ([], [])
+
+
+def test_many_gaps_are_five_lines_and_one_for_the_others() -> None:
+    middles = [(x, y) for y in (-1.7, 1.7) for x in np.array([-3.0, -1.0, 1.0, 3.0]) + y / 3**0.5]
+    points = sheet(13, 8, 0.07)
+    away = np.linalg.norm(points[:, None, :2] - middles, axis=2).min(axis=1)
+    points = points[away > 0.42]
+    samples, grid = scanned(points, lattice())
+    found = certify(grid, samples, NOTHING, SETTINGS)
+    lines = [line for line in left_out_lines(found) if "gap" in line]
+    assert (
+        len(lines) == 6
+        and lines[0].startswith("gap bridged, near (")
+        and lines[-1].startswith("3 more gaps bridged, up to ")
+    )
+
+
+def without_node(grid: st.Grid, node: int) -> st.Grid:
+    """Return a grid with a hole at a node."""
+    return grid.replace(triangles=grid.triangles[~(grid.triangles == node).any(axis=1)])
+
+
+def test_a_hole_of_the_scan_is_none_to_doubt_but_one_between_sparse_points_or_left_out_ones_is() -> None:
+    whole = lattice()
+    node = int(np.linalg.norm(whole.nodes, axis=1).argmin())
+    middle = whole.nodes[node, :2]
+    holed = without_node(whole, node)
+    true = sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.8)
+    sparse = sheet(13, 8, 0.4, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.5)
+    samples, grid = scanned(true, holed)
+    assert doubtful_places(grid, samples, 1.0) == []
+    samples, grid = scanned(sparse, holed)
+    (warning,) = doubtful_places(grid, samples, 1.0)
+    assert warning.kind == "hole" and "may be none" in warning.words
+    assert np.linalg.norm(np.array(known(warning.where))[:2] - middle) < 0.05
+    samples, grid = scanned(np.concatenate([true, [[*middle, 0.05]]]), holed)
+    judged = np.where(
+        np.linalg.norm(samples.scan[:, :2] + samples.origin[:2] - middle, axis=1) < 0.2, OUTLIER, samples.judged
+    )
+    (warning,) = doubtful_places(grid, replace(samples, judged=judged.astype(np.uint8)), 1.0)
+    assert warning.words == "has a hole where points were left out"
+
+
+def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> None:
+    grid = lattice()
+    assert not len(zigzags(grid))
+    number = np.arange(len(grid.triangles))
+    x, y, _ = grid.nodes[grid.triangles].mean(axis=1).T
+    step = grid.replace(triangles=grid.triangles[(x + y / 3**0.5 < 0.1) | (y < 1.8)])
+    assert not len(zigzags(step))
+    teeth = grid.replace(triangles=grid.triangles[(number % 2 == 0) | (y < y.max() - 0.7)])
+    found = zigzags(teeth)
+    assert 1 <= len(found) <= 4 and (teeth.nodes[found, 1] > 2.5).all()
+
+
+def test_more_than_one_percent_missed_by_half_a_member_is_a_warning_with_its_place() -> None:
+    points = sheet(13, 7, 0.08, keep=lambda x, y: abs(x - y / 3**0.5) < 4.2)
+    points[:, 2] = 0.8 * np.exp(-((points[:, 0] / 1.2) ** 2 + (points[:, 1] / 1.2) ** 2))
+    samples, grid = scanned(points, lattice())
+    found = certify(grid, samples, NOTHING, SETTINGS)
+    (warning,) = (warning for warning in found.warnings if warning.kind == "missed")
+    assert (
+        warning.words == f"misses {found.missing:.1%} of the points by more than half a member" and found.missing > 0.01
+    )
+    assert np.hypot(*known(warning.where)[:2]) < 0.9
+    small = replace(found, missing=0.009)
+    assert "missed" not in {warning.kind for warning in places_to_look_at(small, (0.0, 0.0, 0.0))}
+
+
+def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    samples, grid = scanned(sheet(13, 8, 0.08), lattice())
+    boundary = steps_of(st.PointCloud.from_array(sheet(13, 8, 0.08)), SETTINGS).boundary
+    base = Certificate("", 0.5, True, True, 1, 1, 1, 1, 1, 0)
+    cover, angle, short = (
+        Fault("cover", "leaves out 12.1% of the scan"),
+        Fault("angle", "has an angle"),
+        Fault("short", "is short"),
+    )
+    for faults, missing, said in (
+        ((cover,), 0.121, "the grid leaves out 12.1% of the scan; --allow-missing 0.13 accepts that"),
+        (
+            (cover,),
+            0.6,
+            "the grid leaves out 12.1% of the scan; choose the part that is wanted with --crop or --piece; --keep-failed",
+        ),
+        (
+            (angle, short, cover),
+            0.121,
+            "the grid has an angle, is short and leaves out 12.1% of the scan; --keep-failed gives it",
+        ),
+        (
+            (angle, short, cover, angle),
+            0.121,
+            "the grid has an angle, is short and leaves out 12.1% of the scan, and has 1 other fault;",
+        ),
+    ):
+        found = replace(base, faults=faults, missing=missing)
+        monkeypatch.setattr("scantruss.check.certify.certify", lambda *_, found=found: found)
+        with pytest.raises(CertificateError) as refused:
+            certified(grid, samples, boundary, SETTINGS)
+        assert str(refused.value).startswith(said)
