@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
 from .constraints.ridges import find_ridges
-from .errors import CertificateError, FrontError
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
@@ -45,6 +45,8 @@ LENGTHS = (
     1.04,
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed, in turn, where no grid passes without [member lengths]
+ROUGH_SCAN = 0.25  # share of thick samples from which on a scan is so rough that this comes before anything else is given up
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 MOST_FAULTS = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
@@ -75,10 +77,13 @@ class Attempt:
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
 
-    Rather a grid without ridges than none, or one of another look at the scan: a scan so rough that hardly a grid passes is
-    another one to samples that lie a little farther apart. Method "paper" comes last.
+    Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
+    that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
+    very_rough = sample_surface(cloud, settings).rough > ROUGH_SCAN
+    if very_rough:
+        yield from _smoothed(settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
@@ -94,6 +99,8 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
         settings = settings.replace(judge_outliers="always")
         yield from _same_scan(settings)
+    if not very_rough:
+        yield from _smoothed(settings)
     samples = sample_surface(cloud, settings)
     if settings.method == "default":
         if samples.smooth:
@@ -115,6 +122,13 @@ def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
 
 
+def _smoothed(settings: Settings) -> Iterator[Attempt]:
+    """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
+    if settings.method == "default" and settings.smooth_scale is None:
+        for scale in SMOOTHED:
+            yield from _same_scan(settings.replace(smooth_scale=scale, ridge_angle=0.0))
+
+
 def _same_scan(settings: Settings) -> Iterator[Attempt]:
     """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
     if settings.method == "default":
@@ -127,12 +141,13 @@ class Hope:
     """Which attempts are still worth making.
 
     After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
-    such settings none would.
+    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not.
     """
 
     def __init__(self) -> None:
         self._settings: Settings | None = None
         self._far = self._given_up = 0
+        self._looks_one_sided = False
 
     def is_left(self) -> bool:
         """Whether any attempt is worth making."""
@@ -140,18 +155,23 @@ class Hope:
 
     def allows(self, attempt: Attempt) -> bool:
         """Whether an attempt is worth making."""
+        if self._looks_one_sided and not attempt.settings.smooth_scale:
+            return False
         return attempt.settings is not self._settings or self._far < MOST_FAR
 
-    def note(self, attempt: Attempt, fault: Exception) -> None:
+    def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
         if attempt.settings is not self._settings:
             self._settings, self._far = attempt.settings, 0
+        self._looks_one_sided |= isinstance(fault, OneSidedError)
         self._far = self._far + 1 if _is_far_from_passing(fault) else 0
         self._given_up += self._far == MOST_FAR
 
 
-def _is_far_from_passing(fault: Exception) -> bool:
+def _is_far_from_passing(fault: ScanTrussError) -> bool:
     """Whether a grid misses many boundary loops, or many of its triangles cut each other."""
+    if isinstance(fault, OneSidedError):
+        return True
     if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
         return False
     found = fault.grid.certificate

@@ -11,7 +11,7 @@ import numpy as np
 from .boundary.find import find_boundary
 from .candidates import Attempt, Hope, advance_fronts, attempts, best_that_passes, improve_fronts
 from .constraints.find import find_constraints
-from .errors import CertificateError, FrontError, ScanTrussError
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .runtime.progress import Progress
@@ -86,7 +86,7 @@ def grid_from_cloud(
     -------
     Grid
         Where no grid passes the checks, one without the ridges of the scan, with other samples or by the paper's method, if that
-        passes; its settings say so: `ridge_angle` 0, another `box_size`, `method` "paper".
+        passes; its settings say so: `ridge_angle` 0, a `smooth_scale`, another `box_size`, `method` "paper".
     """
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
@@ -115,10 +115,10 @@ def first_that_passes(
 
     Raises
     ------
-    FrontError
+    ScanTrussError
         None passes; the fault of the first with the settings asked for that gave a grid, else of the first.
     """
-    faults: list[FrontError] = []
+    faults: list[ScanTrussError] = []
     hope = Hope()
     for attempt in tried:
         if not hope.allows(attempt):
@@ -127,7 +127,7 @@ def first_that_passes(
             return make_grid_with_most_ridges(cloud, attempt, progress=progress)
         except ScanTrussError as error:
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
-                if not isinstance(error, FrontError):
+                if not isinstance(error, FrontError | OneSidedError):
                     raise
                 faults.append(error)
             hope.note(attempt, error)

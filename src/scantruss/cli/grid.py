@@ -169,6 +169,8 @@ def make_grid(
         bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
+    if grid.settings is not None and grid.settings.smooth_scale != settings.smooth_scale:
+        note_smoothed(bars, grid)
     if grid.settings is not None and grid.settings.box_size != settings.box_size:
         bars.note(
             f"no grid passes with the usual sample spacing, so it is made as with --box-size {grid.settings.box_size:g}"
@@ -179,6 +181,18 @@ def make_grid(
     note_layers(bars, cloud, grid.settings or settings)
     note_pieces(bars, cloud, grid.settings or settings)
     return grid
+
+
+def note_smoothed(bars: Bars, grid: Grid) -> None:
+    """Report that a rough scan was smoothed, and how far that has taken the nodes from its points."""
+    from ..report.figures import offset_words
+
+    assert grid.settings is not None and grid.certificate is not None
+    scale = grid.settings.smooth_scale
+    bars.note(
+        f"no grid follows the roughness of this scan, so it is smoothed over {scale:g} members, as with --smooth-scale {scale:g}"
+        f" --ridge-angle 0: nodes lie on the mean surface; points around nodes: {offset_words(grid.certificate)}"
+    )
 
 
 def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:
