@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -45,11 +46,16 @@ LENGTHS = (
     1.04,
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
-SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed, in turn, where no grid passes without [member lengths]
-ROUGH_SCAN = 0.25  # share of thick samples from which on a scan is so rough that this comes before anything else is given up
+SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
+SOME_ROUGH, MANY_ROUGH = (
+    0.02,
+    0.25,
+)  # shares of thick samples from which on a scan is rough, and so rough that this comes first
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 MOST_FAULTS = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
+FAR_MISSING = 2.0  # share of the scan that a grid misses above which the same holds, in shares that may be missing
+MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 COARSEST = 0.5  # largest of them, in desired lengths
 
@@ -73,6 +79,16 @@ class Attempt:
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
         return replace(self, faults=self.faults + new) if new and follows and len(self.faults) < MOST_FAULTS else None
 
+    def advice(self, fault: ScanTrussError) -> str:
+        """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
+        found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+        if found is None or not self.settings.smooth_scale or {each.kind for each in found.faults} != {"cover"}:
+            return ""
+        return (
+            f"with --smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0 --allow-missing"
+            f" {math.ceil(100.0 * found.missing) / 100.0:g} a grid of its mean surface passes"
+        )
+
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
@@ -81,8 +97,8 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
-    very_rough = sample_surface(cloud, settings).rough > ROUGH_SCAN
-    if very_rough:
+    rough = sample_surface(cloud, settings).rough
+    if rough > MANY_ROUGH:
         yield from _smoothed(settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
@@ -99,7 +115,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
         settings = settings.replace(judge_outliers="always")
         yield from _same_scan(settings)
-    if not very_rough:
+    if SOME_ROUGH < rough <= MANY_ROUGH:
         yield from _smoothed(settings)
     samples = sample_surface(cloud, settings)
     if settings.method == "default":
@@ -126,7 +142,9 @@ def _smoothed(settings: Settings) -> Iterator[Attempt]:
     """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
     if settings.method == "default" and settings.smooth_scale is None:
         for scale in SMOOTHED:
-            yield from _same_scan(settings.replace(smooth_scale=scale, ridge_angle=0.0))
+            smoothed = settings.replace(smooth_scale=scale, ridge_angle=0.0)
+            yield Attempt(smoothed)
+            yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
 
 
 def _same_scan(settings: Settings) -> Iterator[Attempt]:
@@ -141,17 +159,22 @@ class Hope:
     """Which attempts are still worth making.
 
     After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
-    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not.
+    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
+    counted in grids that are made, not in seconds: the same scan gets the same result.
     """
 
     def __init__(self) -> None:
         self._settings: Settings | None = None
         self._far = self._given_up = 0
-        self._looks_one_sided = False
+        self._runs, self._looks_one_sided = 0, False
 
     def is_left(self) -> bool:
         """Whether any attempt is worth making."""
-        return self._given_up < MOST_GIVEN_UP
+        return self._given_up < MOST_GIVEN_UP and self._runs < MOST_RUNS
+
+    def begin(self) -> None:
+        """Note that a grid is made."""
+        self._runs += 1
 
     def allows(self, attempt: Attempt) -> bool:
         """Whether an attempt is worth making."""
@@ -164,17 +187,19 @@ class Hope:
         if attempt.settings is not self._settings:
             self._settings, self._far = attempt.settings, 0
         self._looks_one_sided |= isinstance(fault, OneSidedError)
-        self._far = self._far + 1 if _is_far_from_passing(fault) else 0
+        self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
         self._given_up += self._far == MOST_FAR
 
 
-def _is_far_from_passing(fault: ScanTrussError) -> bool:
-    """Whether a grid misses many boundary loops, or many of its triangles cut each other."""
+def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
+    """Whether a grid misses many boundary loops or much of the scan, or many of its triangles cut each other."""
     if isinstance(fault, OneSidedError):
         return True
     if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
         return False
     found = fault.grid.certificate
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing:
+        return True
     return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
 
 

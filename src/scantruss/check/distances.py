@@ -105,7 +105,8 @@ def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> t
 
     Measured points, never those of the mean surface; NaN over closed holes.
     """
-    points = samples.measured_points[:: len(samples.measured_points) // (ENOUGH * len(grid.nodes)) + 1]
+    every = len(samples.measured_points) // (ENOUGH * len(grid.nodes)) + 1
+    points = np.ascontiguousarray(samples.measured_points[::every])
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     bias, scatter = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     boxes = boxes_of(points, POINT_BOX * length)

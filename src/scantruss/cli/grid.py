@@ -167,10 +167,10 @@ def make_grid(
         )
     if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
         bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
-    if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
-        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.smooth_scale != settings.smooth_scale:
         note_smoothed(bars, grid)
+    elif grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
+        bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:
         bars.note(
             f"no grid passes with the usual sample spacing, so it is made as with --box-size {grid.settings.box_size:g}"
@@ -189,8 +189,9 @@ def note_smoothed(bars: Bars, grid: Grid) -> None:
 
     assert grid.settings is not None and grid.certificate is not None
     scale = grid.settings.smooth_scale
+    words = "a member" if scale == 1.0 else f"{scale:g} members"
     bars.note(
-        f"no grid follows the roughness of this scan, so it is smoothed over {scale:g} members, as with --smooth-scale {scale:g}"
+        f"no grid follows the roughness of this scan, so it is smoothed over {words}, as with --smooth-scale {scale:g}"
         f" --ridge-angle 0: nodes lie on the mean surface; points around nodes: {offset_words(grid.certificate)}"
     )
 

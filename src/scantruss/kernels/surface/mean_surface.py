@@ -24,7 +24,9 @@ MOST_POINTS = 4096  # more than fill a ball of 8 spacings
 TURNS = 4  # fits, each with the weights that follow from the one before
 KNOWN_TURNS = 3  # fits that turn the plane, too
 FAR_OFF = 1.5  # distance from the fit, in mean ones, at which a point weighs half
-ASIDE = 0.2  # distance of the centre of the points from the middle of the ball, in radii, from which on a plane is fitted
+ASIDE = (
+    0.2  # distance of the centre of the points from the middle of the ball, in radii, from which on a plane is fitted
+)
 FEWEST_FOR_QUADRIC, FEWEST_FOR_PLANE = 12, 6
 
 
