@@ -23,7 +23,7 @@ GROWTHS = 50  # times that the reach is made four times as large at most: from a
 BOX = 0.5  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]
 AROUND_NODE = 1.0  # radius within which points are compared with a node [member lengths]
-ENOUGH = 100  # points a node that are compared with it
+ENOUGH = 30  # points a node that are compared with it
 AROUND = 12  # points through which the plane at a node goes
 POINTS_PER_THREAD = 20_000  # fewest points for a thread of their own
 
