@@ -90,6 +90,15 @@ def test_a_scan_that_folds_over_gets_a_grid_of_its_mean_surface_and_the_settings
         st.grid_from_points(points, settings.replace(smooth_scale=0.0))
 
 
+def test_two_layers_that_became_one_are_still_reported() -> None:
+    low = sheet(6, 6, 0.1)
+    points = np.concatenate([low, low + np.array([0.03, 0.04, 0.3])])
+    samples = sample_surface(PointCloud.from_array(points), st.Settings(length=1.0, smooth_scale=0.5))
+    assert abs(samples.surface.mean[:, 2] - 0.15).mean() < 0.03
+    distance, share = samples.layers
+    assert abs(distance - 0.3) < 0.05 and share > 0.5
+
+
 def test_a_smooth_scan_is_not_smoothed() -> None:
     points, settings = cap(4.0, 1.0, 0.25), st.Settings(length=1.0)
     one, other = (st.grid_from_points(points, settings.replace(smooth_scale=scale)) for scale in (None, 0.0))

@@ -94,7 +94,11 @@ def find_layers(samples: SurfaceSamples) -> tuple[float, float]:
         return 0.0, 0.0
     apart, looked = [], 0
     for sample in _spread_evenly(len(surface.mean)):
-        points = _points_near(surface, surface.mean[sample], LAYER_REACH * surface.length) - surface.mean[sample]
+        place, reach = surface.mean[sample], LAYER_REACH * surface.length
+        measured = (
+            _within(samples.measured_points, place, reach) if samples.moved else _points_near(surface, place, reach)
+        )
+        points = measured - place
         if len(points) < 20:
             continue
         looked += 1
