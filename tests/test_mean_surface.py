@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from shapes import make
 from small_clouds import cap, sheet
 from typed import known
 
 import scantruss as st
+from scantruss.candidates import attempts
 from scantruss.check.distances import offsets_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.geometry.quadric import TERMS_OF_PLANE, TERMS_OF_QUADRIC
@@ -97,6 +99,13 @@ def test_two_layers_that_became_one_are_still_reported() -> None:
     assert abs(samples.surface.mean[:, 2] - 0.15).mean() < 0.03
     distance, share = samples.layers
     assert abs(distance - 0.3) < 0.05 and share > 0.5
+
+
+def test_two_sheets_are_never_made_one_unasked() -> None:
+    """A sheet folded over at .6 members: its attempts are not smoothed, so it is refused rather than halved."""
+    shape = make("fold_over", 20_000)
+    tried = attempts(PointCloud.from_array(shape.points), st.Settings(length=shape.length))
+    assert not any(attempt.settings.smooth_scale for attempt in tried)
 
 
 def test_a_smooth_scan_is_not_smoothed() -> None:

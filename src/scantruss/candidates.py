@@ -143,6 +143,8 @@ def _smoothed(settings: Settings) -> Iterator[Attempt]:
     if settings.method == "default" and settings.smooth_scale is None:
         for scale in SMOOTHED:
             smoothed = settings.replace(smooth_scale=scale, ridge_angle=0.0)
+            if sample_surface(cloud, smoothed).layers[1] > 0.0:  # two sheets would become one
+                return
             yield Attempt(smoothed)
             yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
 

@@ -77,7 +77,7 @@ class SurfaceSamples:
     sample_spacing: float = 0.0  #: spacing of the points of `surface` then [scan unit]
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
     rough: float = 0.0  #: share of the samples thicker than `THICK` before they were moved
-    moved: bool = False  #: whether the points of `surface` were moved to the mean surface, see `Settings.smooth_scale`
+    moved: float = 0.0  #: `Settings.smooth_scale` where the points of `surface` were moved to the mean surface, else 0
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
 
@@ -335,7 +335,7 @@ def _prepare(
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
         chosen.rough,
-        asked.smooth_scale > 0.0,
+        asked.smooth_scale,
     )
 
 
