@@ -99,7 +99,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     yield from _same_scan(settings)
     rough = sample_surface(cloud, settings).rough
     if rough > MANY_ROUGH:
-        yield from _smoothed(settings)
+        yield from _smoothed(cloud, settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
@@ -116,7 +116,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
         settings = settings.replace(judge_outliers="always")
         yield from _same_scan(settings)
     if SOME_ROUGH < rough <= MANY_ROUGH:
-        yield from _smoothed(settings)
+        yield from _smoothed(cloud, settings)
     samples = sample_surface(cloud, settings)
     if settings.method == "default":
         if samples.smooth:
@@ -138,7 +138,7 @@ def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
 
 
-def _smoothed(settings: Settings) -> Iterator[Attempt]:
+def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
     if settings.method == "default" and settings.smooth_scale is None:
         for scale in SMOOTHED:
