@@ -15,7 +15,7 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
-from scantruss.candidates import LENGTHS, attempts
+from scantruss.candidates import LENGTHS, MOST_RUNS, SMOOTHED, Attempt, attempts
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
@@ -58,6 +58,21 @@ def test_what_is_tried_in_which_order() -> None:
     assert listed(rough, method="paper") == [(ridge, None, "paper")]
 
 
+@pytest.mark.parametrize(("noise", "first"), [(0.0, None), (0.07, 8), (0.2, 4)])
+def test_the_mean_surface_is_tried_on_rough_scans_alone_and_on_very_rough_ones_at_once(
+    noise: float, first: int | None
+) -> None:
+    points = sheet(8, 8, 0.1)
+    points[:, 2] += np.random.default_rng(0).normal(0.0, noise, len(points))
+    cloud = st.PointCloud.from_array(points)
+    scales = [attempt.settings.smooth_scale for attempt in attempts(cloud, st.Settings(length=1.0))]
+    assert (scales.index(SMOOTHED[0]) if SMOOTHED[0] in scales else None) == first
+    assert [scale for scale in scales if scale] == [scale for scale in SMOOTHED for _ in range(2) if first]
+    for asked in (0.0, 0.7):
+        made = attempts(cloud, st.Settings(length=1.0, smooth_scale=asked))
+        assert {attempt.settings.smooth_scale for attempt in made} == {asked}
+
+
 def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without() -> None:
     cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
     by_kind: dict[tuple[object, ...], list[Any]] = {}
@@ -98,6 +113,14 @@ def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch
     with pytest.raises(FrontError, match="fault 1"):
         st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
     assert len(begun) == 4 * 4 + 3
+
+
+def test_no_more_grids_are_made_than_the_law_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pipeline, "attempts", lambda cloud, settings: (Attempt(settings) for _ in range(1000)))
+    begun = refusing(monkeypatch, lambda _: False)
+    with pytest.raises(FrontError, match="fault 1"):
+        st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
+    assert len(begun) == MOST_RUNS
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])

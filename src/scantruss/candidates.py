@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
 from .constraints.ridges import find_ridges
-from .errors import CertificateError, FrontError
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
@@ -43,9 +44,14 @@ FINALIST_BATCHES = 2  # times that finalists are tried
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 LENGTHS = (1.0, 0.97, 1.04)
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
+# shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
+ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
+FAR_MISSING = 2.0  # share of the scan that a grid misses above which the same holds, in shares that may be missing
+MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 
@@ -73,14 +79,27 @@ class Attempt:
             else None
         )
 
+    def advice(self, fault: ScanTrussError) -> str:
+        """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
+        found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+        if found is None or not self.settings.smooth_scale or {each.kind for each in found.faults} != {"cover"}:
+            return ""
+        return (
+            f"with --smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0 --allow-missing"
+            f" {math.ceil(100.0 * found.missing) / 100.0:g} a grid of its mean surface passes"
+        )
+
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
 
-    Rather a grid without ridges than none, or one of another look at the scan: a scan so rough that hardly a grid passes is
-    another one to samples that lie a little farther apart. Method "paper" comes last.
+    Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
+    that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
+    rough = sample_surface(cloud, settings).rough
+    if rough > VERY_ROUGH_SCAN:
+        yield from _smoothed(cloud, settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
@@ -96,6 +115,8 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
         settings = settings.replace(judge_outliers="always")
         yield from _same_scan(settings)
+    if ROUGH_SCAN < rough <= VERY_ROUGH_SCAN:
+        yield from _smoothed(cloud, settings)
     samples = sample_surface(cloud, settings)
     if settings.method == "default":
         if samples.smooth:
@@ -117,6 +138,17 @@ def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
 
 
+def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
+    """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
+    if settings.method == "default" and settings.smooth_scale is None:
+        for scale in SMOOTHED:
+            smoothed = settings.replace(smooth_scale=scale, ridge_angle=0.0)
+            if sample_surface(cloud, smoothed).layers[1] > 0.0:  # two sheets would become one
+                return
+            yield Attempt(smoothed)
+            yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
+
+
 def _same_scan(settings: Settings) -> Iterator[Attempt]:
     """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
     if settings.method == "default":
@@ -129,34 +161,47 @@ class Hope:
     """Which attempts are still worth making.
 
     After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
-    such settings none would.
+    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
+    counted in grids that are made, not in seconds: the same scan gets the same result.
     """
 
     def __init__(self) -> None:
         self._settings: Settings | None = None
         self._far = self._given_up = 0
+        self._runs, self._looks_one_sided = 0, False
 
     def is_left(self) -> bool:
         """Whether any attempt is worth making."""
-        return self._given_up < MOST_GIVEN_UP
+        return self._given_up < MOST_GIVEN_UP and self._runs < MOST_RUNS
+
+    def begin(self) -> None:
+        """Note that a grid is made."""
+        self._runs += 1
 
     def allows(self, attempt: Attempt) -> bool:
         """Whether an attempt is worth making."""
+        if self._looks_one_sided and not attempt.settings.smooth_scale:
+            return False
         return attempt.settings is not self._settings or self._far < MOST_FAR
 
-    def note(self, attempt: Attempt, fault: Exception) -> None:
+    def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
         if attempt.settings is not self._settings:
             self._settings, self._far = attempt.settings, 0
-        self._far = self._far + 1 if _is_far_from_passing(fault) else 0
+        self._looks_one_sided |= isinstance(fault, OneSidedError)
+        self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
         self._given_up += self._far == MOST_FAR
 
 
-def _is_far_from_passing(fault: Exception) -> bool:
-    """Whether a grid misses many boundary loops, or many of its triangles cut each other."""
+def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
+    """Whether a grid misses many boundary loops or much of the scan, or many of its triangles cut each other."""
+    if isinstance(fault, OneSidedError):
+        return True
     if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
         return False
     found = fault.grid.certificate
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing:
+        return True
     return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
 
 

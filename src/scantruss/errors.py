@@ -3,6 +3,7 @@
 ScanTrussError
     InputError     data or a setting cannot be used (also a ValueError)
       LengthError      the member length cannot be used with this scan
+      OneSidedError    the surface has one side, as a Moebius strip
     FrontError     the front stopped early; has .grid, what was reached, and .where
       CertificateError   a whole grid that does not pass; .grid has its certificate
     FormatError    a file cannot be read or written
@@ -26,6 +27,10 @@ class InputError(ScanTrussError, ValueError):
 
 class LengthError(InputError):
     """A member length cannot be used with this scan."""
+
+
+class OneSidedError(InputError):
+    """The scanned surface is one-sided, or so rough that it looks so."""
 
 
 class FrontError(ScanTrussError):

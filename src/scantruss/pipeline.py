@@ -12,7 +12,7 @@ from .boundary.find import find_boundary
 from .candidates import Attempt, Hope, advance_fronts, attempts, best_that_passes, improve_fronts
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
-from .errors import CertificateError, FrontError, ScanTrussError
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .runtime.progress import Progress
@@ -87,7 +87,7 @@ def grid_from_cloud(
     -------
     Grid
         Where no grid passes the checks, one without the ridges of the scan, with other samples or by the paper's method, if that
-        passes; its settings say so: `ridge_angle` 0, another `box_size`, `method` "paper".
+        passes; its settings say so: `ridge_angle` 0, a `smooth_scale`, another `box_size`, `method` "paper".
     """
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
@@ -116,34 +116,47 @@ def first_that_passes(
 
     Raises
     ------
-    FrontError
-        None passes; the fault of the first with the settings asked for that gave a grid, else of the first.
+    ScanTrussError
+        None passes; the fault of the first with the settings asked for that gave a grid, else of the first. It names the settings
+        of a grid of the mean surface that only leaves out too much.
     """
-    faults: list[FrontError] = []
-    hope = Hope()
+    faults: list[ScanTrussError] = []
+    hope, advice = Hope(), ""
     for attempt in tried:
         if not hope.allows(attempt):
             continue
         try:
-            return make_grid_with_most_ridges(cloud, attempt, progress=progress)
+            return make_grid_with_most_ridges(cloud, attempt, hope, progress=progress)
         except ScanTrussError as error:
+            looks_one_sided = bool(faults) and isinstance(faults[0], OneSidedError)  # where its mean surface does not
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
-                if not isinstance(error, FrontError):
+                if not isinstance(error, FrontError | OneSidedError):
                     raise
                 faults.append(error)
+            elif looks_one_sided and isinstance(error, FrontError):
+                faults.append(error)
+            advice = advice or attempt.advice(error)
             hope.note(attempt, error)
         if not hope.is_left():
             break
     if not faults:
         raise FrontError("none of the attempts made gives a grid that passes")
-    raise next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
+    worst = next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
+    if advice and isinstance(worst, FrontError):
+        raise type(worst)(f"{worst}; {advice}", worst.grid, worst.where)
+    raise worst
 
 
-def make_grid_with_most_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
+def make_grid_with_most_ridges(
+    cloud: PointCloud, attempt: Attempt, hope: Hope, *, progress: Progress | None = None
+) -> Grid:
     """Return the grid of one attempt; where it fails, ridges are given up near the faults, a few times, and a warning says so."""
     first: FrontError | None = None
     later: Attempt | None = attempt
-    while later is not None:  # each turn gives up ridges at one more place at least, and there are not many
+    while later is not None and (
+        first is None or hope.is_left()
+    ):  # each turn gives up ridges at one more place at least
+        hope.begin()
         try:
             return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:

@@ -157,6 +157,20 @@ def _apart(
         ),
         "node_distance": _spread(found.nodes, grid.nodes, grid, length / at_nodes),
         "noise": float(np.median(found.noise)),
+        **_offsets(found),
+    }
+
+
+def _offsets(found: Distances) -> dict[str, float]:
+    """Return the bias of the nodes and the scatter of the points about them; nothing where there are no points around any."""
+    known = np.isfinite(found.bias)
+    if not known.any():
+        return {}
+    bias = found.bias[known]
+    return {
+        "node_bias": float(bias.mean()),
+        "node_bias_p95": float(np.quantile(np.abs(bias), 0.95)),
+        "node_scatter": float(np.median(found.scatter[known])),
     }
 
 

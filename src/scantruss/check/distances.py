@@ -11,6 +11,7 @@ import numpy as np
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.mesh.coverage import nearest_distances, put_places
 from ..kernels.mesh.distances import nearest_triangles, plane_distances, triangle_boxes
+from ..kernels.surface.mean_surface import mean_offsets
 from ..runtime.parallel import in_parts, side_by_side
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ FIRST_REACH = 0.1  # reach of the first search for the nearest triangle; most po
 REACH_GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
 TRIANGLE_BOX = 0.5  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]
+AROUND_NODE = 1.0  # radius within which points are compared with a node [member lengths]
+COMPARED_WITH_NODE = 30  # points a node that are compared with it
 POINTS_OF_PLANE = 12  # points through which the plane at a node goes
 PLACES_MEASURED_PER_THREAD = 20_000  # fewest points for a thread of their own
 
@@ -36,6 +39,8 @@ class Distances:
     )  #: (T,) of the middle or a corner of each triangle, the farther, from the nearest point; NaN over closed holes
     nodes: np.ndarray  #: (V,) of each node from the plane of the points around it; NaN over closed holes
     noise: np.ndarray  #: (V,) rms distance of those points from their plane
+    bias: np.ndarray  #: (V,) of each node from the surface of the points within a member, positive if that lies outside
+    scatter: np.ndarray  #: (V,) rms distance of those points from that surface
 
 
 def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Distances:
@@ -45,10 +50,12 @@ def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Dis
     ----------
     length : desired member length [scan unit]
     """
-    (scan, triangle), (triangles, nodes, noise) = side_by_side(
-        lambda: distances_to_grid(samples.scan, grid, length), lambda: distances_to_points(grid, samples, length)
+    (scan, triangle), (triangles, nodes, noise), (bias, scatter) = side_by_side(
+        lambda: distances_to_grid(samples.scan, grid, length),
+        lambda: distances_to_points(grid, samples, length),
+        lambda: offsets_from_points(grid, samples, length),
     )
-    return Distances(scan, triangle, triangles, nodes, noise)
+    return Distances(scan, triangle, triangles, nodes, noise, bias, scatter)
 
 
 def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -80,6 +87,9 @@ def distances_to_points(
     to_nodes, noise = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
     nearest_distances(grid.nodes, points, boxes, 0.25 * length, to_corners)
+    if samples.moved:  # nodes lie on the mean surface
+        points = samples.surface.points
+        boxes = boxes_of(points, POINT_BOX * length)
     plane_distances(grid.nodes, points, boxes, POINTS_OF_PLANE, 2.5 * samples.spacing, to_nodes, noise)
     if samples.measured < len(samples.surface.mean):
         to_middles[_over_holes(middles, samples)] = np.nan
@@ -88,6 +98,31 @@ def distances_to_points(
     if grid.deviation is not None:
         to_nodes[np.isnan(grid.deviation)] = np.nan
     return np.fmax(to_middles, np.fmax.reduce(to_corners[grid.triangles], axis=1)), to_nodes, noise
+
+
+def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far outside of each node the surface of the points around it lies, and how they scatter about that (V,).
+
+    Measured points, never those of the mean surface; NaN over closed holes.
+    """
+    every = len(samples.measured_points) // (COMPARED_WITH_NODE * len(grid.nodes)) + 1
+    points = np.ascontiguousarray(samples.measured_points[::every])
+    desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    bias, scatter = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
+    boxes = boxes_of(points, POINT_BOX * length)
+    mean_offsets(grid.nodes, _node_normals(grid), points, boxes, AROUND_NODE * desired, bias, scatter, 0, len(bias))
+    if grid.deviation is not None:
+        bias[np.isnan(grid.deviation)] = np.nan
+    return bias, scatter
+
+
+def _node_normals(grid: Grid) -> np.ndarray:
+    """Return the unit normal of each node (V, 3), the mean of its triangles by their areas."""
+    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
+    own, corners = np.repeat(np.cross(b - a, c - a), 3, axis=0), grid.triangles.ravel()
+    sums = np.stack([np.bincount(corners, own[:, k], len(grid.nodes)) for k in range(3)], axis=1)
+    normals: np.ndarray = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
+    return normals
 
 
 def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-WINDOW = 6  # nodes along a boundary in which turns are summed
-ZIGZAG = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
+NODES_TURNED_OVER = 6  # nodes along a boundary in which turns are summed
+ZIGZAG_TURN = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
 SMALL_HOLE = 12  # nodes around a hole up to which it may be none
 
 
@@ -55,17 +55,17 @@ def zigzags(grid: Grid) -> np.ndarray:
         np.add.at(upward, corner, np.cross(b - a, c - a))
     found = [np.zeros(0, np.int64)]
     for loop in grid.boundary_loops:
-        if len(loop) <= 2 * WINDOW:
+        if len(loop) <= 2 * NODES_TURNED_OVER:
             continue
         ahead = grid.nodes[np.roll(loop, -1)] - grid.nodes[loop]
         behind = np.roll(ahead, 1, axis=0)
         across = np.cross(behind, ahead)
         turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), (behind * ahead).sum(axis=1)))
         turn *= np.sign((across * upward[loop]).sum(axis=1))
-        around = np.array([np.roll(turn, WINDOW // 2 - k) for k in range(WINDOW)])
+        around = np.array([np.roll(turn, NODES_TURNED_OVER // 2 - k) for k in range(NODES_TURNED_OVER)])
         least = np.minimum(np.maximum(around, 0.0).sum(axis=0), np.maximum(-around, 0.0).sum(axis=0))
-        highest = least >= np.max([np.roll(least, k) for k in range(-WINDOW, WINDOW + 1)], axis=0)
-        found.append(loop[(least > ZIGZAG) & highest & (least > np.roll(least, 1))])
+        highest = least >= np.max([np.roll(least, k) for k in range(-NODES_TURNED_OVER, NODES_TURNED_OVER + 1)], axis=0)
+        found.append(loop[(least > ZIGZAG_TURN) & highest & (least > np.roll(least, 1))])
     return np.concatenate(found)
 
 

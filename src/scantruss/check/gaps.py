@@ -30,7 +30,7 @@ ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshap
 )  # places around another [reach]
 OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 
-MOST_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
+GAPS_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
 
 
 def bridged_gaps(
@@ -56,7 +56,7 @@ def bridged_gaps(
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     least = HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner]
     far = np.flatnonzero(away > least)
-    far = far[np.argsort(-away[far], kind="stable")[:MOST_LOOKED_AT]]
+    far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
     if not len(far):
         return [], []
     points = by_x(points)

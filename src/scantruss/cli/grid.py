@@ -162,6 +162,9 @@ def grid_with_notes(
             words = f"{error}{nearby_words(bars, cloud, settings)}"
             raise type(error)(words, error.grid, error.where) from None
     made = grid.settings or settings
+    smoothed = made.smooth_scale != settings.smooth_scale
+    if smoothed:
+        note_smoothed(bars, grid)
     for name, words in {
         "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
         "keep_rods": "no grid passes with the columns, scaffold or cables of this scan, so they are left out",
@@ -169,12 +172,25 @@ def grid_with_notes(
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
         "method": "no grid of the default method passes its certificate here, so it is made by the method of the paper",
     }.items():
-        if getattr(made, name) != getattr(settings, name):
+        if getattr(made, name) != getattr(settings, name) and not (smoothed and name == "ridge_angle"):
             bars.note(words)
     note_outliers(bars, cloud, made)
     note_layers(bars, cloud, made)
     note_pieces(bars, cloud, made)
     return grid
+
+
+def note_smoothed(bars: Bars, grid: Grid) -> None:
+    """Report that a rough scan was smoothed, and how far that has taken the nodes from its points."""
+    from ..report.figures import offset_words
+
+    assert grid.settings is not None and grid.certificate is not None
+    scale = grid.settings.smooth_scale
+    words = "a member" if scale == 1.0 else f"{scale:g} members"
+    bars.note(
+        f"no grid follows the roughness of this scan, so it is smoothed over {words}, as with --smooth-scale {scale:g}"
+        f" --ridge-angle 0: nodes lie on the mean surface; points around nodes: {offset_words(grid.certificate)}"
+    )
 
 
 def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:

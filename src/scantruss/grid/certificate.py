@@ -110,6 +110,11 @@ class Certificate:
         None  #: of each node from the plane of the 12 nearest points, or the nearest if that is less
     )
     noise: float = 0.0  #: median rms distance of the 12 points nearest to a node from their plane [scan unit]
+    node_bias: float = (
+        0.0  #: mean of how far outside of each node the surface of the points within a member lies [scan unit]
+    )
+    node_bias_p95: float = 0.0  #: what 95 % of these distances, inside or outside, are below [scan unit]
+    node_scatter: float = 0.0  #: median rms distance of these points from that surface [scan unit]
     shortest_member: Worst | None = None
     longest_member: Worst | None = None
     smallest_angle: Worst | None = None  #: [degree]

@@ -218,7 +218,12 @@ def _usual_and_others(every: Iterator[Attempt], settings: Settings) -> tuple[Ite
     """Return the attempts with the samples and the method that were asked for, which come first, and those after them."""
 
     def is_usual(one: Attempt) -> bool:
-        return (one.settings.box_size, one.settings.method) == (settings.box_size, settings.method)
+        made = one.settings
+        return (made.box_size, made.method, made.smooth_scale) == (
+            settings.box_size,
+            settings.method,
+            settings.smooth_scale,
+        )
 
     one, other = tee(every)
     return takewhile(is_usual, one), dropwhile(is_usual, other)

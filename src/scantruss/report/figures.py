@@ -149,7 +149,7 @@ def first_line(certificate: Certificate) -> list[str]:
 def distance_lines(certificate: Certificate) -> list[str]:
     """Return how far scan and grid lie apart, in the scan's unit and in members."""
     unit, member = f" {certificate.unit}" if certificate.unit else "", 2.0 * certificate.reach
-    return [
+    lines = [
         f"{name}: 50 % within {spread.p50:.3g}, 95 % {spread.p95:.3g}, 99 % {spread.p99:.3g}, all"
         f" {spread.largest.value:.3g}{unit} ({spread.p50 / member:.2g}, {spread.p95 / member:.2g}, {spread.p99 / member:.2g},"
         f" {spread.largest.value / member:.2g} members)"
@@ -160,6 +160,17 @@ def distance_lines(certificate: Certificate) -> list[str]:
         )
         if spread is not None
     ]
+    return [*lines, f"points around nodes: {offset_words(certificate)}"]
+
+
+def offset_words(certificate: Certificate) -> str:
+    """Return how far the points around nodes lie outside of them on the mean, and how far they scatter."""
+    unit, member = f" {certificate.unit}" if certificate.unit else "", 2.0 * certificate.reach
+    bias, most, scatter = certificate.node_bias, certificate.node_bias_p95, certificate.node_scatter
+    return (
+        f"bias {bias:+.2g}, 95 % within {most:.2g}, scatter {scatter:.2g}{unit}"
+        f" ({bias / member:+.2g}, {most / member:.2g}, {scatter / member:.2g} members)"
+    )
 
 
 def left_out_lines(certificate: Certificate) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import OneSidedError
 from ..kernels.surface import normals as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
@@ -87,9 +87,13 @@ def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
 
     Only links within smooth parts count, between neighbours that lie side by side and yet face opposite sides: on rough or
     overgrown scans that happens at random.
+
+    Raises
+    ------
+    OneSidedError
     """
     smooth = 0.15 * surface.step
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
-        raise InputError(
+        raise OneSidedError(
             "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
         )

@@ -170,6 +170,13 @@ class SurfaceSettings(_Checked):
         low=0.05,
         high=0.5,
     )
+    smooth_scale: float | None = _setting(
+        None,
+        "smooth away roughness and overhangs up to this size, in member lengths: nodes lie on the mean surface; 0: nothing;"
+        " none: 0.5, then 1, where no grid passes without",
+        low=0.0,
+        high=2.0,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,7 @@ from .linked_samples import (
     thin_dense,
     without_bends,
 )
+from .mean_surface import mean_surface
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
 from .shape import check_is_surface, layers_of_surface
@@ -52,6 +53,9 @@ UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; a
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
 PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
 PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
+ROUGH_THICKNESS = (
+    0.08  # thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +81,8 @@ class SurfaceSamples:
     whole: np.ndarray | None = None  #: (N, 3) all points if `surface` has only some of them
     sample_spacing: float = 0.0  #: spacing of the points of `surface` then [scan unit]
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
+    rough: float = 0.0  #: share of the samples thicker than `ROUGH_THICKNESS` before they were moved
+    moved: float = 0.0  #: `Settings.smooth_scale` where the points of `surface` were moved to the mean surface, else 0
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
     given: GivenNormals | None = None  #: normals that came with the scan
@@ -138,6 +144,7 @@ class _Asked(NamedTuple):
     piece: str
     z_is_up: bool
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
+    smooth_scale: float  #: size of what is smoothed away [`length`]
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
@@ -146,8 +153,10 @@ class _Asked(NamedTuple):
         repeated = settings.clean and settings.drop_duplicates
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
-        rods, piece = settings.keep_rods, settings.piece
-        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always)
+        rods, piece, scale = settings.keep_rods, settings.piece, settings.smooth_scale or 0.0
+        return cls(
+            settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always, scale
+        )
 
 
 class _Chosen(NamedTuple):
@@ -159,6 +168,7 @@ class _Chosen(NamedTuple):
     whole: np.ndarray  #: (M, 3) all points of the scan
     judged: np.ndarray | None  #: (M,) what each point given is: KEPT, OUTLIER, SPARSE_POINT; None if all are kept
     smooth: bool  #: whether the scan bends evenly everywhere
+    rough: float = 0.0  #: share of the samples thicker than `ROUGH_THICKNESS`
 
 
 _SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
@@ -202,7 +212,7 @@ def samples_with(
     points = samples.surface.points if kept is None else samples.surface.points[kept]
     both = np.concatenate([points, added])
     asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
-        outlier_distance=0.0, drop_duplicates=False
+        outlier_distance=0.0, drop_duplicates=False, smooth_scale=0.0
     )
     if kept is not None:  # which parts are wanted is said by what is kept
         asked = asked._replace(piece="all")
@@ -216,6 +226,8 @@ def samples_with(
         unread=samples.unread,
         whole=samples.whole,
         sample_spacing=samples.sample_spacing,
+        rough=samples.rough,
+        moved=samples.moved,
         origin=samples.origin,
         unit=samples.unit,
     )
@@ -329,6 +341,8 @@ def _prepare(
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
+        chosen.rough,
+        asked.smooth_scale,
         given=given,
     )
 
@@ -354,7 +368,7 @@ def _smooth_samples(
 ) -> _Chosen | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    if asked.box_size is not None or asked.judge_always or spacing > SPARSE_SPACING * length:
+    if asked.box_size is not None or asked.judge_always or asked.smooth_scale or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)
@@ -366,7 +380,10 @@ def _smooth_samples(
 def _usual_samples(
     points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
 ) -> _Chosen:
-    """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets."""
+    """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets.
+
+    Or its points are moved to the mean surface before.
+    """
     length, judged = asked.length, None
     radius = radius_of_samples(asked, spacing)
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
@@ -378,15 +395,19 @@ def _usual_samples(
             points = np.ascontiguousarray(points[judged == KEPT])
             some = thin_dense(points, bounds_of(points), radius, spacing)
             found = link_samples(some, radius, length, spacing, given)
+    if asked.smooth_scale:
+        points = some = mean_surface(some, asked.smooth_scale * length, length)
+        found = link_samples(some, radius, length, spacing)
     if is_rough(found, SHEETS * length):
         fine = link_finer(points, radius, length, spacing, given)
         if fine is not None:
             some, (found, radius) = points, fine
+    rough = float((found.thickness > ROUGH_THICKNESS * length).mean())
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = found._replace(thickness=without_bends(found, ROUGH * length))
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
-    return _Chosen(found, radius, some, points, judged, False)
+    return _Chosen(found, radius, some, points, judged, False, rough)
 
 
 def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:

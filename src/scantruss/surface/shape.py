@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from .mean_surface import RADIUS
 
 if TYPE_CHECKING:
     from ..kernels.surface.local_surface import Surface
@@ -26,6 +27,7 @@ LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengt
 CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
 LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
+SOME_LAYERS = 0.1  # the same where the layers have become one by smoothing
 MANY_LAYERS = 0.3  # share of the places with two layers from which on they are reported
 
 
@@ -93,17 +95,22 @@ def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
     surface = samples.surface
     if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
-    apart, looked = [], 0
+    apart, looked, merged = [], 0, RADIUS * samples.moved
+    reach, close = (max(least, merged) * surface.length for least in (LAYER_REACH, CLOSE_LAYERS))
     # samples with near numbers lie near each other, so these are from all over the scan
     for sample in np.unique(np.linspace(0, len(surface.mean) - 1, PLACES_LOOKED_AT).astype(np.int64)):
-        points = _points_near(surface, surface.mean[sample], LAYER_REACH * surface.length) - surface.mean[sample]
+        place = surface.mean[sample]
+        measured = (
+            _within(samples.measured_points, place, reach) if samples.moved else _points_near(surface, place, reach)
+        )
+        points = measured - place
         if len(points) < 20:
             continue
         looked += 1
-        if 0.0 < (distance := _layer_distance(points)) < CLOSE_LAYERS * surface.length:
+        if 0.0 < (distance := _layer_distance(points)) < close:
             apart.append(distance)
     share = len(apart) / max(looked, 1)
-    return (float(np.median(apart)), share) if share >= MANY_LAYERS else (0.0, 0.0)
+    return (float(np.median(apart)), share) if share >= (SOME_LAYERS if samples.moved else MANY_LAYERS) else (0.0, 0.0)
 
 
 def _layer_distance(points: np.ndarray) -> float:

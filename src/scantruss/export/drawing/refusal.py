@@ -13,7 +13,7 @@ from .picture import PICTURE_SIZE, encode_picture, paint
 from .strokes import cloud_strokes, oblique_view
 from .style import PictureStyle
 
-LINE = 110  # characters in a line
+LINE_CHARACTERS = 110  # characters in a line
 
 
 def encode_refusal(error: FrontError, cloud: PointCloud, *, style: PictureStyle | None = None) -> bytes:
@@ -32,7 +32,7 @@ def encode_refusal(error: FrontError, cloud: PointCloud, *, style: PictureStyle 
         return encode_picture(error.grid, cloud, style=style)
     size = (style.size if style else None) or PICTURE_SIZE
     em = 22.0 * min(size[0] / PICTURE_SIZE[0], size[1] / PICTURE_SIZE[1])  # height of the letters
-    lines = wrap(str(error), LINE)
+    lines = wrap(str(error), LINE_CHARACTERS)
     texts = [Text(2 * em, size[1] - (2 + 1.6 * k) * em, words, em, "left", FAULT) for k, words in enumerate(lines)]
     below = size[0], round(size[1] - (2 + 1.6 * len(lines)) * em)
     rings = []

@@ -29,7 +29,7 @@ TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances co
 SETTLING_TURNS = 3  # fits of a sheet, those after the first with points far off it weighing less
 BENT = 0.7  # share of the spread about a plane below which that about a quadric says that the sheet is bent
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
-ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
+LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
 OPPOSITE = -0.7  # cosine of the normals given with two points below which they lie on opposite sides of something thin
 
@@ -260,7 +260,7 @@ def cut_across_grooves(positions: np.ndarray, neighbors: np.ndarray, facing: np.
                 break
             a, b, d = row(facing, s), row(facing, t), subtract(row(positions, t), row(positions, s))
             far = norm(d)
-            if dot(a, b) < SIDE_OF_GROOVE and dot(d, a) > ACROSS * far and dot(d, b) < -ACROSS * far:
+            if dot(a, b) < SIDE_OF_GROOVE and dot(d, a) > LOOKS_ACROSS * far and dot(d, b) < -LOOKS_ACROSS * far:
                 up = unit((a[0] + b[0], a[1] + b[1], a[2] + b[2]))
                 cut[s, k] = _goes_deeper(positions, neighbors, facing, s, t, up, far) or _goes_deeper(
                     positions, neighbors, facing, t, s, up, far
@@ -285,7 +285,7 @@ def _goes_deeper(
             break
         down = -dot(subtract(row(positions, n), row(positions, s)), up)
         if (
-            down > ACROSS * far
+            down > LOOKS_ACROSS * far
             and dot(row(facing, n), row(facing, s)) > ONE_SIDE
             and dot(row(facing, n), row(facing, t)) < 0.0
         ):

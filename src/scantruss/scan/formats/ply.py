@@ -23,7 +23,7 @@ from .ply_header import PLY, Element, PlyHeader, ends_early, read_header
 
 LONGEST_LIST = 1 << 26  # entries
 LISTS_OF_CORNERS = ("vertex_indices", "vertex_index")  # properties of a face
-MOST_RUNS = 20_000  # changes of list length walked through behind the points
+RUNS_OF_LISTS = 20_000  # changes of list length walked through behind the points
 
 
 def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -73,7 +73,7 @@ def _binary_faces(path: Path, header: PlyHeader, face: Element) -> list[np.ndarr
         offset = _skip(path, data, offset, header.order, element, None)
     number = next(i for i, p in enumerate(face.properties) if p.name in LISTS_OF_CORNERS)
     runs, found = _runs(path, data, offset, header.order, face), list[np.ndarray]()
-    for rows, _ in itertools.islice(runs, MOST_RUNS):
+    for rows, _ in itertools.islice(runs, RUNS_OF_LISTS):
         found.append(np.array(rows[f"list {number}"]))
     whole = sum(map(len, found)) == face.count
     return found if whole else []
@@ -106,7 +106,7 @@ def _read_binary(path: Path, header: PlyHeader, vertex: Element, columns: Sequen
             table, offset = _read_rows(path, data, offset, header.order, element, columns)
             behind = True
         else:
-            offset = _skip(path, data, offset, header.order, element, MOST_RUNS if behind else None)
+            offset = _skip(path, data, offset, header.order, element, RUNS_OF_LISTS if behind else None)
     return table
 
 
