@@ -14,6 +14,7 @@ from .constraints.ridges import find_ridges
 from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
+from .improve.caps import with_caps
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .runtime.parallel import processors
@@ -45,6 +46,7 @@ LENGTHS = (
     1.04,
 )  # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 COARSER = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 MOST_FAULTS = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
@@ -79,7 +81,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
-    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+    cut = len(sample_surface(cloud, settings).rings) > 0
+    if cut:  # fewer limbs cut off, then none
+        for share in THINNER:
+            yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
+    if settings.keep_rods and settings.method == "default" and not cut and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
@@ -263,6 +269,7 @@ def best_that_passes(
     def finish(candidate: Candidate) -> None:
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
+            grid = with_caps(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
         except FrontError as error:
             candidate.fault = error

@@ -167,6 +167,10 @@ def make_grid(
         )
     if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
         bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
+    if grid.settings is not None and grid.settings.limb_girth != settings.limb_girth:
+        bars.note(
+            f"no grid passes with thin limbs cut off as asked, so it is made as with --limb-girth {grid.settings.limb_girth:g}"
+        )
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:
         bars.note("no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0")
     if grid.settings is not None and grid.settings.box_size != settings.box_size:

@@ -11,15 +11,15 @@ import numpy as np
 
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.scan.nearby import nearest_places
-from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
-from ..scan.normals import STEEP, cut_steep_links, face_one_side, face_outside, mean_normals
+from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
+from .limbs import Ring, cut_limbs
 from .linked_samples import (
     MANY_ROUGH,
     PATCH_SPACING,
@@ -27,6 +27,7 @@ from .linked_samples import (
     ROUGH,
     SHEETS,
     Linked,
+    faced_surface,
     group,
     is_rough,
     is_smooth,
@@ -46,8 +47,7 @@ BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all po
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB = 0, 1, 2, 3, 4, 5  # what a point of the scan was judged to be
 ALL = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
@@ -76,6 +76,7 @@ class SurfaceSamples:
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
+    rings: tuple[Ring, ...] = ()  #: where limbs too thin for a grid were cut off
 
     @property
     def outliers(self) -> int:
@@ -133,6 +134,7 @@ class _Asked(NamedTuple):
     keep_rods: bool
     piece: str
     z_is_up: bool
+    limb_girth: float  #: below which limbs are cut off [desired lengths]
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
 
     @classmethod
@@ -143,7 +145,10 @@ class _Asked(NamedTuple):
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece = settings.keep_rods, settings.piece
-        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always)
+        girth = 0.0 if settings.boundary or settings.method == "paper" else settings.limb_girth
+        return cls(
+            settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, girth, always
+        )
 
 
 class _Chosen(NamedTuple):
@@ -214,6 +219,7 @@ def samples_with(
         sample_spacing=samples.sample_spacing,
         origin=samples.origin,
         unit=samples.unit,
+        rings=samples.rings,
     )
 
 
@@ -287,9 +293,7 @@ def _prepare(
         points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
-        points, bounds, spacing, asked, thinned
-    )
+    chosen = _chosen(points, bounds, spacing, asked, thinned)
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
     if not asked.keep_rods and thinned:
@@ -297,9 +301,15 @@ def _prepare(
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), thinned)
-    found = chosen.found
-    surface, piece = _faced_surface(found, chosen.radius, length, spacing)
-    surface = surface._replace(field=length_field(surface, asked.wish))
+    found, surface, piece = _faced(chosen, spacing, asked)
+    rings: tuple[Ring, ...] = ()
+    if asked.limb_girth and thinned:
+        limb, rings = cut_limbs(scan[judged == KEPT], spacing, asked.limb_girth, surface, found.boxes)
+        if rings:
+            judged[np.flatnonzero(judged == KEPT)[limb]] = LIMB
+            left = np.ascontiguousarray(scan[judged == KEPT])
+            chosen = _chosen(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), thinned)
+            found, surface, piece = _faced(chosen, spacing, asked)
     piece = number_pieces(piece)
     area = sample_areas(surface)
     graded = area / surface.field**2
@@ -324,7 +334,21 @@ def _prepare(
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
+        rings=rings,
     )
+
+
+def _chosen(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen:
+    """Return larger samples where the scan allows it, else the usual ones."""
+    return _smooth_samples(points, bounds, spacing, asked, thinned) or _usual_samples(
+        points, bounds, spacing, asked, thinned
+    )
+
+
+def _faced(chosen: _Chosen, spacing: float, asked: _Asked) -> tuple[Linked, Surface, np.ndarray]:
+    """Return the linked samples, their surface with the length field, and the piece of each."""
+    surface, piece = faced_surface(chosen.found, chosen.radius, asked.length, spacing)
+    return chosen.found, surface._replace(field=length_field(surface, asked.wish)), piece
 
 
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
@@ -367,30 +391,3 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
     return _Chosen(found, radius, some, points, judged, False)
-
-
-def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
-    mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
-    cut_steep_links(mean, normals, neighbors)
-    piece = face_one_side(mean, normals, neighbors)
-    normals = mean_normals(normals, neighbors, 0.7)
-    face_outside(mean, normals, piece)
-    surface = Surface(
-        points=found.grouped,
-        start=found.start,
-        mean=mean,
-        normals=normals,
-        neighbors=neighbors,
-        length=float(length),
-        radius=float(radius),
-        patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=POINTS_ON_THE_WAY,
-        step=float(max(radius, 1.3 * spacing)),
-        stamp=np.zeros(len(mean), np.int64),
-        queue=np.zeros(len(mean), np.int64),
-        counter=np.zeros(1, np.int64),
-        field=np.ones(len(mean)),
-    )
-    return surface, piece
