@@ -14,9 +14,9 @@ from .constraints.ridges import find_ridges
 from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
-from .improve.caps import with_caps
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
+from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
@@ -269,7 +269,7 @@ def best_that_passes(
     def finish(candidate: Candidate) -> None:
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
-            grid = with_caps(grid, boundary)
+            grid = finish_rings(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
         except FrontError as error:
             candidate.fault = error
