@@ -193,8 +193,9 @@ def off_patch(patches: np.ndarray, v: int, place: Vector) -> float:
 
 
 @kernel
-def cuts_across(net: Net, patches: np.ndarray, scratch: Scratch, length: float) -> bool:
-    """Whether a triangle at the edge of a trial, or at its wings, has left the patches of its nodes: it lies across a limb."""
+def triangles_across(net: Net, patches: np.ndarray, scratch: Scratch, length: float) -> int:
+    """Number of triangles at the edge of a trial and its wings that have left the patches of their nodes: those across a limb."""
+    found = 0
     for k in range(min(4, scratch.gathered[0])):
         v = scratch.around[k]
         d = net.degree[v]
@@ -203,6 +204,5 @@ def cuts_across(net: Net, patches: np.ndarray, scratch: Scratch, length: float) 
             p, q, r = row(net.nodes, v), row(net.nodes, a), row(net.nodes, b)
             middle = ((p[0] + q[0] + r[0]) / 3.0, (p[1] + q[1] + r[1]) / 3.0, (p[2] + q[2] + r[2]) / 3.0)
             away = min(off_patch(patches, v, middle), off_patch(patches, a, middle), off_patch(patches, b, middle))
-            if away > OFF_PATCH * length * net.desired[v]:
-                return True
-    return False
+            found += away > OFF_PATCH * length * net.desired[v]
+    return found
