@@ -85,7 +85,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
-    if settings.keep_rods and settings.method == "default" and not cut and _has_rods(cloud, settings):
+    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
@@ -117,8 +117,13 @@ def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a part of the scan is too thin for a grid, as columns and scaffold are."""
-    return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
+    """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
+
+    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
+    """
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
+    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
 
 
 def _same_scan(settings: Settings) -> Iterator[Attempt]:
