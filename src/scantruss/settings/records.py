@@ -149,8 +149,7 @@ class CleaningSettings(_Checked):
     )
     limb_girth: float = _setting(
         3.0,
-        "cut off limbs, tails, handles and necks thinner than this, in member lengths around them; 0: never"
-        " (default method only)",
+        "cut off limbs, tails, handles and necks thinner than this, in member lengths around them; 0: never",
         low=0.0,
         high=6.0,
     )

@@ -145,7 +145,7 @@ class _Asked(NamedTuple):
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece = settings.keep_rods, settings.piece
-        girth = 0.0 if settings.boundary or settings.method == "paper" else settings.limb_girth
+        girth = 0.0 if settings.boundary else settings.limb_girth
         return cls(
             settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, girth, always
         )
