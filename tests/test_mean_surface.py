@@ -11,7 +11,7 @@ from scantruss.candidates import attempts
 from scantruss.check.distances import offsets_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.geometry.quadric import TERMS_OF_PLANE, TERMS_OF_QUADRIC
-from scantruss.kernels.surface.mean_surface import FAR_OFF, KNOWN_TURNS, TURNS, mean_offsets, move_to_mean
+from scantruss.kernels.surface.mean_surface import FIT_TURNS, KNOWN_TURNS, OFF_THE_FIT, mean_offsets, move_to_mean
 from scantruss.kernels.surface.samples import put_all
 from scantruss.scan.cloud import PointCloud, bounds_of
 from scantruss.surface.mean_surface import RADIUS, mean_surface
@@ -50,7 +50,7 @@ def test_points_move_as_by_the_slow_twin(terms: int) -> None:
         near = d[(d**2).sum(axis=1) <= 0.81]
         first = (1.0 - (near**2).sum(axis=1) / 0.81) ** 2
         weight = first.copy()
-        for turn in range(TURNS):
+        for turn in range(FIT_TURNS):
             if turn < KNOWN_TURNS:
                 centre = weight @ near / weight.sum()
                 normal = np.linalg.eigh((near - centre).T * weight @ (near - centre))[1][:, 0]
@@ -61,7 +61,7 @@ def test_points_move_as_by_the_slow_twin(terms: int) -> None:
             root = np.sqrt(weight)[:, None]
             fit = np.linalg.lstsq(np.stack(columns, axis=1) * root, h * root[:, 0], rcond=None)[0]
             off = np.abs(h - np.stack(columns, axis=1) @ fit)
-            weight = first / (1.0 + (off / (FAR_OFF * (first @ off) / first.sum())) ** 2)
+            weight = first / (1.0 + (off / (OFF_THE_FIT * (first @ off) / first.sum())) ** 2)
         assert np.linalg.norm(found - (place + fit[0] * normal)) < 1e-6
 
 

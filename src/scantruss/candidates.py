@@ -17,6 +17,7 @@ from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
+from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
@@ -47,6 +48,7 @@ COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are t
 SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
 # shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
 ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
+THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
@@ -97,7 +99,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     yield from _same_scan(settings)
-    rough = sample_surface(cloud, settings).rough
+    samples = sample_surface(cloud, settings)
+    rough, cut = samples.rough, len(samples.rings) > 0
+    if cut:  # fewer limbs cut off, then none
+        for share in THINNER:
+            yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
@@ -134,8 +140,13 @@ def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a part of the scan is too thin for a grid, as columns and scaffold are."""
-    return bool((sample_surface(cloud, settings.replace(keep_rods=False)).judged == ROD).any())
+    """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
+
+    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
+    """
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
+    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
 
 
 def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
@@ -314,6 +325,7 @@ def best_that_passes(
     def finish(candidate: Candidate) -> None:
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
+            grid = finish_rings(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
         except FrontError as error:
             candidate.fault = error

@@ -32,6 +32,8 @@ SPIKES = (0.6, 0.3, 0.16)
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
+# distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
+AT_RING = 0.6
 STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
 PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
@@ -47,6 +49,7 @@ class Loop:
     piece: int  #: number of the piece of the cloud it bounds
     desired: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None if it is the same for all
     line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
+    cut: str = ""  #: close or open where a limb was cut off, as the settings say
 
     @property
     def corners(self) -> np.ndarray:
@@ -141,6 +144,7 @@ def find_boundary(
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
+        boundary = replace(boundary, loops=(*boundary.loops, *_rings(filled, settings)))
         # the value must not keep its key alive
         kept = _KEPT[samples] = (settings, filled if filled is not samples else None, boundary)
     if progress:
@@ -197,9 +201,34 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
             paper = settings.method == "paper"
             bias = NO_BIAS if paper else sampling_bias_of(surface, points, samples.density, disc)
             found.append((curve, piece, bias))
+    found = [each for each in found if not _at_ring(each[0], samples, length)]
+    bridged = [curve for curve in bridged if not _at_ring(curve, samples, length)]
     smoothed = [smooth_loop(*each, settings, surface) for each in found]
     bridged += [curve for (curve, _, _), loop in zip(found, smoothed, strict=True) if loop is None]
     return [loop for loop in smoothed if loop is not None], bridged
+
+
+def _at_ring(curve: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
+    """Whether a curve (M, 3) runs mostly along a ring where a limb was cut off."""
+    for ring in samples.rings:
+        away = np.linalg.norm(curve[:, None] - ring.points, axis=2).min(axis=1)
+        if ring.bounds and np.median(away) < AT_RING * length:
+            return True
+    return False
+
+
+def _rings(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
+    """Return the boundaries where limbs were cut off, of the pieces that get a grid."""
+    loops = []
+    for ring in samples.rings:
+        nearest = nearest_sample(samples.surface, *ring.points[0].tolist())
+        piece = int(samples.piece[nearest])
+        if ring.bounds and piece in samples.pieces:
+            desired = field_along(samples.surface, ring.points)
+            loops.append(
+                Loop(ring.points, np.zeros(0, np.int64), False, ring.girth, piece, desired, cut=settings.cut_thin)
+            )
+    return loops
 
 
 def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from ..surface.samples import KEPT
+from ..surface.samples import KEPT, LIMB
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances
@@ -128,7 +128,7 @@ def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
         pieces=found.components,
         scan_pieces=len(samples.pieces),
         boundary_loops=found.boundary_loops,
-        scan_loops=len(boundary.loops),
+        scan_loops=sum(loop.cut != "close" for loop in boundary.loops),
         euler=found.euler,
         handles=(2 * found.components - found.boundary_loops - found.euler) // 2 if closed else None,
     )
@@ -143,7 +143,7 @@ def _apart(
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
-    beyond = (samples.judged == KEPT) & (found.scan > COVER_REACH * members)
+    beyond = ((samples.judged == KEPT) | (samples.judged == LIMB)) & (found.scan > COVER_REACH * members)
     left_out = parts_left_out(samples, boundary, gaps, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),

@@ -94,7 +94,9 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         words = f"has members whose lengths are {uneven:.0%} apart"
         faults.append(Fault("uneven", words, found.longest_member.where))
     if found.scan_distance and found.missing > settings.allow_missing:
-        words = f"leaves out {found.missing:.1%} of the scan"
+        limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
+        thin = f", {limbs:.1%} on limbs too thin for the members" if limbs else ""
+        words = f"leaves out {found.missing:.1%} of the scan{thin}"
         faults.append(Fault("cover", words, found.scan_distance.largest.where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     worst = found.triangle_distance.largest if found.triangle_distance else None

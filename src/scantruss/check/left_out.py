@@ -10,7 +10,7 @@ import numpy as np
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.owners import owners_of
-from ..surface.samples import DUPLICATE, KEPT, OUTLIER, ROD, SPARSE_POINT
+from ..surface.samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SPARSE_POINT
 from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 OTHER_PIECES = ("pieces", "not chosen", "floor")  # parts of the scan that are pieces by themselves, without a grid
+LIMBS_APART = 0.5  # gap between points of two limbs [member lengths]
 PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
 
@@ -59,6 +60,11 @@ def points_left_out(
     for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
         if len(which := np.flatnonzero(samples.judged == judged)):
             parts.append(_part(kind, which, samples, distance))
+    limb = np.flatnonzero((samples.judged == LIMB) & (distance > reach))
+    if len(limb):
+        parts += _places(
+            "limbs", limb, _near_each_other(samples.scan[limb], LIMBS_APART * members[limb]), samples, distance
+        )
     away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
     owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
@@ -98,6 +104,23 @@ def _places(
     parts = [_part(kind, which[number == each], samples, distance) for each in largest[:PLACES_LISTED]]
     rest = np.isin(number, largest[PLACES_LISTED:])
     return [*parts, *([_part(kind, which[rest], samples, distance, placed=False)] if rest.any() else [])]
+
+
+def _near_each_other(points: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Return a number for each of some points (K, 3): the same where gaps between them are small (K,)."""
+    cell = float(apart.max())
+    cells, number = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True)
+    there = {tuple(each): k for k, each in enumerate(cells.tolist())}
+    steps = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
+    pairs = [
+        (number, there[beside])
+        for each, number in there.items()
+        for step in steps
+        if (beside := tuple(int(a + b) for a, b in zip(each, step, strict=True))) in there
+    ]
+    one, other = np.array(pairs, np.int64).reshape(-1, 2).T
+    label: np.ndarray = component_labels(len(cells), one, other)[number.ravel()]
+    return label
 
 
 def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:

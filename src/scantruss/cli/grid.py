@@ -168,6 +168,7 @@ def grid_with_notes(
     for name, words in {
         "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
         "keep_rods": "no grid passes with the columns, scaffold or cables of this scan, so they are left out",
+        "limb_girth": f"no grid passes with thin limbs cut off as asked, so it is made as with --limb-girth {made.limb_girth:g}",
         "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
         "method": "no grid of the default method passes its certificate here, so it is made by the method of the paper",

@@ -188,7 +188,7 @@ def start_front(
     """Fill the lists with the initial front: boundary loops, lines, candidate nodes, a seed triangle on closed pieces."""
     surface = samples.surface
     for loop in boundary.loops:
-        active = loop.external or settings.advance_from == "all"
+        active = loop.external or loop.cut != "" or settings.advance_from == "all"
         nodes, _ = characteristic_points(loop, settings.length)
         curves = np.array(add_nodes(front, surface, nodes), np.int64)
         lists.add_chain(front, curves, lists.ACTIVE if active else lists.INACTIVE)

@@ -45,7 +45,7 @@ class Spread:
 class LeftOut:
     """Points of the scan that the grid does not follow, or a hole that it closes."""
 
-    kind: str  #: duplicates outliers sparse rods floor pieces far hole gap, or why points were not read
+    kind: str  #: duplicates outliers sparse rods limbs floor pieces far hole gap, or why points were not read
     points: int
     share: float  #: of all points that were read
     where: Place | None = None  #: middle, in the scan's own frame
@@ -67,6 +67,7 @@ KINDS_LEFT_OUT = {
     "duplicates": "duplicates",
     "outliers": "outliers, which lie on no surface",
     "rods": "columns, scaffold or cables, thinner than a member",
+    "limbs": "on a limb, handle or neck too thin for the members, cut off at a ring",
     "floor": "in a floor under the others",
     "sparse": "too far apart for this length",
     "not chosen": "in pieces that were not asked for",

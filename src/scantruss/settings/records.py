@@ -21,6 +21,7 @@ EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
 ADVANCE_FROM = ("external", "all")
 CASE3 = ("merge", "quadrangle")
+CUT_THIN = ("close", "open")
 UNITS = {"": None, "mm": 0.001, "cm": 0.01, "m": 1.0, "inch": 0.0254, "foot": 0.3048}  # [metre]
 
 
@@ -146,6 +147,16 @@ class CleaningSettings(_Checked):
         True,
         "keep columns, scaffold and cables, thinner than a member; they are left out if no grid passes with them",
     )
+    limb_girth: float = _setting(
+        3.0,
+        "cut off limbs, tails, handles and necks thinner than this, in member lengths around them; 0: never",
+        low=0.0,
+        high=6.0,
+    )
+    cut_thin: str = _setting(
+        "close", "what becomes of the ring where a thin limb is cut off: closed by a cap, or left open as a boundary",
+        choices=CUT_THIN,
+    )  # fmt: skip
     piece: str = _setting(
         "auto",
         "pieces of the scan to make a grid of: auto (all but a floor under the others), all, largest, or numbers such as 1 or 1,3",

@@ -11,16 +11,16 @@ import numpy as np
 
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.scan.nearby import nearest_places
-from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
-from ..scan.normals import STEEP_SINE, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
+from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
+from .limbs import LimbRing, cut_limbs
 from .linked_samples import (
     LINK_BOX,
     LINKED_POINTS_PER_THREAD,
@@ -29,6 +29,7 @@ from .linked_samples import (
     ROUGH,
     SHEETS,
     Linked,
+    faced_surface,
     group,
     is_rough,
     is_smooth,
@@ -50,12 +51,10 @@ BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all po
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD = 0, 1, 2, 3, 4  # what a point of the scan was judged to be
-PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB = 0, 1, 2, 3, 4, 5  # what a point of the scan was judged to be
 PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
-ROUGH_THICKNESS = (
-    0.08  # thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
-)
+# thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
+ROUGH_THICKNESS = 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +85,7 @@ class SurfaceSamples:
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
     given: GivenNormals | None = None  #: normals that came with the scan
+    rings: tuple[LimbRing, ...] = ()  #: where limbs too thin for a grid were cut off
 
     @property
     def outliers(self) -> int:
@@ -143,6 +143,7 @@ class _Asked(NamedTuple):
     keep_rods: bool
     piece: str
     z_is_up: bool
+    limb_girth: float  #: below which limbs are cut off [desired lengths]
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
     smooth_scale: float  #: size of what is smoothed away [`length`]
 
@@ -154,8 +155,20 @@ class _Asked(NamedTuple):
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece, scale = settings.keep_rods, settings.piece, settings.smooth_scale or 0.0
+        girth = 0.0 if settings.boundary else settings.limb_girth
         return cls(
-            settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always, scale
+            settings.length,
+            settings.box_size,
+            outliers,
+            repeated,
+            uneven,
+            wish,
+            rods,
+            piece,
+            z_is_up,
+            girth,
+            always,
+            scale,
         )
 
 
@@ -230,6 +243,7 @@ def samples_with(
         moved=samples.moved,
         origin=samples.origin,
         unit=samples.unit,
+        rings=samples.rings,
     )
 
 
@@ -304,9 +318,7 @@ def _prepare(
         points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _smooth_samples(points, bounds, spacing, asked, given, thinned) or _usual_samples(
-        points, bounds, spacing, asked, given, thinned
-    )
+    chosen = _chosen(points, bounds, spacing, asked, given, thinned)
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
     if not asked.keep_rods and thinned:
@@ -314,9 +326,15 @@ def _prepare(
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
-    found = chosen.found
-    surface, piece = _faced_surface(found, chosen.radius, length, spacing)
-    surface = surface._replace(field=length_field(surface, asked.wish))
+    found, surface, piece = _faced(chosen, spacing, asked)
+    rings: tuple[LimbRing, ...] = ()
+    if asked.limb_girth and thinned:
+        limb, rings = cut_limbs(scan[judged == KEPT], spacing, asked.limb_girth, surface, found.boxes, given)
+        if rings:
+            judged[np.flatnonzero(judged == KEPT)[limb]] = LIMB
+            left = np.ascontiguousarray(scan[judged == KEPT])
+            chosen = _chosen(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
+            found, surface, piece = _faced(chosen, spacing, asked)
     piece = number_pieces(piece)
     area = sample_areas(surface)
     graded = area / surface.field**2
@@ -344,6 +362,7 @@ def _prepare(
         chosen.rough,
         asked.smooth_scale,
         given=given,
+        rings=rings,
     )
 
 
@@ -353,6 +372,21 @@ def radius_of_samples(asked: _Asked, spacing: float) -> float:
     So they are never narrower than the spacing of the points, the lower bound of Eq. 1; holes need no upper one (docs/choices.md).
     """
     return max((asked.box_size or SAMPLE_SPACING) * asked.length, spacing / LINK_BOX)
+
+
+def _chosen(
+    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
+) -> _Chosen:
+    """Return larger samples where the scan allows it, else the usual ones."""
+    return _smooth_samples(points, bounds, spacing, asked, given, thinned) or _usual_samples(
+        points, bounds, spacing, asked, given, thinned
+    )
+
+
+def _faced(chosen: _Chosen, spacing: float, asked: _Asked) -> tuple[Linked, Surface, np.ndarray]:
+    """Return the linked samples, their surface with the length field, and the piece of each."""
+    surface, piece = faced_surface(chosen.found, chosen.radius, asked.length, spacing)
+    return chosen.found, surface._replace(field=length_field(surface, asked.wish)), piece
 
 
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
@@ -408,32 +442,3 @@ def _usual_samples(
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing)
     return _Chosen(found, radius, some, points, judged, False, rough)
-
-
-def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
-    mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP_SINE)
-    cut_steep_links(mean, normals, neighbors)
-    piece = face_one_side(mean, normals, neighbors)
-    if len(found.facing):
-        face_as_given(normals, found.facing)
-    normals = mean_normals(normals, neighbors, 0.7)
-    face_outside(mean, normals, piece)
-    surface = Surface(
-        points=found.grouped,
-        start=found.start,
-        mean=mean,
-        normals=normals,
-        neighbors=neighbors,
-        length=float(length),
-        radius=float(radius),
-        patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=PATCH_POINTS_ON_THE_WAY,
-        step=float(max(radius, 1.3 * spacing)),
-        stamp=np.zeros(len(mean), np.int64),
-        queue=np.zeros(len(mean), np.int64),
-        counter=np.zeros(1, np.int64),
-        field=np.ones(len(mean)),
-    )
-    return surface, piece

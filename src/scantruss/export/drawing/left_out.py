@@ -25,6 +25,7 @@ COLOURS = {
     "pieces": VIOLET,
     "not chosen": VIOLET,
     "rods": VIOLET,
+    "limbs": VIOLET,
     "floor": VIOLET,
     "outliers": AMBER,
     "sparse": AMBER,

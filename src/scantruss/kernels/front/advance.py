@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.triangles import quality, turned
-from ..geometry.vectors import Vector, along, norm, row, subtract
+from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..surface.size_field import length_at
 from .cases import choose_by_case, far_from_front
@@ -33,6 +33,13 @@ from .front import (
     rules_at,
 )
 
+ALONG_LIMB = 0.3  # cosine between a triangle and the normal at a node below which it may shut off a limb
+TRIANGLE_OFF_SHEET = (
+    0.36  # distance of the middle of a triangle from the nearest sample at which it has left the sheet [member lengths]
+)
+SIGHT, TIP = 0.9, 0.55  # how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
+STEPS_AROUND = 4  # in which the surface is followed around a bend
+NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
 GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
 
 
@@ -65,6 +72,63 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)
     return gap < 0.9 * surface.length * surface.field[near]
+
+
+@kernel
+def goes_on(surface: Surface, sample: int, middle: Vector, ahead: Vector, length: float) -> bool:
+    """Whether the sheet of a sample goes on beyond a place in a direction, as a limb does beyond a triangle across it."""
+    far = along(middle, SIGHT * length, ahead)
+    sample = walk(surface, sample, far)
+    return dot(subtract(row(surface.mean, sample), middle), ahead) > TIP * length
+
+
+@kernel
+def off_sheet(surface: Surface, sample: int, middle: Vector, length: float) -> bool:
+    """Whether a place has left the sheet of a sample near it."""
+    return norm(subtract(row(surface.mean, walk(surface, sample, middle)), middle)) > TRIANGLE_OFF_SHEET * length
+
+
+@kernel
+def shuts_off(surface: Surface, front: Front, s: int, p: int, length: float, strict: float) -> bool:
+    """Whether the triangle of segment s and node p lies across a limb, or leaves the sheet there, and not along it."""
+    a, b = front.tail[s], front.head[s]
+    pa, pb, pp = row(front.nodes, a), row(front.nodes, b), row(front.nodes, p)
+    middle = (pa[0] + pb[0] + pp[0]) / 3.0, (pa[1] + pb[1] + pp[1]) / 3.0, (pa[2] + pb[2] + pp[2]) / 3.0
+    off = off_sheet(surface, front.sample[a], middle, length)
+    if off and strict > 0.0:
+        return True
+    face = unit(cross(subtract(pb, pa), subtract(pp, pa)))
+    across_limb = 0
+    for q in (a, b, p):
+        across_limb += dot(face, row(front.normals, q)) < ALONG_LIMB
+    return (off or across_limb >= 2) and goes_on(surface, front.sample[a], middle, face, length)
+
+
+@kernel
+def propose_around_bend(surface: Surface, front: Front, s: int, side: float, patch: np.ndarray) -> bool:
+    """Propose a node at the height of a regular triangle over a segment, measured along the surface, where that bends sharply.
+
+    In the plane of the segment the same way leads across a limb to its other side. False where the surface hardly bends.
+    """
+    a, b = front.tail[s], front.head[s]
+    pa, pb, na, nb = row(front.nodes, a), row(front.nodes, b), row(front.normals, a), row(front.normals, b)
+    ab = subtract(pb, pa)
+    place, first = along(pa, 0.5, ab), unit((na[0] + nb[0], na[1] + nb[1], na[2] + nb[2]))
+    normal, sample = first, front.sample[a]
+    ahead = unit(cross(first, ab))
+    for _ in range(STEPS_AROUND):
+        place = along(place, 0.87 * side / STEPS_AROUND, ahead)
+        if fit_patch(surface, patch, sample, place) < 3:
+            return False
+        place = onto_patch(patch, place)
+        normal, sample = patch_normal(patch, place), walk(surface, int(patch[NEAREST_SAMPLE]), place)
+        ahead = unit(along(ahead, -dot(ahead, normal), normal))
+    if dot(normal, first) > NO_BEND:
+        return False
+    propose_node(front, place, normal, sample, False)
+    return (
+        norm(subtract(row(surface.mean, sample), place)) < TRIANGLE_OFF_SHEET * surface.length * surface.field[sample]
+    )
 
 
 @kernel
@@ -101,8 +165,8 @@ def choose_by_quality(
             elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
                 score[i] = 0.95 * value  # a candidate node that the front has not reached yet
     enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
-    proposed = False
-    while True:  # each turn proposes the one new node or takes a candidate out
+    proposed = around_bend = False
+    while True:  # each turn proposes one of two new nodes or takes a candidate out
         best = -1
         for i in range(near + 1):
             if score[i] > 0.0 and (best < 0 or score[i] > score[best]):
@@ -115,10 +179,16 @@ def choose_by_quality(
                     score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
             continue
         if best < 0 or score[best] < 0.5 * strict:
-            return False
+            if around_bend or not propose_around_bend(surface, front, s, side, patch):
+                return False
+            around_bend = True
+            pp = row(front.nodes, front.count[NODES])
+            if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
+                score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
+            continue
         p = found[best] if best < near else front.count[NODES]
         good, passage = fits(front, s, p, found, near, length, strict)
-        if good:
+        if good and not shuts_off(surface, front, s, p, length, strict):
             if best == near:
                 add_node(front)
             attach(front, s, p, passage)

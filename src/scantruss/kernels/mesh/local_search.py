@@ -24,7 +24,7 @@ from .grid import (
     wings,
 )
 from .lines import arc_on_line, halfway
-from .trial import Scratch, gather, local_energy, may_change, put_back
+from .trial import Scratch, gather, local_energy, may_change, put_back, triangles_across
 
 FLIP, COLLAPSE, SPLIT = 0, 1, 2  # moves
 NO_MOVE = -1  # stands for a move that cannot be made or makes no sense
@@ -153,7 +153,7 @@ def try_move(
     weight: float,
     worth: float,
 ) -> bool:
-    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy falls.
+    """Make a move at the edge a-b, settle the nodes around, and keep it if the energy falls and no collapse shuts off a limb.
 
     `worth` is the energy that one more node may cost. Moves that raise the disorder hardly ever pay and are not tried, unless flips
     around them can repair it.
@@ -163,6 +163,7 @@ def try_move(
     if change > TOLERATED_DISORDER[move] + (REPAIRABLE_DISORDER if tidied else 0):
         return False
     gather(net, scratch, a, b)
+    across = triangles_across(net, patches, scratch, length) if move == COLLAPSE else 0
     before = after = 0.0
     rehearse = change > TOLERATED_DISORDER[move]  # flips are tried first, before anything settles
     for turn in range(2):
@@ -188,7 +189,7 @@ def try_move(
         after = local_energy(net, patches, scratch, length, weight)
         if after > before + (EARLY_ALLOWANCE[move] if turn == 0 else LATE_ALLOWANCE[move]):
             break
-    if after < before - 1e-4:
+    if after < before - 1e-4 and (move != COLLAPSE or triangles_across(net, patches, scratch, length) <= across):
         for i in range(scratch.gathered[0]):
             scratch.tried[scratch.around[i]] = 0
         scratch.paid[0] += 1

@@ -8,10 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
+from ..geometry.quadric import coefficients_from, height_at
 from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 from ..surface.folds import FOLD_WEIGHT, chord_energy, fold_energy
+from ..surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
+
+OFF_PATCH = 0.33  # distance of the middle of a triangle from the patches of its nodes at which it has left them [desired length]
 
 
 class Scratch(NamedTuple):
@@ -176,3 +180,29 @@ def total_energy(
                     total += norm(subtract(row(net.nodes, u), row(net.nodes, v))) / target
     scratch.gathered[0] = count
     return local_energy(net, patches, scratch, length, weight), total / max(members, 1), count
+
+
+@kernel
+def off_patch(patches: np.ndarray, v: int, place: Vector) -> float:
+    """Distance of a place from the patch of a node, along the normal of its plane."""
+    d = subtract(place, (patches[v, CENTRE], patches[v, CENTRE + 1], patches[v, CENTRE + 2]))
+    normal = (patches[v, NORMAL], patches[v, NORMAL + 1], patches[v, NORMAL + 2])
+    u = (patches[v, TANGENT], patches[v, TANGENT + 1], patches[v, TANGENT + 2])
+    heights = coefficients_from(patches[v], HEIGHTS)
+    return abs(dot(d, normal) - height_at(heights, dot(d, u), dot(d, cross(normal, u))))
+
+
+@kernel
+def triangles_across(net: Net, patches: np.ndarray, scratch: Scratch, length: float) -> int:
+    """Number of triangles at the edge of a trial and its wings that have left the patches of their nodes: those across a limb."""
+    found = 0
+    for k in range(min(4, scratch.gathered[0])):
+        v = scratch.around[k]
+        d = net.degree[v]
+        for i in range(d - 1 if net.is_open[v] == 1 else d):
+            a, b = net.ring[v, i], net.ring[v, (i + 1) % d]
+            p, q, r = row(net.nodes, v), row(net.nodes, a), row(net.nodes, b)
+            middle = ((p[0] + q[0] + r[0]) / 3.0, (p[1] + q[1] + r[1]) / 3.0, (p[2] + q[2] + r[2]) / 3.0)
+            away = min(off_patch(patches, v, middle), off_patch(patches, a, middle), off_patch(patches, b, middle))
+            found += away > OFF_PATCH * length * net.desired[v]
+    return found

@@ -27,7 +27,7 @@ from ..geometry.vectors import Vector, across, along, dot, norm, put_vector, row
 
 TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances count as equal
 SETTLING_TURNS = 3  # fits of a sheet, those after the first with points far off it weighing less
-BENT = 0.7  # share of the spread about a plane below which that about a quadric says that the sheet is bent
+BENT_SHARE = 0.7  # share of the spread about a plane below which that about a quadric says that the sheet is bent
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
 LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
@@ -374,7 +374,7 @@ def _settled_place(buffer: np.ndarray, taken: int, place: Vector, radius: float)
             spread /= max(total, 1e-300)
             _weigh(buffer, taken, radius, 1.5 * max(spread, 1e-300))
         if spread < least:
-            off, least = heights[0], BENT * spread
+            off, least = heights[0], BENT_SHARE * spread
     return along(place, off, normal)
 
 

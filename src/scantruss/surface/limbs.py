@@ -1,0 +1,306 @@
+"""Limbs, handles and necks too thin for a tube of three members: where they are cut off, each at a clean ring."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.geometry.boxes import SearchBoxes
+from ..kernels.geometry.components import component_labels
+from ..kernels.scan.nearby import nearest_places
+from ..kernels.surface.girths import mark_opposite, measure_girths
+from ..kernels.surface.local_surface import Surface, flood
+from ..runtime.parallel import in_parts, run_in_parts
+from .given_normals import GivenNormals
+from .linked_samples import faced_surface, link_samples
+from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
+from .scratch import with_own_scratch
+
+SUSPECT = 1.1  # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
+FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
+HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
+BEYOND = 1.2  # largest girth that is measured [girth below which limbs are cut off]
+SMOOTHINGS = 3  # passes in which a sample becomes what most of those linked to it are
+FEWEST = 12  # fewest samples of a part that is cut off
+BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
+SURELY = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
+CLEAN = 0.8  # least share of the samples on each side of a ring that are on the right side
+NECK = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
+AROUND = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
+NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points tell its shape [desired lengths]
+RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
+WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
+SMALLEST_RING = (
+    2.0  # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
+)
+POINTS_OF_RING = 72
+MOST = 0.4  # share of the scan above which what is thin is the scan itself
+LIMBS_PER_THREAD = 400
+
+
+@dataclass(frozen=True, eq=False)
+class LimbRing:
+    """Where a limb was cut off."""
+
+    points: np.ndarray  #: (M, 3) closed curve, the surface that is left to its left; relative to the cloud's origin
+    girth: float  #: [scan unit]
+    bounds: bool  #: whether it becomes a boundary; else it is as small as a hole that the front runs over
+
+
+def cut_limbs(
+    points: np.ndarray,
+    spacing: float,
+    girth: float,
+    surface: Surface,
+    boxes: SearchBoxes,
+    given: GivenNormals | None = None,
+) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
+    """Return which points (N, 3) lie on limbs thinner than a girth, (N,) bool, and the rings at which these are cut off.
+
+    Parameters
+    ----------
+    girth : float
+        Below which limbs are cut off [desired lengths].
+    surface, boxes : Surface, SearchBoxes
+        The samples of the points.
+    given : GivenNormals, optional
+        Normals that came with the scan.
+    """
+    none: tuple[np.ndarray, tuple[LimbRing, ...]] = np.zeros(len(points), np.bool_), ()
+    suspect = _suspects(surface, boxes, girth)
+    if suspect.sum() < FEWEST:
+        return none
+    owner = np.empty(len(points), np.int64)
+    reach = 2.0 * max(surface.radius, spacing)
+    nearest_places(points, boxes, surface.mean, reach, owner, 0, len(points))
+    which = np.flatnonzero((owner >= 0) & suspect[owner])
+    rim = suspect & (~suspect[surface.neighbors] & (surface.neighbors >= 0)).any(axis=1)
+    parts = _Parts.of(points[which], owner[which], spacing, girth, surface, rim, given)
+    if parts is None:
+        return none
+    gone, rings = parts.cut()
+    if not gone.any() or gone.sum() > MOST * len(points):
+        return none
+    none[0][which[gone]] = True
+    return none[0], rings
+
+
+def _suspects(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
+    """Return which samples may lie on a limb too thin (S,) bool, and those around them."""
+    marks = np.zeros(len(surface.mean), np.bool_)
+    run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT * girth / 3.0, marks)
+    if marks.sum() < FEWEST:
+        return marks
+    beside = surface.neighbors
+    for _ in range(int(np.ceil(1.5 * surface.length / (2.0 * surface.radius)))):
+        marks = marks | (marks[beside] & (beside >= 0)).any(axis=1)
+    return marks
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Fine samples of the parts of a scan where limbs may be, and what they are."""
+
+    points: np.ndarray  #: (N, 3)
+    owner: np.ndarray  #: (N,) fine sample of each
+    surface: Surface
+    axis: np.ndarray  #: (S, 3) of the limb at each sample
+    girth: np.ndarray  #: (S,) [desired lengths]
+    limit: float  #: girth below which limbs are cut off [desired lengths]
+    label: np.ndarray  #: (S,) number of the part of each sample
+    thin: np.ndarray  #: (S,) bool
+    solid: np.ndarray  #: (S,) bool, of a part that is no end of a limb
+
+    @classmethod
+    def of(
+        cls,
+        points: np.ndarray,
+        coarse: np.ndarray,
+        spacing: float,
+        limit: float,
+        scan: Surface,
+        rim: np.ndarray,
+        given: GivenNormals | None,
+    ) -> _Parts | None:
+        """Return the parts of points (N, 3) of samples of the scan (N,); None where none is thin."""
+        length = scan.length
+        radius = max(FINE_SAMPLES * length, 0.25 * spacing)
+        found = link_samples(points, radius, length, spacing, given)
+        surface, piece = faced_surface(found, radius, length, spacing)
+        of_scan = coarse[found.chosen]
+        surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
+        agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
+        surface.normals[agree[piece] < 0.0] *= -1.0
+        girth, axis = np.full(len(piece), np.inf), np.zeros((len(piece), 3))
+
+        def measure(part: int, begin: int, end: int) -> None:
+            own = surface if part == 0 else with_own_scratch(surface)
+            measure_girths(own, BEYOND * limit, HALF_SECTION, girth, axis, begin, end)
+
+        in_parts(len(piece), LIMBS_PER_THREAD, measure)
+        girth /= length * surface.field
+        thin = _smoothed(girth < limit, surface.neighbors)
+        if thin.sum() < FEWEST:
+            return None
+        area = sample_areas(surface) / (length * surface.field) ** 2
+        label = _labels(thin, surface.neighbors)
+        total = np.bincount(label, area, len(label))
+        at_rim = np.bincount(label, rim[of_scan], len(label)) > 0
+        small = ~thin & ~at_rim[label] & (total[label] < BLUNT_END)
+        thin = thin | small
+        label = _labels(thin, surface.neighbors)
+        few = thin & (np.bincount(label, minlength=len(label))[label] < FEWEST)
+        if few.any():
+            thin = thin & ~few
+            label = _labels(thin, surface.neighbors)
+        total = np.bincount(label, area, len(label))
+        at_rim = np.bincount(label, rim[of_scan], len(label)) > 0
+        solid = ~thin & (at_rim | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
+        return cls(points, found.owner, surface, axis, girth, limit, label, thin, solid)
+
+    def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
+        """Return which points (N,) bool are cut off, and the rings."""
+        beside, label = self.surface.neighbors, self.label
+        one, k = np.nonzero((beside >= 0) & self.thin[:, None] & ~self.thin[beside])
+        other = beside[one, k]
+        kept_necks = self._kept_necks(label[one], label[other])
+        joined = np.isin(label[one], kept_necks)
+        whole = component_labels(len(label), label[one[joined]], label[other[joined]])[label]
+        stays = np.isin(whole, np.unique(whole[self.solid]))
+        removed = np.zeros(len(self.owner), np.bool_)
+        rings: list[LimbRing] = []
+        for limb in np.unique(whole[~stays]):
+            gone = whole == limb
+            if self._thinnest(gone & self.thin) > SURELY * self.limit:
+                continue
+            ends = gone[one] & ~gone[other]
+            own, off = [], gone[self.owner]
+            for edge in self._groups(one[ends], other[ends]):
+                own.append(self._ring(edge, gone, off))
+            found = [ring for ring in own if ring is not None]
+            if found and len(found) == len(own):  # what has no clean end stays
+                rings += found
+                removed |= off
+        return removed, tuple(rings)
+
+    def _kept_necks(self, thin: np.ndarray, fat: np.ndarray) -> np.ndarray:
+        """Return the labels of thin parts that stay: those before a blunt end that are not much too thin; all links thin-fat (L,)."""
+        kept = []
+        solid = np.unique(self.label[self.solid])
+        for part in np.unique(thin):
+            ends = np.unique(fat[thin == part])
+            blunt = ~np.isin(ends, solid)
+            thick = self._thinnest(self.label == part) >= NECK * self.limit
+            if len(ends) > 1 and blunt.any() and not blunt.all() and thick:
+                kept.append(part)
+        return np.array(kept, np.int64)
+
+    def _thinnest(self, which: np.ndarray) -> float:
+        """Return the girth at the thinnest twentieth of some samples (S,) bool [desired lengths]."""
+        known = self.girth[which & np.isfinite(self.girth)]
+        return float(np.quantile(known, 0.05)) if len(known) else 0.0
+
+    def _groups(self, thin: np.ndarray, fat: np.ndarray) -> list[np.ndarray]:
+        """Return the thin samples at each place where a part that is cut off joins one that stays; of the links (L,) between these."""
+        at = np.unique(np.concatenate([thin, fat]))
+        position = np.full(len(self.label) + 1, -1)
+        position[at] = np.arange(len(at))
+        beside = position[self.surface.neighbors[at]]
+        one, k = np.nonzero(beside >= 0)
+        group = component_labels(len(at), one, beside[one, k])
+        edge = np.isin(at, thin)
+        return [at[edge & (group == each)] for each in np.unique(group[edge])]
+
+    def _ring(self, edge: np.ndarray, gone: np.ndarray, removed: np.ndarray) -> LimbRing | None:
+        """Return the ring at some samples (K,) where a limb begins, and mark the points beyond it as removed, those before it as not."""
+        surface = self.surface
+        length = surface.length * float(surface.field[edge].mean())
+        middle = surface.mean[edge].mean(axis=0)
+        radius = float(np.linalg.norm(surface.mean[edge] - middle, axis=1).max())
+        count = flood(surface, int(edge[0]), tuple(middle), radius + AROUND * length)
+        near = surface.queue[:count].copy()
+        normals = surface.normals[near[np.linalg.norm(surface.mean[near] - middle, axis=1) < radius + 0.2 * length]]
+        axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
+        side = surface.mean[near[gone[near]]].mean(axis=0) - surface.mean[near[~gone[near]]].mean(axis=0)
+        axis = axis * np.sign(side @ axis)
+        frame = np.stack([*_frame(axis), axis])
+        mine = np.flatnonzero(np.isin(self.owner, near))
+        for _ in range(2):
+            flat = (self.points[mine] - middle) @ frame.T
+            close = np.abs(flat[:, 2]) < NEAR_PLANE * length
+            middle = middle + frame[:2].T @ _middle(flat[close, :2])
+        flat = (self.points[mine] - middle) @ frame.T
+        fitted = _fit_ring(flat[np.abs(flat[:, 2]) < NEAR_PLANE * length])
+        if fitted is None:
+            return None
+        turn = -2.0 * np.pi * np.arange(POINTS_OF_RING) / POINTS_OF_RING
+        out = fitted(turn)
+        ring = middle + out[:, None] * (np.cos(turn)[:, None] * frame[0] + np.sin(turn)[:, None] * frame[1])
+        girth = float(np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1).sum())
+        height = (surface.mean[near] - middle) @ frame.T
+        within = np.hypot(height[:, 0], height[:, 1]) < 1.3 * out.max()
+        for way in (1.0, -1.0):
+            clear = within & (way * height[:, 2] > HALF_SECTION * length)
+            if (gone[near[clear]] == (way > 0.0)).sum() < CLEAN * clear.sum():
+                return None
+        bounds = girth > SMALLEST_RING * length
+        inside = np.hypot(flat[:, 0], flat[:, 1]) < 1.3 * out.max()
+        removed[mine[inside]] = flat[inside, 2] > (0.0 if bounds else -HALF_SECTION * length)
+        return LimbRing(ring, girth, bounds)
+
+
+def _smoothed(marks: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return marks (S,) bool as most of the samples linked to each have them."""
+    linked = beside >= 0
+    for _ in range(SMOOTHINGS):
+        marks = (marks[beside] & linked).sum(axis=1) + marks > 0.5 * (linked.sum(axis=1) + 1)
+    return marks
+
+
+def _labels(marks: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return a number for each sample (S,): the same where samples with the same mark hang together."""
+    one, k = np.nonzero((beside >= 0) & (marks[beside] == marks[:, None]))
+    label: np.ndarray = component_labels(len(marks), one, beside[one, k])
+    return label
+
+
+def _frame(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors at right angles to an axis and to each other."""
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+def _middle(flat: np.ndarray) -> np.ndarray:
+    """Middle of points in a plane (K, 2): of the box around them, however they are spread, in two frames."""
+    if not len(flat):
+        return np.zeros(2)
+    box = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    turned = flat @ np.array([[1.0, 1.0], [-1.0, 1.0]])
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    other = np.array([[1.0, 1.0], [-1.0, 1.0]]) @ (0.25 * (low + high))
+    middle: np.ndarray = 0.5 * (box + other)
+    return middle
+
+
+def _fit_ring(flat: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return the radius of a ring by its angle, fitted to points (K, 3): in its plane, and their height; None where it has a gap."""
+    angle, out = np.arctan2(flat[:, 1], flat[:, 0]), np.hypot(flat[:, 0], flat[:, 1])
+    if len(flat) < 6:
+        return None
+    ordered = np.sort(angle)
+    gap = max(float(np.diff(ordered).max()), float(ordered[0] + 2.0 * np.pi - ordered[-1]))
+    if gap > np.radians(WIDEST_GAP):
+        return None
+    waves = min(RING_WAVES, (len(flat) - 3) // 4)
+
+    def series(turn: np.ndarray) -> np.ndarray:
+        steps = np.arange(1, waves + 1) * turn[:, None]
+        return np.column_stack([np.ones(len(turn)), np.cos(steps), np.sin(steps)])
+
+    terms = np.column_stack([series(angle), flat[:, 2], flat[:, 2] * np.cos(angle), flat[:, 2] * np.sin(angle)])
+    weights = 1e-3 * len(flat) * np.concatenate([[0.0], np.tile(np.arange(1, waves + 1), 2) ** 2, np.zeros(3)])
+    found = np.linalg.solve(terms.T @ terms + np.diag(weights) + 1e-9 * np.eye(terms.shape[1]), terms.T @ out)
+    return lambda turn: series(turn) @ found[: 1 + 2 * waves]
