@@ -14,6 +14,7 @@ from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
+INSIDE = 9.0  # stands for no free direction
 TRIES = 20  # attempts to roll the disc away from one place
 TRAP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 
@@ -26,7 +27,7 @@ class Rolled(NamedTuple):
 
 
 def boundary_loops(
-    surface: Surface, piece: np.ndarray, radius: float, least: float
+    surface: Surface, piece: np.ndarray, radius: float, least: float, on_edge: np.ndarray
 ) -> tuple[list[Rolled], list[Rolled]]:
     """Return the loops of samples that the rolled disc touches: those that are kept, and those no longer than `least`."""
     free = np.empty(len(surface.mean))
@@ -37,6 +38,8 @@ def boundary_loops(
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
     in_parts(len(free), SAMPLES_PER_THREAD, look)
+    beside = surface.neighbors[on_edge]
+    free[on_edge], free[beside[beside >= 0]] = INSIDE, INSIDE
     rolling = _RollingDisc(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
     loops, short, closed = list[Rolled](), list[Rolled](), np.zeros(len(free), np.bool_)
     for sample in np.flatnonzero(free < 9.0).tolist():

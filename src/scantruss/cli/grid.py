@@ -165,6 +165,8 @@ def make_grid(
         bars.note(
             "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always"
         )
+    if grid.settings is not None and grid.settings.sharp_edges != settings.sharp_edges:
+        bars.note("no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges")
     if grid.settings is not None and grid.settings.keep_rods != settings.keep_rods:
         bars.note("no grid passes with the columns, scaffold or cables of this scan, so they are left out")
     if grid.settings is not None and grid.settings.ridge_angle != settings.ridge_angle:

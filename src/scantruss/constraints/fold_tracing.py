@@ -54,6 +54,7 @@ class Tracer:
         self.surface = samples.surface
         self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
+        self.sharpest = SHARPEST_EDGE if settings.sharp_edges else SHARPEST
         self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in RADII]
         of_sample = samples.area / len(samples.surface.mean)
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
@@ -111,7 +112,7 @@ class Tracer:
                 and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
-                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle)]
+                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle, self.sharpest)]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds[:, :3]:
@@ -229,6 +230,7 @@ CORNER = 25.0  # by how much a line turns more in a corner than before and after
 LONG = 1.0  # least length of a line of folds [member lengths]
 FULL = 0.75  # least length of it with the full angle [member lengths]
 SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+SHARPEST_EDGE = 155.0  # the same where sharp edges of bodies are looked for [degree]
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN = (0.5, 3.5)
@@ -255,7 +257,7 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     return [*parts, folds[first:]]
 
 
-def is_even(folds: np.ndarray, angle: float) -> bool:
+def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
     if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < FULL:
@@ -266,7 +268,7 @@ def is_even(folds: np.ndarray, angle: float) -> bool:
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
     most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN)) + BY_NOISE / np.sqrt(max(gain, 1.0))
-    return bool(gain >= SURE and uneven <= most and bend < SHARPEST)
+    return bool(gain >= SURE and uneven <= most and bend < sharpest)
 
 
 def smoothed(places: np.ndarray) -> np.ndarray:

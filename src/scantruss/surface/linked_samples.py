@@ -99,10 +99,31 @@ def link_finer(points: np.ndarray, radius: float, length: float, spacing: float)
     return None
 
 
-def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the samples of a rough layer moved to its middle, thinned and linked again."""
-    moved = np.empty_like(found.mean)
-    kernels.settle_samples(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
+def refined(
+    found: Linked, points: np.ndarray, coarse: np.ndarray, radius: float, length: float, spacing: float
+) -> Linked:
+    """Return the samples with finer ones, of a smaller radius, in place of some of them, `coarse` (S,) bool."""
+    among, kept = np.flatnonzero(coarse[found.owner]), int((~coarse).sum())
+    owner, finer, _, _ = samples_of_points(points[among], radius)
+    chosen = np.concatenate([found.chosen[~coarse], among[finer]])
+    places = np.concatenate([found.mean[~coarse], points[among[finer]]])
+    owners = (np.cumsum(~coarse) - 1)[found.owner]
+    owners[among] = kept + owner
+    boxes = new_boxes(*bounds_of(places), float(found.boxes.size.max()), len(places), len(places))
+    kernels.put_all(boxes, places, np.arange(len(places)))
+    neighbors = _neighbors(places, boxes, length, radius, spacing)
+    _settle(points, places, neighbors, owners)
+    grouped, start, mean = group(points, owners, len(chosen))
+    mean[:kept] = places[:kept]
+    return Linked(owners, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
+
+
+def settle_to_sheet(
+    found: Linked, points: np.ndarray, radius: float, length: float, spacing: float, still: np.ndarray
+) -> Linked:
+    """Return the samples of a rough layer moved to its middle, but those that stay where they are, thinned and linked again."""
+    moved, thickness = np.empty_like(found.mean), np.where(still, 0.0, found.thickness)
+    kernels.settle_samples(found.mean, found.neighbors, thickness, ROUGH * length, 0.6 * length, moved)
     joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing)
     owner = joined[found.owner]
     grouped, start, _ = group(points, owner, len(chosen))
@@ -144,12 +165,17 @@ def _settled(
     """Return the nearest sample of each point, the point and position of each sample, the samples by box, and their neighbours."""
     owner, chosen, places, boxes = samples_of_points(points, radius)
     neighbors = _neighbors(places, boxes, length, radius, spacing)
+    _settle(points, places, neighbors, owner)
+    return owner, chosen, places, boxes, neighbors
+
+
+def _settle(points: np.ndarray, places: np.ndarray, neighbors: np.ndarray, owner: np.ndarray) -> None:
+    """Give each point to the sample nearest to it, from a near one on."""
     in_parts(
         len(points),
         POINTS_PER_THREAD,
         lambda _, begin, end: kernels.settle_points(points, places, neighbors, owner, begin, end),
     )
-    return owner, chosen, places, boxes, neighbors
 
 
 def _neighbors(places: np.ndarray, boxes: SearchBoxes, length: float, radius: float, spacing: float) -> np.ndarray:

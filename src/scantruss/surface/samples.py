@@ -32,11 +32,13 @@ from .linked_samples import (
     is_smooth,
     link_finer,
     link_samples,
+    refined,
     settle_to_sheet,
     thin_dense,
 )
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
+from .sharp_edges import BESIDE, beside_edges, coarse_samples, on_sharp_edges, unsure_samples
 from .shape import check_is_surface, find_layers
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
@@ -74,6 +76,9 @@ class SurfaceSamples:
     whole: np.ndarray | None = None  #: (N, 3) all points if `surface` has only some of them
     sample_spacing: float = 0.0  #: spacing of the points of `surface` then [scan unit]
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
+    on_edge: np.ndarray = field(
+        default_factory=lambda: np.zeros(0, np.bool_)
+    )  #: (S,) whether each sample lies on a sharp edge of a body, if these are looked for
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
 
@@ -134,6 +139,7 @@ class _Asked(NamedTuple):
     piece: str
     z_is_up: bool
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
+    sharp_edges: bool
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
@@ -143,7 +149,10 @@ class _Asked(NamedTuple):
         uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece = settings.keep_rods, settings.piece
-        return cls(settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always)
+        return cls(
+            settings.length, settings.box_size, outliers, repeated, uneven, wish, rods, piece, z_is_up, always,
+            settings.sharp_edges,
+        )  # fmt: skip
 
 
 class _Chosen(NamedTuple):
@@ -298,7 +307,7 @@ def _prepare(
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), thinned)
     found = chosen.found
-    surface, piece = _faced_surface(found, chosen.radius, length, spacing)
+    surface, piece, on_edge = _faced_surface(found, chosen.radius, length, spacing, asked.sharp_edges)
     surface = surface._replace(field=length_field(surface, asked.wish))
     piece = number_pieces(piece)
     area = sample_areas(surface)
@@ -324,6 +333,7 @@ def _prepare(
         chosen.whole if len(chosen.points) < len(chosen.whole) else None,
         PATCH_SPACING * chosen.radius,
         chosen.smooth,
+        on_edge=on_edge,
     )
 
 
@@ -338,7 +348,7 @@ def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
 def _smooth_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, thinned: bool) -> _Chosen | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    if asked.box_size is not None or asked.judge_always or spacing > SPARSE_SPACING * length:
+    if asked.box_size is not None or asked.judge_always or asked.sharp_edges or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing)
@@ -364,17 +374,27 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
         fine = link_finer(points, radius, length, spacing)
         if fine is not None:
             some, (found, radius) = points, fine
+    still = np.zeros(len(found.mean), np.bool_)
+    if asked.sharp_edges:
+        still = beside_edges(found, on_sharp_edges(found, found.normals.copy(), length), BESIDE * length)
     if is_rough(found, ROUGH * length, MANY_ROUGH):
-        found = settle_to_sheet(found, some, radius, length, spacing)
+        found = settle_to_sheet(found, some, radius, length, spacing, still)
+    if asked.sharp_edges:
+        coarse = coarse_samples(found, length)
+        found = refined(found, some, coarse, max(0.5 * radius, spacing), length, spacing) if coarse.any() else found
     return _Chosen(found, radius, some, points, judged, False)
 
 
-def _faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
+def _faced_surface(
+    found: Linked, radius: float, length: float, spacing: float, sharp_edges: bool
+) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """Return the local surface of linked samples, with smoothed normals that face outwards; for each (S,) its piece, and whether it
+    lies on a sharp edge."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
+    on_edge = on_sharp_edges(found, normals, length) if sharp_edges else np.zeros(len(mean), np.bool_)
     cut_steep_links(mean, normals, neighbors)
-    piece = face_one_side(mean, normals, neighbors)
+    piece = face_one_side(mean, normals, neighbors, unsure_samples(found, on_edge, length) if on_edge.any() else None)
     normals = mean_normals(normals, neighbors, 0.7)
     face_outside(mean, normals, piece)
     surface = Surface(
@@ -393,4 +413,4 @@ def _faced_surface(found: Linked, radius: float, length: float, spacing: float) 
         counter=np.zeros(1, np.int64),
         field=np.ones(len(mean)),
     )
-    return surface, piece
+    return surface, piece, on_edge

@@ -26,6 +26,7 @@ from .front import NODES, Front, edge_exists
 FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, [member lengths]
 FACES = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
+FACES_AWAY = -0.5  # cosine between the normals of two places below which they lie on two sides of a body that meet at a sharp edge
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
@@ -178,6 +179,8 @@ def clear_of_front(
     for i in range(near + 2):
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
+        if dot(normal, row(front.normals, q)) < FACES_AWAY:
+            continue
         if i < near and q != p and q != a and q != b:
             if abs(dot(subtract(pq, pa), normal)) < SHEET * length and inside_triangle(
                 onto_tangent_plane(pq, pa, u, v), a2, b2, p2
@@ -194,7 +197,7 @@ def clear_of_front(
         t = front.out[q]
         while t >= 0:
             e = front.head[t]
-            if t != s and q != p and e != p:
+            if t != s and q != p and e != p and dot(normal, row(front.normals, e)) >= FACES_AWAY:
                 pe = row(front.nodes, e)
                 # a line in a fold lies deep below a triangle that bridges it, and faces as that does
                 faces = min(dot(normal, row(front.normals, q)), dot(normal, row(front.normals, e)))
