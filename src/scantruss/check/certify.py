@@ -64,7 +64,7 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     found = measure_distances(grid, samples, length)
     nearest, cuts, certificate = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
-        lambda: find_crossings(grid.nodes, grid.triangles),
+        lambda: find_crossings(grid.nodes, grid.triangles, grid.origin),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
     )
     certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, found, length))

@@ -11,6 +11,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
+from ..runtime.watch import Watch
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -38,6 +39,8 @@ MISSED = 2  # places in a row at which a fold may not be seen and still goes on
 TURNED = 0.94  # least cosine of the turn of a fold from place to place
 RING = 6  # places along the shortest ring
 FARTHEST = 20_000  # most places along a fold
+TRACED = 4.0  # times as many places as ridges can have where they lie side by side
+TANGLED = "the ridges of the scan cannot be followed; use another length, or --ridge-angle 0"
 MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
@@ -61,6 +64,8 @@ class Tracer:
         self.spacing = samples.spacing
         self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty((6000, COLUMNS))
+        self.origin = samples.origin
+        self.watch = Watch(TANGLED, samples.area / (MEETS * STRIDE * settings.length**2), TRACED)
 
     def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.ndarray | None:
         """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
@@ -112,6 +117,7 @@ class Tracer:
                 and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
+                self.watch.note(len(folds), folds[-1, :3] + self.origin)
                 even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle, self.sharpest)]
                 ridges += even
                 misses = 0 if even else misses

@@ -18,7 +18,6 @@ from ..constraints.embedded_lines import (
 )
 from ..constraints.find import Constraints
 from ..constraints.network import Lines
-from ..errors import FrontError
 from ..grid.grid import Grid
 from ..kernels.front import advance as kernels
 from ..kernels.front import front as lists
@@ -40,6 +39,7 @@ from ..kernels.surface.local_surface import (
 )
 from ..kernels.surface.ridges import mean_normal
 from ..runtime.progress import Progress
+from ..runtime.watch import Watch
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
@@ -50,6 +50,8 @@ CLEAR = 0.6  # least distance of a candidate node from the initial front [member
 NEARER = 0.33  # the same distance for the position of a fixed node [member lengths]
 BESIDE = 0.6  # how far the sides of a ridge are looked at [member lengths]
 BOX = 2.4  # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
+MADE = 4.0  # times as many triangles as the scan has room for that a front may make
+RUNS_OVER_ITSELF = "the front runs over itself: the scan is too rough or too sparse for this length"
 BUDGET = 500  # segments advanced between two reports of progress
 
 
@@ -310,16 +312,15 @@ def run(
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = samples.graded_area / (0.433 * rules.desired**2)
-    while True:
+    watch, made = Watch(RUNS_OVER_ITSELF, expected, MADE), int(front.count[lists.TRIANGLES])
+    watch.note(made, samples.origin)
+    while True:  # each slice makes triangles, or the queue becomes shorter
         status = step(samples.surface, front, rules, BUDGET)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:
             return front
-        if front.count[lists.TRIANGLES] > 4 * expected + 1000:
-            x, y, z = (front.nodes[front.count[lists.NODES] - 1] + samples.origin).tolist()
-            raise FrontError(
-                "the front runs over itself: the scan is too rough or too sparse for this length", where=(x, y, z)
-            )
+        watch.note(int(front.count[lists.TRIANGLES]) - made, front.nodes[front.count[lists.NODES] - 1] + samples.origin)
+        made = int(front.count[lists.TRIANGLES])
         if status == lists.FULL:
             front = grown(front)

@@ -24,11 +24,11 @@ def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
     )
 
 
-def face_off_edges(
-    mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float
-) -> None:
+def face_off_edges(mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float) -> None:
     """Let those of the thick samples (P,) that lie on a sharp edge of a body face away from it."""
-    in_parts(len(thick), SAMPLES_PER_THREAD, lambda _, i, j: kernels.face_off_edges(mean, normals, boxes, thick, reach, i, j))
+    in_parts(
+        len(thick), SAMPLES_PER_THREAD, lambda _, i, j: kernels.face_off_edges(mean, normals, boxes, thick, reach, i, j)
+    )
 
 
 def face_one_side(

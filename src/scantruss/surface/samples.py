@@ -38,8 +38,8 @@ from .linked_samples import (
 )
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
-from .sharp_edges import BESIDE, beside_edges, coarse_samples, on_sharp_edges, unsure_samples
 from .shape import check_is_surface, find_layers
+from .sharp_edges import BESIDE, beside_edges, coarse_samples, on_sharp_edges, unsure_samples
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 from .supports import support_samples
@@ -388,8 +388,7 @@ def _usual_samples(points: np.ndarray, bounds: Bounds, spacing: float, asked: _A
 def _faced_surface(
     found: Linked, radius: float, length: float, spacing: float, sharp_edges: bool
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
-    """Return the local surface of linked samples, with smoothed normals that face outwards; for each (S,) its piece, and whether it
-    lies on a sharp edge."""
+    """Return the local surface of linked samples, its normals facing outwards; each one's piece, and whether it lies on an edge."""
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP)
     on_edge = on_sharp_edges(found, normals, length) if sharp_edges else np.zeros(len(mean), np.bool_)

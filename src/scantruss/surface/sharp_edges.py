@@ -23,9 +23,16 @@ if TYPE_CHECKING:
 THICK = 0.03  # thickness above which a sample may lie on a sharp edge [member lengths]
 REACH = 0.7  # distance within which other samples tell whether it does [member lengths]
 FEWEST = 8  # fewest samples of an edge
-BESIDE = 1.2  # distance from an edge within which samples are not moved to the middle of their sheet, and finer where thick [member lengths]
-UNSURE = 0.6  # distance from an edge within which other thick samples tell little of which way a side faces [member lengths]
-SHARE, FEWEST_NEEDED = 0.02, 40  # share of the samples that lie on sharp edges where these are worth an attempt, and their number
+BESIDE = (
+    1.2  # distance from an edge within which samples stay in their places, and are finer where thick [member lengths]
+)
+UNSURE = (
+    0.6  # distance from an edge within which other thick samples tell little of which way a side faces [member lengths]
+)
+SHARE, FEWEST_NEEDED = (
+    0.02,
+    40,
+)  # share of the samples that lie on sharp edges where these are worth an attempt, and their number
 
 
 def on_sharp_edges(found: Linked, normals: np.ndarray, length: float) -> np.ndarray:

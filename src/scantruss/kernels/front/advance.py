@@ -172,7 +172,7 @@ def has_room(front: Front) -> bool:
 @kernel
 def take_segment(front: Front) -> int:
     """Next active segment of the queue, -1 if it is empty."""
-    while front.count[FIRST] < front.count[LAST]:
+    while front.count[FIRST] < front.count[LAST]:  # each turn takes one out
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1
         if front.state[s] == ACTIVE:

@@ -309,7 +309,11 @@ def far_from_front(
         t = front.out[q]
         while t >= 0:
             beside = dot(normal, row(front.normals, front.head[t])) >= FACES_AWAY
-            if t != s and beside and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
+            if (
+                t != s
+                and beside
+                and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least
+            ):
                 return False
             t = front.out_next[t]
         if (

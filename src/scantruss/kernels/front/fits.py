@@ -26,7 +26,9 @@ from .front import NODES, Front, edge_exists
 FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, [member lengths]
 FACES = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
-FACES_AWAY = -0.5  # cosine between the normals of two places below which they lie on two sides of a body that meet at a sharp edge
+FACES_AWAY = (
+    -0.5
+)  # cosine between the normals of two places below which they lie on two sides of a body that meet at a sharp edge
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 

@@ -152,7 +152,7 @@ def remove_segment(front: Front, s: int) -> None:
     if at == s:
         front.out[node] = front.out_next[s]
         return
-    while front.out_next[at] != s:
+    while front.out_next[at] != s:  # each turn goes on in the list of the node, which holds s
         at = front.out_next[at]
     front.out_next[at] = front.out_next[s]
 

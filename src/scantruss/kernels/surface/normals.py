@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, search
-from ..geometry.vectors import Vector, along, cross, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
+from ..geometry.vectors import Vector, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
 
 ASIDE = 0.25  # least distance of the middle of what is around a sharp edge from it [reach]
 BEHIND = 0.35  # samples nearer than this tell nothing of the two sides of the edge [reach]
@@ -111,7 +111,12 @@ def face_off_edges(
         large = xx + yy + zz
         a, b, c = inwards
         between = smallest_eigenvector(
-            xx + large * a * a, xy + large * a * b, xz + large * a * c, yy + large * b * b, yz + large * b * c, zz + large * c * c
+            xx + large * a * a,
+            xy + large * a * b,
+            xz + large * a * c,
+            yy + large * b * b,
+            yz + large * b * c,
+            zz + large * c * c,
         )
         n = above = 0
         st = sh = stt = sth = shh = 0.0
@@ -206,7 +211,7 @@ def link_weights(
 def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
     """Root of a sample in the union-find tree, and its sign relative to that root; shortens the path."""
     total = 1
-    while piece[s] != s:
+    while piece[s] != s:  # numbers fall along the way
         parent = piece[s]
         if piece[parent] != parent:
             sign[s] *= sign[parent]
