@@ -188,6 +188,7 @@ def start_front(
 ) -> lists.Front:
     """Fill the lists with the initial front: boundary loops, lines, candidate nodes, a seed triangle on closed pieces."""
     surface = samples.surface
+    front.count[lists.SHARP] = int(settings.sharp_edges)
     for loop in boundary.loops:
         active = loop.external or settings.advance_from == "all"
         nodes, _ = characteristic_points(loop, settings.length)

@@ -23,6 +23,7 @@ from .front import (
     MOST_NEAR_NODES,
     NODES,
     SEGMENTS,
+    SHARP,
     TRIANGLES,
     WAITING,
     Front,
@@ -112,7 +113,7 @@ def choose_by_quality(
     segment = norm(subtract(pb, pa))
     side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
     place = ideal_point(front, s, alpha, beta, side)
-    if front.on_boundary[a] and front.on_boundary[b]:
+    if front.count[SHARP] == 1 and front.on_boundary[a] and front.on_boundary[b]:
         place = beside_line(surface, front, s, place, length)
     widest = 2.2 + 0.7 * (1.0 - strict)
     around = (0.75 + 0.9 * (1.0 - strict)) * length

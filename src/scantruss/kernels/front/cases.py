@@ -11,7 +11,7 @@ from ..geometry.boxes import put, take
 from ..geometry.triangles import distance_to_segment, on_unmeshed_side, quality, shape_quality, turned
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, patch_normal, walk
-from .fits import FACES_AWAY, clear_of_front, fits, left_angle, near_nodes, right_angle
+from .fits import clear_of_front, faces_away, fits, left_angle, near_nodes, right_angle
 from .front import (
     INACTIVE,
     NODES,
@@ -304,16 +304,13 @@ def far_from_front(
     normal = row(front.normals, p)
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
-        if dot(normal, row(front.normals, q)) < FACES_AWAY:
+        if faces_away(front, normal, q):
             continue
         t = front.out[q]
         while t >= 0:
-            beside = dot(normal, row(front.normals, front.head[t])) >= FACES_AWAY
-            if (
-                t != s
-                and beside
-                and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least
-            ):
+            e = front.head[t]
+            near_it = distance_to_segment(pp, row(front.nodes, q), row(front.nodes, e)) < least
+            if t != s and near_it and not faces_away(front, normal, e):
                 return False
             t = front.out_next[t]
         if (

@@ -21,14 +21,12 @@ from ..geometry.triangles import (
 )
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, linked
-from .front import NODES, Front, edge_exists
+from .front import NODES, SHARP, Front, edge_exists
 
 FOLD = 0.85  # a line on the boundary of the front that faces as a triangle does may be that far from it and be crossed, [member lengths]
 FACES = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
-FACES_AWAY = (
-    -0.5
-)  # cosine between the normals of two places below which they lie on two sides of a body that meet at a sharp edge
+FACES_AWAY = -0.5  # cosine between normals below which places near each other lie on two sides of a sharp edge
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
@@ -48,6 +46,12 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
         return False
     place = along(row(front.nodes, a), 0.5, d)
     return linked(surface, front.sample[a], front.sample[q], place, 0.6 * far + 1.5 * surface.step)
+
+
+@kernel
+def faces_away(front: Front, normal: Vector, q: int) -> bool:
+    """Whether a node lies on the other side of a sharp edge of a body, seen from a place of that normal."""
+    return front.count[SHARP] == 1 and dot(normal, row(front.normals, q)) < FACES_AWAY
 
 
 @kernel
@@ -181,7 +185,7 @@ def clear_of_front(
     for i in range(near + 2):
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
-        if dot(normal, row(front.normals, q)) < FACES_AWAY:
+        if faces_away(front, normal, q):
             continue
         if i < near and q != p and q != a and q != b:
             if abs(dot(subtract(pq, pa), normal)) < SHEET * length and inside_triangle(
@@ -199,7 +203,7 @@ def clear_of_front(
         t = front.out[q]
         while t >= 0:
             e = front.head[t]
-            if t != s and q != p and e != p and dot(normal, row(front.normals, e)) >= FACES_AWAY:
+            if t != s and q != p and e != p and not faces_away(front, normal, e):
                 pe = row(front.nodes, e)
                 # a line in a fold lies deep below a triangle that bridges it, and faces as that does
                 faces = min(dot(normal, row(front.normals, q)), dot(normal, row(front.normals, e)))
