@@ -139,7 +139,7 @@ class _Asked(NamedTuple):
     piece: str
     z_is_up: bool
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
-    sharp_edges: bool
+    sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
@@ -177,7 +177,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     cloud : PointCloud
     settings : Settings
         `length` and `box_size` determine the spacing of the samples; `clean`, `outlier_distance` and `drop_duplicates` which points
-        are left out; `length_field` where members are longer.
+        are left out; `length_field` where members are longer; `sharp_edges` whether edges of bodies are looked at.
     """
     asked = _Asked.of(settings, cloud.origin, cloud.z_is_up)
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
