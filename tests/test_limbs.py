@@ -11,8 +11,9 @@ from typed import known
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.kernels.surface.girths import FACING_OPPOSITE, mark_opposite, measure_girths
+from scantruss.surface.faced_surface import faced_surface
 from scantruss.surface.limbs import SMALLEST_RING
-from scantruss.surface.linked_samples import faced_surface, link_samples
+from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.samples import LIMB, SurfaceSamples, sample_surface
 
 BODY, TIP = 3.0, 14.0  # radius of the body, where the limb ends [member]
@@ -68,7 +69,7 @@ def test_a_limb_of_three_members_round_is_kept_to_its_blunt_end(girth: float, ti
     assert not samples_of(points).rings
     grid = st.grid_from_points(points, st.Settings(length=1.0, effort="quick"))
     certificate = known(grid.certificate)
-    assert certificate.passed and certificate.missing < 0.002 and known(grid.settings).limb_girth == 3.0
+    assert certificate.passed and certificate.missing < 0.003 and known(grid.settings).limb_girth == 3.0
     assert (grid.topology.components, grid.topology.boundary_loops, grid.topology.euler) == (1, 0, 2)
     assert grid.scan_nodes[:, 0].max() > TIP - 0.6
 
@@ -154,7 +155,7 @@ def test_girths_of_a_cone_are_those_of_its_circles() -> None:
     points = turned(radius, axis_x, 120.0, 3)
     cloud = st.PointCloud.from_array(points)
     found = link_samples(cloud.points, 0.1, 1.0, cloud.spacing)
-    surface, _ = faced_surface(found, 0.1, 1.0, cloud.spacing)
+    surface, _, _ = faced_surface(found, 0.1, 1.0, cloud.spacing)
     count = len(surface.mean)
     girth, axis = np.empty(count), np.zeros((count, 3))
     measure_girths(surface, 4.0, 0.15, girth, axis, 0, count)
@@ -171,7 +172,7 @@ def test_opposite_samples_are_those_of_plain_distances() -> None:
     points = handle(2.3)[::40]
     cloud = st.PointCloud.from_array(points)
     found = link_samples(cloud.points, 0.5, 1.0, cloud.spacing)
-    surface, _ = faced_surface(found, 0.5, 1.0, cloud.spacing)
+    surface, _, _ = faced_surface(found, 0.5, 1.0, cloud.spacing)
     marks = np.zeros(len(surface.mean), np.bool_)
     mark_opposite(surface, found.boxes, 1.3, marks, 0, len(marks))
     near = np.linalg.norm(surface.mean[:, None] - surface.mean, axis=2) <= 1.3

@@ -23,6 +23,7 @@ from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
 from .surface.samples import ROD, sample_surface
 from .surface.scratch import with_own_scratch
+from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 
 if TYPE_CHECKING:
     from .boundary.find import Boundary
@@ -104,6 +105,9 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
+    if not settings.sharp_edges and settings.method == "default" and _has_sharp_edges(cloud, settings):
+        settings = settings.replace(sharp_edges=True)
+        yield from _same_scan(settings)
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
@@ -137,6 +141,12 @@ def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
     """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
     always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
     return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
+
+
+def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether so many samples lie on sharp edges that these are to be looked at."""
+    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
+    return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:

@@ -184,7 +184,9 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
     found: list[tuple[np.ndarray, int, SamplingBias]] = []
     surface = samples.surface._replace(normals=broad_normals(samples.surface))
-    rolled, short = boundary_loops(surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length)
+    rolled, short = boundary_loops(
+        surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length, samples.on_edge, samples.origin
+    )
     loops = [loop for loop in rolled if loop.piece in samples.pieces]
     bridged = [surface.mean[loop.samples] for loop in short if loop.piece in samples.pieces]
     disc = max(0.5 * radius, 2.5 * samples.spacing)

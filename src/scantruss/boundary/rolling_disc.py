@@ -9,11 +9,17 @@ import numpy as np
 from ..kernels.boundary import loops as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
+from ..runtime.watch import Watch
 from ..scan.normals import NORMALS_PER_THREAD
 from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
+INSIDE = 9.0  # stands for no free direction
+ROLLED = 200.0  # times that the disc may touch each sample at the edge, on average
+ROUND_AND_ROUND = (
+    "the boundary cannot be followed: the scan is too rough or too sparse; use a longer length, or clean the scan"
+)
 TRIES = 20  # attempts to roll the disc away from one place
 TRAP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 
@@ -26,7 +32,7 @@ class Rolled(NamedTuple):
 
 
 def boundary_loops(
-    surface: Surface, piece: np.ndarray, radius: float, least: float
+    surface: Surface, piece: np.ndarray, radius: float, least: float, on_edge: np.ndarray, origin: np.ndarray
 ) -> tuple[list[Rolled], list[Rolled]]:
     """Return the loops of samples that the rolled disc touches: those that are kept, and those no longer than `least`."""
     free = np.empty(len(surface.mean))
@@ -37,9 +43,11 @@ def boundary_loops(
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
     in_parts(len(free), NORMALS_PER_THREAD, look)
-    rolling = _RollingDisc(surface, radii, 2_000 + 4 * int((free < 9.0).sum()))
+    beside = surface.neighbors[on_edge]
+    free[on_edge], free[beside[beside >= 0]] = INSIDE, INSIDE
+    rolling = _RollingDisc(surface, radii, int((free < INSIDE).sum()), origin)
     loops, short, closed = list[Rolled](), list[Rolled](), np.zeros(len(free), np.bool_)
-    for sample in np.flatnonzero(free < 9.0).tolist():
+    for sample in np.flatnonzero(free < INSIDE).tolist():
         if rolling.following[sample] >= 0:
             continue
         loop = rolling.loop_at(sample, free[sample], radius)
@@ -59,11 +67,12 @@ def boundary_loops(
 class _RollingDisc:
     """The disc rolled from one sample after the other, and what it has touched."""
 
-    def __init__(self, surface: Surface, radii: np.ndarray, room: int) -> None:
+    def __init__(self, surface: Surface, radii: np.ndarray, free: int, origin: np.ndarray) -> None:
         count = len(surface.mean)
+        self.origin, self.watch = origin, Watch(ROUND_AND_ROUND, free, ROLLED)
         self.surface, self.radii = surface, radii
         self.mirrored = surface._replace(normals=-surface.normals)
-        self.path = np.empty(room, np.int64)
+        self.path = np.empty(2_000 + 4 * free, np.int64)
         self.following, self.preceding, self.visit = (np.full(count, -1, np.int64) for _ in range(3))
         self.banned = np.zeros(count, np.bool_)
 
@@ -92,7 +101,9 @@ class _RollingDisc:
 
     def _roll(self, surface: Surface, sample: int, centre: tuple[float, float, float], seen: np.ndarray) -> np.ndarray:
         """Samples of the loop that the disc ends up in; empty if it falls off or meets an earlier loop."""
-        first, last = kernels.roll_disc(surface, sample, centre, self.radii, self.path, seen, self.visit, self.banned)
+        own = self.radii, self.path, seen, self.visit, self.banned
+        first, last, steps = kernels.roll_disc(surface, sample, centre, *own)
+        self.watch.note(steps, surface.mean[sample] + self.origin)
         return self.path[first:last].copy()
 
     def _is_near(self, samples: np.ndarray, sample: int, radius: float) -> bool:

@@ -67,7 +67,7 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     found = measure_distances(grid, samples, length)
     nearest, cuts, certificate, (gaps, bridged), doubtful = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
-        lambda: find_crossings(grid.nodes, grid.triangles),
+        lambda: find_crossings(grid.nodes, grid.triangles, grid.origin),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
         lambda: bridged_gaps(grid, samples, boundary, length),
         lambda: [] if settings.boundary else doubtful_places(grid, samples, length),

@@ -12,16 +12,19 @@ from fractions import Fraction
 
 import numpy as np
 
+from ..errors import FrontError
+from ..grid.certificate import place_of
 from ..kernels.geometry.boxes import new_boxes
 from ..kernels.mesh.crossings import doubtful_pairs
 
 MOST_CROSSINGS = 100  # number of intersecting pairs after which the search stops
-ROOM_FOR_PAIRS = 1024  # pairs for which the first search has room
+NEAR_A_TRIANGLE = 50  # pairs a triangle that are looked at: a right grid has hardly any
+ROOM_FOR_PAIRS = 1024  # further pairs
 
 Exact = tuple[Fraction, Fraction, Fraction]
 
 
-def find_crossings(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def find_crossings(nodes: np.ndarray, triangles: np.ndarray, origin: np.ndarray | float = 0.0) -> np.ndarray:
     """Return pairs of triangles that have more in common than their shared nodes and members, (P, 2), at most `MOST_CROSSINGS`.
 
     Parameters
@@ -29,35 +32,44 @@ def find_crossings(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     nodes : (V, 3) float64 [scan unit]
     triangles : (T, 3) int64
         Those that have a node twice have no inside, and do not count.
+    origin : (3,) of the cloud, for messages [scan unit]
+
+    Raises
+    ------
+    FrontError
+        So many lie near each other that it cannot be told.
     """
     a, b, c = triangles.T
     whole = np.flatnonzero((a != b) & (b != c) & (c != a))
     found: list[tuple[int, int]] = []
-    for t, u in whole[_doubtful(nodes, np.ascontiguousarray(triangles[whole]))].tolist():
+    most = NEAR_A_TRIANGLE * len(whole) + ROOM_FOR_PAIRS
+    pairs = whole[_doubtful(nodes, np.ascontiguousarray(triangles[whole]), most)]
+    for t, u in pairs.tolist():
         if triangles_meet(nodes, triangles[t], triangles[u]):
             found.append((t, u))
             if len(found) == MOST_CROSSINGS:
                 break
+    if not found and len(pairs) == most:
+        raise FrontError(
+            "more triangles lie near each other than can be told apart; use a longer length",
+            where=place_of(nodes[a[pairs[-1, 0]]] + origin),
+        )
     return np.array(found, np.int64).reshape(-1, 2)
 
 
-def _doubtful(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the pairs (P, 2) that are not proved to be apart."""
+def _doubtful(nodes: np.ndarray, triangles: np.ndarray, most: int = ROOM_FOR_PAIRS) -> np.ndarray:
+    """Return the pairs (P, 2) that are not proved to be apart, no more than `most` of them."""
     if len(triangles) == 0:
         return np.zeros((0, 2), np.int64)
     corners = nodes[triangles]
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     middles = 0.5 * (lower + upper)
     radii = np.sqrt(((corners - middles[:, None]) ** 2).sum(axis=2).max(axis=1))
-    room, widest = ROOM_FOR_PAIRS, float(radii.max())
-    while True:
-        box = 2.0 * widest if widest > 0.0 else 1.0
-        boxes = new_boxes(lower.min(axis=0), upper.max(axis=0), box, len(triangles), len(triangles))
-        pairs = np.empty((room, 2), np.int64)
-        count = doubtful_pairs(nodes, triangles, middles, radii, widest, boxes, pairs)
-        if count <= room:
-            return pairs[:count]
-        room = count
+    widest = float(radii.max())
+    box = 2.0 * widest if widest > 0.0 else 1.0
+    boxes = new_boxes(lower.min(axis=0), upper.max(axis=0), box, len(triangles), len(triangles))
+    pairs = np.empty((most, 2), np.int64)
+    return pairs[: doubtful_pairs(nodes, triangles, middles, radii, widest, boxes, pairs)]
 
 
 def triangles_meet(nodes: np.ndarray, first: Sequence[int], second: Sequence[int]) -> bool:

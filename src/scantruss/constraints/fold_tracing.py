@@ -11,6 +11,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
+from ..runtime.watch import Watch
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -38,6 +39,8 @@ MISSED = 2  # places in a row at which a fold may not be seen and still goes on
 TURNED = 0.94  # least cosine of the turn of a fold from place to place
 RING = 6  # places along the shortest ring
 MOST_PLACES_OF_FOLD = 20_000  # most places along a fold
+TRACED = 4.0  # times as many places as ridges can have where they lie side by side
+TANGLED = "the ridges of the scan cannot be followed; use another length, or --ridge-angle 0"
 MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
@@ -54,12 +57,15 @@ class Tracer:
         self.surface = samples.surface
         self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
+        self.sharpest = SHARPEST_EDGE if settings.sharp_edges else SHARPEST
         self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in RADII]
         of_sample = samples.area / len(samples.surface.mean)
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
         self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty((6000, COLUMNS))
+        self.origin = samples.origin
+        self.watch = Watch(TANGLED, samples.area / (MEETS * STRIDE * settings.length**2), TRACED)
 
     def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.ndarray | None:
         """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
@@ -111,7 +117,8 @@ class Tracer:
                 and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
-                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle)]
+                self.watch.note(len(folds), folds[-1, :3] + self.origin)
+                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle, self.sharpest)]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds[:, :3]:
@@ -229,6 +236,7 @@ CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and 
 LONG = 1.0  # least length of a line of folds [member lengths]
 LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
 SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+SHARPEST_EDGE = 155.0  # the same where sharp edges of bodies are looked for [degree]
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN = (0.5, 3.5)
@@ -260,7 +268,7 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     return [*parts, folds[first:]]
 
 
-def is_even(folds: np.ndarray, angle: float) -> bool:
+def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
     if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < LEAST_FULL_LENGTH:
@@ -271,7 +279,7 @@ def is_even(folds: np.ndarray, angle: float) -> bool:
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
     most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN)) + BY_NOISE / np.sqrt(max(gain, 1.0))
-    return bool(gain >= SURE_GAIN and uneven <= most and bend < SHARPEST)
+    return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
 
 
 def smoothed(places: np.ndarray) -> np.ndarray:

@@ -18,7 +18,6 @@ from ..constraints.embedded_lines import (
 )
 from ..constraints.find import Constraints
 from ..constraints.network import Lines
-from ..errors import FrontError
 from ..grid.grid import Grid
 from ..kernels.front import advance as kernels
 from ..kernels.front import front as lists
@@ -40,6 +39,7 @@ from ..kernels.surface.local_surface import (
 )
 from ..kernels.surface.ridges import mean_normal
 from ..runtime.progress import Progress
+from ..runtime.watch import Watch
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
@@ -51,6 +51,8 @@ FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial fr
 SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 NODE_BOX = 2.4
+MADE = 4.0  # times as many triangles as the scan has room for that a front may make
+RUNS_OVER_ITSELF = "the front runs over itself: the scan is too rough or too sparse for this length"
 SEGMENTS_PER_REPORT = 500  # segments advanced between two reports of progress
 
 
@@ -187,6 +189,7 @@ def start_front(
 ) -> lists.Front:
     """Fill the lists with the initial front: boundary loops, lines, candidate nodes, a seed triangle on closed pieces."""
     surface = samples.surface
+    front.count[lists.LOOK_AT_EDGES] = int(settings.sharp_edges)
     for loop in boundary.loops:
         active = loop.external or loop.cut != "" or settings.advance_from == "all"
         nodes, _ = characteristic_points(loop, settings.length)
@@ -311,16 +314,15 @@ def run(
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = samples.graded_area / (0.433 * rules.desired**2)
-    while True:
+    watch, made = Watch(RUNS_OVER_ITSELF, expected, MADE), int(front.count[lists.TRIANGLES])
+    watch.note(made, samples.origin)
+    while True:  # each slice makes triangles, or the queue becomes shorter
         status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT)
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:
             return front
-        if front.count[lists.TRIANGLES] > 4 * expected + 1000:
-            x, y, z = (front.nodes[front.count[lists.NODES] - 1] + samples.origin).tolist()
-            raise FrontError(
-                "the front runs over itself: the scan is too rough or too sparse for this length", where=(x, y, z)
-            )
+        watch.note(int(front.count[lists.TRIANGLES]) - made, front.nodes[front.count[lists.NODES] - 1] + samples.origin)
+        made = int(front.count[lists.TRIANGLES])
         if status == lists.FULL:
             front = grown(front)

@@ -103,7 +103,9 @@ class Advice:
             grid = first_that_passes(self._cloud, settings, tried, progress=self._show(length))
             trial = LengthTrial(length, grid)
             made = grid.settings or settings  # what one length needed to pass, the others will need too
-            self._settings = self._settings.replace(keep_rods=made.keep_rods, judge_outliers=made.judge_outliers)
+            self._settings = self._settings.replace(
+                keep_rods=made.keep_rods, judge_outliers=made.judge_outliers, sharp_edges=made.sharp_edges
+            )
         except FrontError as error:
             trial = LengthTrial(length, None, error) if known is None else known
         except LengthError as error:

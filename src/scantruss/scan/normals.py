@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import OneSidedError
+from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.surface import normals as kernels
 from ..kernels.surface.local_surface import Surface
-from ..runtime.parallel import in_parts
+from ..runtime.parallel import in_parts, run_in_parts
 from .vectors import dots
 
 NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit is not used
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
 NORMALS_PER_THREAD = 1500  # fewest samples that are worth a thread
+LEAST_CERTAIN = 254  # weight of the least certain links
 STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
@@ -25,12 +27,24 @@ def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
     )
 
 
-def face_one_side(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray) -> np.ndarray:
-    """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,)."""
+def face_off_edges(mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float) -> None:
+    """Let those of the thick samples (P,) that lie on a sharp edge of a body face away from it."""
+    run_in_parts(len(thick), NORMALS_PER_THREAD, kernels.face_off_edges, mean, normals, boxes, thick, reach)
+
+
+def face_one_side(
+    mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, doubtful: np.ndarray | None = None
+) -> np.ndarray:
+    """Turn the normals (S, 3) of each connected piece to the same side, along its most certain links; returns the piece of each (S,).
+
+    doubtful : (S,) bool, samples whose links count last
+    """
     weights = np.empty(neighbors.shape, np.uint8)  # few values are sorted faster
     in_parts(
         len(mean), NORMALS_PER_THREAD, lambda _, i, j: kernels.link_weights(mean, normals, neighbors, weights, i, j)
     )
+    if doubtful is not None and doubtful.any():
+        weights[(doubtful[:, None] | doubtful[neighbors]) & (neighbors >= 0)] = LEAST_CERTAIN
     order = np.argsort(weights, axis=None, kind="stable")[: int((neighbors >= 0).sum())]
     piece = np.empty(len(mean), np.int64)
     kernels.orient_normals(mean, normals, neighbors, order, piece)

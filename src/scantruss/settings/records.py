@@ -188,6 +188,11 @@ class SurfaceSettings(_Checked):
         low=0.0,
         high=2.0,
     )
+    sharp_edges: bool = _setting(
+        False,
+        "look for edges at which two sides of a body meet at less than some 60 degrees; tried by itself if no grid passes"
+        " (default method only)",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,9 @@ from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.girths import mark_opposite, measure_girths
 from ..kernels.surface.local_surface import Surface, flood
 from ..runtime.parallel import in_parts, run_in_parts
+from .faced_surface import faced_surface
 from .given_normals import GivenNormals
-from .linked_samples import faced_surface, link_samples
+from .linked_samples import link_samples
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .scratch import with_own_scratch
 
@@ -23,7 +24,7 @@ FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
 BEYOND = 1.2  # largest girth that is measured [girth below which limbs are cut off]
 SMOOTHINGS = 3  # passes in which a sample becomes what most of those linked to it are
-FEWEST = 12  # fewest samples of a part that is cut off
+FEWEST_OF_LIMB = 12  # fewest samples of a part that is cut off
 BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
 SURELY = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
 CLEAN = 0.8  # least share of the samples on each side of a ring that are on the right side
@@ -70,7 +71,7 @@ def cut_limbs(
     """
     none: tuple[np.ndarray, tuple[LimbRing, ...]] = np.zeros(len(points), np.bool_), ()
     suspect = _suspects(surface, boxes, girth)
-    if suspect.sum() < FEWEST:
+    if suspect.sum() < FEWEST_OF_LIMB:
         return none
     owner = np.empty(len(points), np.int64)
     reach = 2.0 * max(surface.radius, spacing)
@@ -91,7 +92,7 @@ def _suspects(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
     """Return which samples may lie on a limb too thin (S,) bool, and those around them."""
     marks = np.zeros(len(surface.mean), np.bool_)
     run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT * girth / 3.0, marks)
-    if marks.sum() < FEWEST:
+    if marks.sum() < FEWEST_OF_LIMB:
         return marks
     beside = surface.neighbors
     for _ in range(int(np.ceil(1.5 * surface.length / (2.0 * surface.radius)))):
@@ -128,7 +129,7 @@ class _Parts:
         length = scan.length
         radius = max(FINE_SAMPLES * length, 0.25 * spacing)
         found = link_samples(points, radius, length, spacing, given)
-        surface, piece = faced_surface(found, radius, length, spacing)
+        surface, piece, _ = faced_surface(found, radius, length, spacing)
         of_scan = coarse[found.chosen]
         surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
         agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
@@ -142,7 +143,7 @@ class _Parts:
         in_parts(len(piece), LIMBS_PER_THREAD, measure)
         girth /= length * surface.field
         thin = _smoothed(girth < limit, surface.neighbors)
-        if thin.sum() < FEWEST:
+        if thin.sum() < FEWEST_OF_LIMB:
             return None
         area = sample_areas(surface) / (length * surface.field) ** 2
         label = _labels(thin, surface.neighbors)
@@ -151,7 +152,7 @@ class _Parts:
         small = ~thin & ~at_rim[label] & (total[label] < BLUNT_END)
         thin = thin | small
         label = _labels(thin, surface.neighbors)
-        few = thin & (np.bincount(label, minlength=len(label))[label] < FEWEST)
+        few = thin & (np.bincount(label, minlength=len(label))[label] < FEWEST_OF_LIMB)
         if few.any():
             thin = thin & ~few
             label = _labels(thin, surface.neighbors)

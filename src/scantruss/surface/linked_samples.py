@@ -9,18 +9,9 @@ import numpy as np
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
-from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import run_in_parts
 from ..scan.cloud import Bounds, bounds_of
-from ..scan.normals import (
-    NORMALS_PER_THREAD,
-    STEEP_SINE,
-    cut_steep_links,
-    face_as_given,
-    face_one_side,
-    face_outside,
-    mean_normals,
-)
+from ..scan.normals import NORMALS_PER_THREAD
 from .given_normals import NO_NORMALS, GivenNormals
 from .streamline import is_dense, streamlined
 
@@ -40,7 +31,6 @@ SHEETS = 0.12  # thickness above which a sample may hold several sheets [member 
 MOST_REFINEMENTS = 2  # most times that the sample radius is halved to see whether a thick layer is several sheets
 FINEST_RADIUS = 1.0  # smallest radius of a sample [point spacings]
 SMOOTH_THICKNESS = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
-PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
 SAMPLES_WITHOUT_ROOM_FOR_RIDGE = 2  # rough samples that a smooth scan may have: too few for a ridge
 
 
@@ -114,10 +104,32 @@ def link_finer(
     return None
 
 
-def settle_to_sheet(found: Linked, points: np.ndarray, radius: float, length: float, spacing: float) -> Linked:
-    """Return the samples of a rough layer moved to its middle, thinned and linked again."""
-    moved = np.empty_like(found.mean)
-    kernels.settle_samples(found.mean, found.neighbors, found.thickness, ROUGH * length, 0.6 * length, moved)
+def refined(
+    found: Linked, points: np.ndarray, coarse: np.ndarray, radius: float, length: float, spacing: float
+) -> Linked:
+    """Return the samples with finer ones, of a smaller radius, in place of some of them, `coarse` (S,) bool."""
+    among, kept = np.flatnonzero(coarse[found.owner]), int((~coarse).sum())
+    owner, finer, _, _ = samples_of_points(points[among], radius)
+    chosen = np.concatenate([found.chosen[~coarse], among[finer]])
+    places = np.concatenate([found.mean[~coarse], points[among[finer]]])
+    owners = (np.cumsum(~coarse) - 1)[found.owner]
+    owners[among] = kept + owner
+    boxes = new_boxes(*bounds_of(places), float(found.boxes.size.max()), len(places), len(places))
+    kernels.put_all(boxes, places, np.arange(len(places)))
+    neighbors = _neighbors(places, boxes, length, radius, spacing, NO_NORMALS)
+    settled = points, places, neighbors, owners, NO_NORMALS, chosen
+    run_in_parts(len(points), LINKED_POINTS_PER_THREAD, kernels.settle_points, *settled)
+    grouped, start, mean = group(points, owners, len(chosen))
+    mean[:kept] = places[:kept]
+    return Linked(owners, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
+
+
+def settle_to_sheet(
+    found: Linked, points: np.ndarray, radius: float, length: float, spacing: float, still: np.ndarray
+) -> Linked:
+    """Return the samples of a rough layer moved to its middle, but those that stay where they are, thinned and linked again."""
+    moved, thickness = np.empty_like(found.mean), np.where(still, 0.0, found.thickness)
+    kernels.settle_samples(found.mean, found.neighbors, thickness, ROUGH * length, 0.6 * length, moved)
     joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing, found.facing)
     owner = joined[found.owner]
     grouped, start, _ = group(points, owner, len(chosen))
@@ -203,32 +215,3 @@ def group(points: np.ndarray, owner: np.ndarray, samples: int) -> tuple[np.ndarr
     grouped = np.empty_like(points)
     kernels.group_points(points, owner, start, grouped, mean)
     return grouped, start, mean
-
-
-def faced_surface(found: Linked, radius: float, length: float, spacing: float) -> tuple[Surface, np.ndarray]:
-    """Return the local surface of linked samples, with smoothed normals that face outwards, and the piece of each sample (S,)."""
-    mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP_SINE)
-    cut_steep_links(mean, normals, neighbors)
-    piece = face_one_side(mean, normals, neighbors)
-    if len(found.facing):
-        face_as_given(normals, found.facing)
-    normals = mean_normals(normals, neighbors, 0.7)
-    face_outside(mean, normals, piece)
-    surface = Surface(
-        points=found.grouped,
-        start=found.start,
-        mean=mean,
-        normals=normals,
-        neighbors=neighbors,
-        length=float(length),
-        radius=float(radius),
-        patch_radius=float(max(0.65 * length, 2.6 * spacing)),
-        patch_points=PATCH_POINTS_ON_THE_WAY,
-        step=float(max(radius, 1.3 * spacing)),
-        stamp=np.zeros(len(mean), np.int64),
-        queue=np.zeros(len(mean), np.int64),
-        counter=np.zeros(1, np.int64),
-        field=np.ones(len(mean)),
-    )
-    return surface, piece

@@ -18,6 +18,7 @@ from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
+from .faced_surface import faced_surface
 from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
@@ -29,12 +30,12 @@ from .linked_samples import (
     ROUGH,
     SHEETS,
     Linked,
-    faced_surface,
     group,
     is_rough,
     is_smooth,
     link_finer,
     link_samples,
+    refined,
     settle_to_sheet,
     thin_dense,
     without_bends,
@@ -43,6 +44,7 @@ from .mean_surface import mean_surface
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
 from .shape import check_is_surface, layers_of_surface
+from .sharp_edges import BESIDE_EDGE, beside_edges, coarse_samples, on_sharp_edges
 from .size_field import Wish, length_field, wish_of
 from .streamline import points_near
 from .supports import support_samples
@@ -82,6 +84,8 @@ class SurfaceSamples:
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
     rough: float = 0.0  #: share of the samples thicker than `ROUGH_THICKNESS` before they were moved
     moved: float = 0.0  #: `Settings.smooth_scale` where the points of `surface` were moved to the mean surface, else 0
+    #: (S,) whether each sample lies on a sharp edge of a body, if these are looked for
+    on_edge: np.ndarray = field(default_factory=lambda: np.zeros(0, np.bool_))
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
     given: GivenNormals | None = None  #: normals that came with the scan
@@ -146,6 +150,7 @@ class _Asked(NamedTuple):
     limb_girth: float  #: below which limbs are cut off [desired lengths]
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
     smooth_scale: float  #: size of what is smoothed away [`length`]
+    sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
@@ -169,6 +174,7 @@ class _Asked(NamedTuple):
             girth,
             always,
             scale,
+            settings.sharp_edges,
         )
 
 
@@ -195,7 +201,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     cloud : PointCloud
     settings : Settings
         `length` and `box_size` determine the spacing of the samples; `clean`, `outlier_distance` and `drop_duplicates` which points
-        are left out; `length_field` where members are longer.
+        are left out; `length_field` where members are longer; `sharp_edges` whether edges of bodies are looked at.
     """
     asked = _Asked.of(settings, cloud.origin, cloud.z_is_up)
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
@@ -326,15 +332,16 @@ def _prepare(
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
-    found, surface, piece = _faced(chosen, spacing, asked)
+    surface, piece, on_edge = _faced(chosen, spacing, asked)
     rings: tuple[LimbRing, ...] = ()
     if asked.limb_girth and thinned:
-        limb, rings = cut_limbs(scan[judged == KEPT], spacing, asked.limb_girth, surface, found.boxes, given)
+        limb, rings = cut_limbs(scan[judged == KEPT], spacing, asked.limb_girth, surface, chosen.found.boxes, given)
         if rings:
             judged[np.flatnonzero(judged == KEPT)[limb]] = LIMB
             left = np.ascontiguousarray(scan[judged == KEPT])
             chosen = _chosen(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
-            found, surface, piece = _faced(chosen, spacing, asked)
+            surface, piece, on_edge = _faced(chosen, spacing, asked)
+    found = chosen.found
     piece = number_pieces(piece)
     area = sample_areas(surface)
     graded = area / surface.field**2
@@ -361,6 +368,7 @@ def _prepare(
         chosen.smooth,
         chosen.rough,
         asked.smooth_scale,
+        on_edge,
         given=given,
         rings=rings,
     )
@@ -383,10 +391,10 @@ def _chosen(
     )
 
 
-def _faced(chosen: _Chosen, spacing: float, asked: _Asked) -> tuple[Linked, Surface, np.ndarray]:
-    """Return the linked samples, their surface with the length field, and the piece of each."""
-    surface, piece = faced_surface(chosen.found, chosen.radius, asked.length, spacing)
-    return chosen.found, surface._replace(field=length_field(surface, asked.wish)), piece
+def _faced(chosen: _Chosen, spacing: float, asked: _Asked) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """Return the surface of the samples with its length field; each one's piece, and whether it lies on a sharp edge."""
+    surface, piece, on_edge = faced_surface(chosen.found, chosen.radius, asked.length, spacing, asked.sharp_edges)
+    return surface._replace(field=length_field(surface, asked.wish)), piece, on_edge
 
 
 def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
@@ -402,7 +410,8 @@ def _smooth_samples(
 ) -> _Chosen | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    if asked.box_size is not None or asked.judge_always or asked.smooth_scale or spacing > SPARSE_SPACING * length:
+    exact = asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges
+    if exact or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)
@@ -437,8 +446,14 @@ def _usual_samples(
         if fine is not None:
             some, (found, radius) = points, fine
     rough = float((found.thickness > ROUGH_THICKNESS * length).mean())
+    still = np.zeros(len(found.mean), np.bool_)
+    if asked.sharp_edges:
+        still = beside_edges(found, on_sharp_edges(found, found.normals.copy(), length), BESIDE_EDGE * length)
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = found._replace(thickness=without_bends(found, ROUGH * length))
     if is_rough(found, ROUGH * length, MANY_ROUGH):
-        found = settle_to_sheet(found, some, radius, length, spacing)
+        found = settle_to_sheet(found, some, radius, length, spacing, still)
+    if asked.sharp_edges:
+        coarse = coarse_samples(found, length)
+        found = refined(found, some, coarse, max(0.5 * radius, spacing), length, spacing) if coarse.any() else found
     return _Chosen(found, radius, some, points, judged, False, rough)

@@ -57,7 +57,7 @@ def is_open(curves: Curves, curve: int) -> bool:
 def segment_at(curves: Curves, curve: int, arc: float) -> int:
     """Segment of a curve in which an arc length (0 to total) lies, by bisection."""
     low, high = curves.start[curve], curves.start[curve + 1]
-    while high - low > 1:
+    while high - low > 1:  # each turn halves what is left
         middle = (low + high) // 2
         if curves.arc[middle] <= arc:
             low = middle
@@ -124,13 +124,13 @@ def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int
     best, curve, arc = np.inf, -1, 0.0
     for c in range(len(curves.total)):
         i, last = curves.start[c], curves.start[c + 1]
-        while i < last:
+        while i < last:  # each turn goes on by a segment or more
             square, along = foot_on_segment(curves, c, i, 0.0, np.inf, x, y, z)
             here = curves.arc[i] + along
             if square < best:
                 best, curve, arc = square, c, here
             spare = here + np.sqrt(square) - np.sqrt(best)  # no place before this is nearer
             i += 1
-            while i + 1 < last and curves.arc[i + 1] < spare:
+            while i + 1 < last and curves.arc[i + 1] < spare:  # and so does each of these
                 i += 1
     return curve, arc, np.sqrt(best)

@@ -175,7 +175,7 @@ def roll_disc(
     seen: np.ndarray,
     visit: np.ndarray,
     banned: np.ndarray,
-) -> tuple[int, int]:
+) -> tuple[int, int, int]:
     """Roll an empty disc along the boundary from a sample that it touches, the surface to its left.
 
     Parameters
@@ -189,6 +189,7 @@ def roll_disc(
     Returns
     -------
     first, last : path[first:last] is the loop; first = last where the disc fell off, came to an earlier loop or path is too short
+    steps : how many samples the disc has touched
     """
     path[0] = sample
     count, came_from = 1, -1
@@ -233,19 +234,19 @@ def roll_disc(
                 if turn < least:
                     least, to, to_angle = turn, s, touch
         if to < 0:
-            return 0, 0
+            return 0, 0, count
         centre = along(along(place, radius * math.cos(to_angle), u), radius * math.sin(to_angle), v)
         if seen[sample] == to:
-            return 0, 0
+            return 0, 0, count
         i = visit[sample]
         if 0 <= i < count - 1 and path[i] == sample and path[i + 1] == to:
-            return i, count - 1
+            return i, count - 1, count
         visit[sample] = count - 1
         came_from = sample
         sample = to
         path[count] = sample
         count += 1
-    return 0, 0
+    return 0, 0, count
 
 
 @kernel
@@ -340,7 +341,7 @@ def widest_spike(curve: np.ndarray, normals: np.ndarray, width: float, low: int,
     at, gap = 0, 0
     for i in range(count):
         k = high
-        while k > max(low, gap):
+        while k > max(low, gap):  # each turn takes away a step or more
             j = (i + k) % count
             d = subtract(row(curve, j), row(curve, i))
             away = norm(d)
@@ -360,7 +361,7 @@ def room_across(curve: np.ndarray, low: int, room: np.ndarray) -> None:
     count, longest = len(curve), _longest_step(curve)
     for i in range(count):
         k = low + 1
-        while k < count - low:
+        while k < count - low:  # each turn goes on by a step or more
             away = norm(subtract(row(curve, (i + k) % count), row(curve, i)))
             if away < room[i]:
                 room[i] = away

@@ -9,7 +9,16 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.triangles import quality, turned
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
-from ..surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..surface.local_surface import (
+    NEAREST_SAMPLE,
+    PATCH_COLUMNS,
+    Surface,
+    fit_patch,
+    flood,
+    onto_patch,
+    patch_normal,
+    walk,
+)
 from ..surface.size_field import length_at
 from .cases import choose_by_case, far_from_front
 from .fits import fits, left_angle, near_nodes, right_angle
@@ -19,6 +28,7 @@ from .front import (
     FIRST,
     FULL,
     LAST,
+    LOOK_AT_EDGES,
     MORE,
     MOST_NEAR_NODES,
     NODES,
@@ -41,6 +51,8 @@ SIGHT, TIP = 0.9, 0.55  # how far such a triangle looks for more scan, and what 
 STEPS_AROUND = 4  # in which the surface is followed around a bend
 NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
 GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
+SEEN_FROM, SEEN_TO = 0.4, 1.1  # distances from a line between which the surface beside it is looked at [member lengths]
+STEEP_SIDE = 0.6  # cosine of the angle between that side and the plane of its nodes below which the side is followed
 
 
 @kernel
@@ -58,6 +70,34 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
     from_a = along(pa, side, turned(ab, row(front.normals, a), at_a))
     from_b = along(pb, side, turned((-ab[0], -ab[1], -ab[2]), row(front.normals, b), -at_b))
     return 0.5 * (from_a[0] + from_b[0]), 0.5 * (from_a[1] + from_b[1]), 0.5 * (from_a[2] + from_b[2])
+
+
+@kernel
+def beside_line(surface: Surface, front: Front, s: int, place: Vector, length: float) -> Vector:
+    """An ideal point beside a segment of a line, turned onto the side of the surface to its left where that falls off steeply.
+
+    At a sharp edge of a body, the nodes face as both sides together do, and neither side lies in their plane.
+    """
+    pa, pb = row(front.nodes, front.tail[s]), row(front.nodes, front.head[s])
+    middle = along(pa, 0.5, subtract(pb, pa))
+    way = unit(subtract(pb, pa))
+    arm = subtract(place, middle)
+    ahead = dot(arm, way)
+    left = along(arm, -ahead, way)
+    height = norm(left)
+    left = unit(left)
+    side = (0.0, 0.0, 0.0)
+    count = flood(surface, walk(surface, front.sample[front.tail[s]], middle), middle, SEEN_TO * length)
+    for i in range(count):
+        d = subtract(row(surface.mean, surface.queue[i]), middle)
+        d = along(d, -dot(d, way), way)
+        far = norm(d)
+        if far > SEEN_FROM * length and dot(d, left) > 0.0:
+            side = along(side, 1.0 / far, d)
+    side = unit(side)
+    if norm(side) == 0.0 or dot(side, left) > STEEP_SIDE:
+        return place
+    return along(along(middle, ahead, way), height, side)
 
 
 @kernel
@@ -146,6 +186,8 @@ def choose_by_quality(
     segment = norm(subtract(pb, pa))
     side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
     place = ideal_point(front, s, alpha, beta, side)
+    if front.count[LOOK_AT_EDGES] == 1 and front.on_boundary[a] and front.on_boundary[b]:
+        place = beside_line(surface, front, s, place, length)
     widest = 2.2 + 0.7 * (1.0 - strict)
     around = (0.75 + 0.9 * (1.0 - strict)) * length
     room = (0.4 + 0.6 * strict) * rules.nearness * length * 1.1
@@ -210,7 +252,7 @@ def has_room(front: Front) -> bool:
 @kernel
 def take_segment(front: Front) -> int:
     """Next active segment of the queue, -1 if it is empty."""
-    while front.count[FIRST] < front.count[LAST]:
+    while front.count[FIRST] < front.count[LAST]:  # each turn takes one out
         s = front.queue[front.count[FIRST] % len(front.queue)]
         front.count[FIRST] += 1
         if front.state[s] == ACTIVE:

@@ -11,7 +11,7 @@ from ..geometry.boxes import put, take
 from ..geometry.triangles import distance_to_segment, on_unmeshed_side, quality, shape_quality, turned
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, patch_normal, walk
-from .fits import clear_of_front, fits, left_angle, near_nodes, right_angle
+from .fits import clear_of_front, faces_away, fits, left_angle, near_nodes, right_angle
 from .front import (
     INACTIVE,
     NODES,
@@ -303,11 +303,16 @@ def far_from_front(
     front: Front, s: int, p: int, pp: Vector, found: np.ndarray, near: int, least: float, length: float
 ) -> bool:
     """Step 2 of Sec. 3.4: whether a new node is at least `least` away from all surrounding front segments."""
+    normal = row(front.normals, p)
     for i in range(near + 2):
         q = found[i] if i < near else (front.tail[s] if i == near else front.head[s])
+        if faces_away(front, normal, q):
+            continue
         t = front.out[q]
         while t >= 0:
-            if t != s and distance_to_segment(pp, row(front.nodes, q), row(front.nodes, front.head[t])) < least:
+            e = front.head[t]
+            near_it = distance_to_segment(pp, row(front.nodes, q), row(front.nodes, e)) < least
+            if t != s and near_it and not faces_away(front, normal, e):
                 return False
             t = front.out_next[t]
         if (

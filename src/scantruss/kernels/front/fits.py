@@ -21,12 +21,13 @@ from ..geometry.triangles import (
 )
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, linked
-from .front import NODES, Front, edge_exists
+from .front import LOOK_AT_EDGES, NODES, Front, edge_exists
 
 # how far from a triangle a line of the front that faces as it does may be and still be crossed [member lengths]
 FOLD_DISTANCE = 0.85
 FACING_COSINE = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET_DISTANCE = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
+FACES_AWAY = -0.5  # cosine between normals below which places near each other lie on two sides of a sharp edge
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
@@ -46,6 +47,12 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
         return False
     place = along(row(front.nodes, a), 0.5, d)
     return linked(surface, front.sample[a], front.sample[q], place, 0.6 * far + 1.5 * surface.step)
+
+
+@kernel
+def faces_away(front: Front, normal: Vector, q: int) -> bool:
+    """Whether a node lies on the other side of a sharp edge of a body, seen from a place of that normal."""
+    return front.count[LOOK_AT_EDGES] == 1 and dot(normal, row(front.normals, q)) < FACES_AWAY
 
 
 @kernel
@@ -179,6 +186,8 @@ def clear_of_front(
     for i in range(near + 2):
         q = found[i] if i < near else (a if i == near else b)
         pq = row(front.nodes, q)
+        if faces_away(front, normal, q):
+            continue
         if i < near and q != p and q != a and q != b:
             if abs(dot(subtract(pq, pa), normal)) < SHEET_DISTANCE * length and inside_triangle(
                 onto_tangent_plane(pq, pa, u, v), a2, b2, p2
@@ -195,7 +204,7 @@ def clear_of_front(
         t = front.out[q]
         while t >= 0:
             e = front.head[t]
-            if t != s and q != p and e != p:
+            if t != s and q != p and e != p and not faces_away(front, normal, e):
                 pe = row(front.nodes, e)
                 # a line in a fold lies deep below a triangle that bridges it, and faces as that does
                 faces = min(dot(normal, row(front.normals, q)), dot(normal, row(front.normals, e)))

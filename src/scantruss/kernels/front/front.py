@@ -24,6 +24,7 @@ from ..geometry.vectors import Vector
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
 NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # places of the counters in `Front.count`
+LOOK_AT_EDGES = 5  # place in it of 1 where the sharp edges of bodies are looked at, else 0
 MOST_NEAR_NODES = 400  # most front nodes looked at in one step
 
 
@@ -152,7 +153,7 @@ def remove_segment(front: Front, s: int) -> None:
     if at == s:
         front.out[node] = front.out_next[s]
         return
-    while front.out_next[at] != s:
+    while front.out_next[at] != s:  # each turn goes on in the list of the node, which holds s
         at = front.out_next[at]
     front.out_next[at] = front.out_next[s]
 

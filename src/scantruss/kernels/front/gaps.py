@@ -73,7 +73,7 @@ def close_gap(front: Front, loop: np.ndarray, count: int, length: float) -> int:
     stack = np.empty((count, 2), np.int64)
     stack[0, 0], stack[0, 1] = 0, count - 1
     held, made = 1, 0
-    while held > 0:
+    while held > 0:  # a piece of a polygon with k sides gives k - 2 triangles, whatever the turns
         held -= 1
         i, j = stack[held, 0], stack[held, 1]
         if j - i < 2:

@@ -60,7 +60,7 @@ def slot_of(boxes: SearchBoxes, i: int, j: int, k: int) -> int:
     mask = len(boxes.keys) - 1
     mixed = key * 613  # at most 1e15 boxes: no overflow
     slot = (mixed ^ (mixed >> 17)) & mask
-    while boxes.keys[slot] != key and boxes.keys[slot] != -1:
+    while boxes.keys[slot] != key and boxes.keys[slot] != -1:  # at least half of the slots are free
         slot = (slot + 1) & mask
     return slot
 

@@ -26,7 +26,7 @@ def component_labels(count: int, first: np.ndarray, second: np.ndarray) -> np.nd
 @kernel
 def _lowest(label: np.ndarray, item: int) -> int:
     """The lowest item known to be connected with an item; shortens the path to it."""
-    while label[item] != item:
+    while label[item] != item:  # labels fall along the way
         label[item] = label[label[item]]
         item = label[item]
     return item

@@ -31,7 +31,7 @@ class KDTree(NamedTuple):
 def empty_kd_tree(points: np.ndarray) -> KDTree:
     """Return a tree of points (N, 3) that is not yet divided; see `divide`."""
     levels = 0
-    while len(points) > POINTS_OF_LEAF << levels:
+    while len(points) > POINTS_OF_LEAF << levels:  # each turn doubles the number of leaves
         levels += 1
     nodes = (2 << levels) - 1
     first, end = np.zeros((2, nodes), np.int64)
@@ -74,10 +74,10 @@ def _select(tree: KDTree, axis: int, begin: int, end: int, middle: int) -> None:
             a, b, c = tree.points[low, axis], tree.points[(low + high) // 2, axis], tree.points[high, axis]
             pivot = max(min(a, b), min(max(a, b), c))
         i, j = low, high
-        while i <= j:
-            while tree.points[i, axis] < pivot:
+        while i <= j:  # each turn brings them together by one place or more
+            while tree.points[i, axis] < pivot:  # the pivot, or what was swapped, stops it
                 i += 1
-            while tree.points[j, axis] > pivot:
+            while tree.points[j, axis] > pivot:  # the same
                 j -= 1
             if i <= j:
                 _swap(tree, i, j)
@@ -138,7 +138,7 @@ def nearest(
     """
     held, top = 0, 1
     stack[0] = 0
-    while top > 0:
+    while top > 0:  # each node is taken from the stack once
         top -= 1
         node = stack[top]
         if held == most and _away(tree, node, x, y, z) > squares[held - 1]:
@@ -170,7 +170,7 @@ def within(tree: KDTree, x: float, y: float, z: float, radius: float, stack: np.
     count, top = 0, 1
     stack[0] = 0
     limit = radius * radius
-    while top > 0:
+    while top > 0:  # each node is taken from the stack once
         top -= 1
         node = stack[top]
         if _away(tree, node, x, y, z) > limit:

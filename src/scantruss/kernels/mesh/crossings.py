@@ -160,7 +160,7 @@ def doubtful_pairs(
     boxes: SearchBoxes,
     pairs: np.ndarray,
 ) -> int:
-    """Fill pairs (P, 2) with triangles that are not proved to be apart; returns how many there are, which may exceed P.
+    """Fill pairs (P, 2) with triangles that are not proved to be apart; returns how many there are, P where there may be more.
 
     Parameters
     ----------
@@ -180,8 +180,9 @@ def doubtful_pairs(
                         d = subtract(row(middles, u), (x, y, z))
                         touch = 1.000001 * (radii[t] + radii[u])
                         if dot(d, d) <= touch * touch and not proved_apart(nodes, triangles, u, t):
-                            if count < len(pairs):
-                                pairs[count, 0], pairs[count, 1] = u, t
+                            if count == len(pairs):
+                                return count
+                            pairs[count, 0], pairs[count, 1] = u, t
                             count += 1
                         u = boxes.next[u]
         put(boxes, t, x, y, z)

@@ -264,7 +264,7 @@ def search(
         i, left = 0, scratch.out[v] == 1
         if left:
             continue
-        while i < 4 * net.degree[v] and scratch.paid[0] - kept < count:
+        while i < 4 * net.degree[v] and scratch.paid[0] - kept < count:  # between two moves that are kept, i rises
             u, way = net.ring[v, i // 4], i % 4
             if i == 0 and scratch.tried[v] == 1:
                 break

@@ -231,7 +231,7 @@ def search_area(
         if scratch.tried[v] == 1 or is_regular(net, v, length):
             continue
         i = 0
-        while i < 4 * net.degree[v] and kept < 20:
+        while i < 4 * net.degree[v] and kept < 20:  # between two moves that are kept, i rises
             u, way = net.ring[v, i // 4], i % 4
             if way == 0 and scratch.tried[u] == 1:
                 i += 4  # this edge was tried from its other end

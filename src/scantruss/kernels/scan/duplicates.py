@@ -42,7 +42,7 @@ def mark_repeats(points: np.ndarray, bits: np.ndarray, slots: np.ndarray, repeat
     mask = len(slots) - 1
     for p in range(len(points)):
         slot = _mixed(bits[p, 0], bits[p, 1], bits[p, 2]) & mask
-        while slots[slot] >= 0 and not _same(points, p, slots[slot]):
+        while slots[slot] >= 0 and not _same(points, p, slots[slot]):  # there are more slots than points
             slot = (slot + 1) & mask
         if slots[slot] >= 0:
             repeated[p] = True
@@ -58,7 +58,7 @@ def enter_points(points: np.ndarray, bits: np.ndarray, chosen: np.ndarray, slots
     for i in range(len(chosen)):
         p = chosen[i]
         slot = _roughly_mixed(bits[p, 0], bits[p, 1], bits[p, 2]) & mask
-        while slots[slot] >= 0 and not _same(points, p, slots[slot]):
+        while slots[slot] >= 0 and not _same(points, p, slots[slot]):  # there are more slots than points
             slot = (slot + 1) & mask
         if slots[slot] >= 0:
             count += 1
@@ -74,7 +74,7 @@ def count_repeats(points: np.ndarray, bits: np.ndarray, slots: np.ndarray, begin
     count = 0
     for p in range(begin, end):
         slot = _roughly_mixed(bits[p, 0], bits[p, 1], bits[p, 2]) & mask
-        while slots[slot] >= 0:
+        while slots[slot] >= 0:  # there are more slots than points
             if slots[slot] != p and _same(points, p, slots[slot]):
                 count += 1
             slot = (slot + 1) & mask

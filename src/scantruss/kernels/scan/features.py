@@ -50,7 +50,7 @@ def sample_values(
 def _bin(edges: np.ndarray, kind: int, value: float) -> int:
     """Bin of a value among the edges (3, B - 1)."""
     low, high = 0, edges.shape[1]
-    while low < high:
+    while low < high:  # each turn halves what is left
         middle = (low + high) // 2
         if value < edges[kind, middle]:
             high = middle

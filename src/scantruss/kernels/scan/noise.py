@@ -44,7 +44,7 @@ def fit_patches(
         place = row(tree.points, centres[i])
         taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
         share = widest
-        while taken == MOST_AROUND and share > 1.0:
+        while taken == MOST_AROUND and share > 1.0:  # the share falls to one
             share = max(share / RADIUS_RATIO, 1.0)
             taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:  # the share falls to one

@@ -138,7 +138,7 @@ def find_sheets(
         p = which[i]
         place = row(tree.points, p)
         most, taken, count, exhausted = COMPANY, 0, 0, False
-        while taken < COMPANY and not exhausted:
+        while taken < COMPANY and not exhausted:  # each turn looks at twice as many, MOST_LOOKED_AT at most
             most *= 2
             count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
             taken = 0

@@ -40,7 +40,7 @@ def slot_of_box(slots: np.ndarray, rows: np.ndarray, i: int, j: int, k: int) -> 
     mixed = ((i >> 3) * 73856093 + j * 19349669 + k * 83492791) & LARGEST_INT64
     mixed = ((mixed ^ (mixed >> 23)) * 668265263) & LARGEST_INT64
     slot = (8 * (mixed ^ (mixed >> 19)) + (i & 7)) & mask
-    while slots[slot] >= 0:
+    while slots[slot] >= 0:  # a third of the slots are free
         row = slots[slot]
         if rows[row, 0] == i and rows[row, 1] == j and rows[row, 2] == k:
             break

@@ -7,8 +7,17 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
+from ..geometry.boxes import SearchBoxes, search
 from ..geometry.quadric import COLUMNS, RESIDUAL, TERMS_OF_QUADRIC, WEIGHT, fit_heights, project
-from ..geometry.vectors import Vector, across, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
+from ..geometry.vectors import Vector, across, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
+
+ASIDE_OF_EDGE = 0.25  # least distance of the middle of what is around a sharp edge from it [reach]
+BEHIND = 0.35  # samples nearer than this tell nothing of the two sides of the edge [reach]
+OPENS = 0.4  # share of the distance between both sides that must grow with that from the edge, at least
+NARROWEST, WIDEST = 0.1, 1.0  # tangent of half the angle between both sides, at least and at most
+SCATTER = 0.5  # rms distance of the samples from both sides, at most, in their mean distance from the plane between
+FEWEST_BEHIND = 6  # fewest samples that tell of the two sides
+MOST_AROUND_EDGE = 1024  # most samples that are looked at around an edge
 
 
 @kernel
@@ -117,6 +126,67 @@ def trust_thin_samples(
 
 
 @kernel
+def face_off_edges(
+    mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float, begin: int, end: int
+) -> None:
+    """Let samples on a sharp edge of a body face away from it: some of `thick` (P,), from `begin` to `end` - 1.
+
+    Where two sides meet at less than a right angle, a plane through the samples around lies between both and faces neither. There
+    the samples lie to one side of the edge, near two planes that part from it: away from a plane through the edge, with t the distance
+    from it, by |h| = a + b t.
+
+    reach : distance within which samples are looked at
+    """
+    found = np.empty(MOST_AROUND_EDGE, np.int64)
+    for i in range(begin, end):
+        place = row(mean, thick[i])
+        count = search(boxes, mean, place[0], place[1], place[2], reach, found)
+        inwards = (0.0, 0.0, 0.0)
+        for k in range(count):
+            inwards = along(inwards, 1.0 / count, subtract(row(mean, found[k]), place))
+        if norm(inwards) < ASIDE_OF_EDGE * reach:
+            continue
+        inwards = unit(inwards)
+        xx = xy = xz = yy = yz = zz = 0.0
+        for k in range(count):
+            x, y, z = across_to(subtract(row(mean, found[k]), place), inwards)
+            xx, xy, xz, yy, yz, zz = xx + x * x, xy + x * y, xz + x * z, yy + y * y, yz + y * z, zz + z * z
+        # the edge runs along the widest spread across `inwards`; the smallest but the one along `inwards` is the way between both sides
+        large = xx + yy + zz
+        a, b, c = inwards
+        between = smallest_eigenvector(
+            xx + large * a * a,
+            xy + large * a * b,
+            xz + large * a * c,
+            yy + large * b * b,
+            yz + large * b * c,
+            zz + large * c * c,
+        )
+        n = above = 0
+        st = sh = stt = sth = shh = 0.0
+        for k in range(count):
+            d = subtract(row(mean, found[k]), place)
+            t, h = dot(d, inwards), dot(d, between)
+            if t > BEHIND * reach:
+                n, above = n + 1, above + (h > 0.0)
+                h = abs(h)
+                st, sh, stt, sth, shh = st + t, sh + h, stt + t * t, sth + t * h, shh + h * h
+        if n < FEWEST_BEHIND or not 0.2 * n < above < 0.8 * n:
+            continue
+        spread = stt - st * st / n
+        slope = (sth - st * sh / n) / spread if spread > 0.0 else 0.0
+        off = math.sqrt(max(shh - sh * sh / n - slope * slope * spread, 0.0) / n)
+        if NARROWEST < slope < WIDEST and slope * st > OPENS * sh and off * n < SCATTER * sh:
+            normals[thick[i], 0], normals[thick[i], 1], normals[thick[i], 2] = -a, -b, -c
+
+
+@kernel
+def across_to(d: Vector, way: Vector) -> Vector:
+    """The part of a vector at right angles to a unit vector."""
+    return along(d, -dot(d, way), way)
+
+
+@kernel
 def cut_steep_links(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
 ) -> None:
@@ -185,7 +255,7 @@ def link_weights(
 def _root(piece: np.ndarray, sign: np.ndarray, s: int) -> tuple[int, int]:
     """Root of a sample in the union-find tree, and its sign relative to that root; shortens the path."""
     total = 1
-    while piece[s] != s:
+    while piece[s] != s:  # numbers fall along the way
         parent = piece[s]
         if piece[parent] != parent:
             sign[s] *= sign[parent]

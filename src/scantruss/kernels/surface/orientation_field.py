@@ -278,7 +278,7 @@ def lay_first(level: Level, first: int, direction: Vector, node: Vector, length:
     """
     for p in range(len(level.mean)):
         level.mark[p] = 0
-    begin = first
+    begin, unmarked = first, 0
     for _ in range(len(level.mean)):
         way = flat(direction, row(level.normals, begin))
         put_lattice(level, begin, way, node, length)
@@ -298,9 +298,9 @@ def lay_first(level: Level, first: int, direction: Vector, node: Vector, length:
                     queue[last] = q
                     last += 1
         begin = -1
-        for p in range(len(level.mean)):
+        for p in range(unmarked, len(level.mean)):  # those before are marked, and stay so
             if level.mark[p] == 0:
-                begin = p
+                begin = unmarked = p
                 break
         if begin < 0:
             return

@@ -222,7 +222,7 @@ def nearest_samples(
         x, y, z = row(positions, s)
         reach = near
         count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
-        while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):
+        while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):  # the reach, never 0, grows by half
             reach = min(1.5 * reach, far if reach < far else 2.0 * far)
             count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
         held = 0

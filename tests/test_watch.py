@@ -1,0 +1,54 @@
+"""A watch on a stage: what takes more than a multiple of its expected steps is refused, with the place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import make
+
+import scantruss as st
+from scantruss.boundary import rolling_disc
+from scantruss.check import crossings
+from scantruss.constraints import fold_tracing
+from scantruss.front import advance
+from scantruss.runtime import watch
+from scantruss.runtime.watch import SPARE, Watch
+
+
+def test_a_stage_may_take_a_multiple_of_its_expected_steps() -> None:
+    some = Watch("too many steps", 100.0, 3.0)
+    for _ in range(3):
+        some.note(100, (1.0, 2.0, 3.0))
+    some.note(SPARE, (1.0, 2.0, 3.0))
+    with pytest.raises(st.FrontError, match="too many steps") as refusal:
+        some.note(1, np.array([4.0, 5.0, 6.0]))
+    assert refusal.value.where == (4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("module", "multiple", "words"),
+    [
+        (rolling_disc, "ROLLED", "the boundary cannot be followed"),
+        (fold_tracing, "TRACED", "the ridges of the scan cannot be followed"),
+        (advance, "MADE", "the front runs over itself"),
+    ],
+)
+def test_each_stage_is_watched(monkeypatch: pytest.MonkeyPatch, module: object, multiple: str, words: str) -> None:
+    """With a multiple that no stage can keep to, each one refuses, at a place on the scan."""
+    monkeypatch.setattr(watch, "SPARE", 0)
+    monkeypatch.setattr(module, multiple, 1e-3)
+    shape = make("gable", 10_000)
+    with pytest.raises(st.FrontError, match=words) as refusal:
+        st.grid_from_points(shape.points, st.Settings(length=shape.length, effort="quick"))
+    where = refusal.value.where
+    assert where is not None and np.linalg.norm(shape.points - where, axis=1).min() < shape.length
+
+
+def test_triangles_that_cannot_be_told_apart_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that meets nothing but triangles near each other ends, whatever is among those that it has not seen."""
+    monkeypatch.setattr(crossings, "NEAR_A_TRIANGLE", 0)
+    monkeypatch.setattr(crossings, "ROOM_FOR_PAIRS", 1)
+    monkeypatch.setattr(crossings, "triangles_meet", lambda *_: False)
+    nodes = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, -1), (0.2, 0.2, 1), (2, 2, 0)], float)
+    with pytest.raises(st.FrontError, match="can be told apart"):
+        crossings.find_crossings(nodes, np.array([(0, 1, 2), (3, 4, 5)]))
