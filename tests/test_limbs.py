@@ -11,10 +11,11 @@ from typed import known
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.kernels.surface.girths import FACING_OPPOSITE, mark_opposite, measure_girths
+from scantruss.surface.chosen_samples import LIMB
 from scantruss.surface.faced_surface import faced_surface
 from scantruss.surface.limbs import SMALLEST_RING
 from scantruss.surface.linked_samples import link_samples
-from scantruss.surface.samples import LIMB, SurfaceSamples, sample_surface
+from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 BODY, TIP = 3.0, 14.0  # radius of the body, where the limb ends [member]
 

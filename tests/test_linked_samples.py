@@ -13,8 +13,9 @@ import scantruss as st
 from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
 from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
+from scantruss.surface.chosen_samples import SPARSE_SPACING
 from scantruss.surface.linked_samples import link_samples
-from scantruss.surface.samples import SPARSE_SPACING, SurfaceSamples, sample_surface, samples_with, with_whole_boundary
+from scantruss.surface.samples import SurfaceSamples, sample_surface, samples_with, with_whole_boundary
 
 
 def apart(samples: SurfaceSamples) -> float:

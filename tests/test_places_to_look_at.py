@@ -20,7 +20,8 @@ from scantruss.check.limits import places_to_look_at
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
-from scantruss.surface.samples import OUTLIER, sample_surface
+from scantruss.surface.chosen_samples import OUTLIER
+from scantruss.surface.samples import sample_surface
 
 SETTINGS = st.Settings(length=1.0)
 NOTHING = Boundary(())

@@ -21,7 +21,8 @@ from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress
 from .settings import SAMPLE_SPACING
-from .surface.samples import ROD, sample_surface
+from .surface.chosen_samples import ROD
+from .surface.samples import sample_surface
 from .surface.scratch import with_own_scratch
 from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 

@@ -13,8 +13,9 @@ from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.samples import put_all
+from ..surface.chosen_samples import KEPT
 from ..surface.owners import owners_of
-from ..surface.samples import KEPT, narrow_surface, samples_with
+from ..surface.samples import narrow_surface, samples_with
 from .corners import CURVE_STEP
 from .curves import length_around
 from .holes import fill_holes

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from ..surface.samples import KEPT, LIMB
+from ..surface.chosen_samples import KEPT, LIMB
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances

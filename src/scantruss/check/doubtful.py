@@ -8,7 +8,7 @@ import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
-from ..surface.samples import DUPLICATE, KEPT
+from ..surface.chosen_samples import DUPLICATE, KEPT
 from .gaps import by_x, is_empty_within
 from .limits import PLACES_KEPT
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
+from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SPARSE_POINT
 from ..surface.owners import owners_of
-from ..surface.samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SPARSE_POINT
 from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:

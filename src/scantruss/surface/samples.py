@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,49 +13,36 @@ from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
-from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
+from .chosen_samples import (
+    DUPLICATE,
+    KEPT,
+    LIMB,
+    OUTLIER,
+    ROD,
+    Asked,
+    ChosenSamples,
+    choose_samples_of,
+    radius_of_samples,
+    usual_samples,
+)
 from .faced_surface import faced_surface
 from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
-from .linked_samples import (
-    LINK_BOX,
-    LINKED_POINTS_PER_THREAD,
-    MANY_ROUGH,
-    PATCH_SPACING,
-    ROUGH,
-    SHEETS,
-    Linked,
-    group,
-    is_rough,
-    is_smooth,
-    link_finer,
-    link_samples,
-    refined,
-    settle_to_sheet,
-    thin_dense,
-    without_bends,
-)
-from .mean_surface import mean_surface
+from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, group, link_samples
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
 from .shape import check_is_surface, layers_of_surface
-from .sharp_edges import BESIDE_EDGE, beside_edges, coarse_samples, on_sharp_edges
-from .size_field import Wish, length_field, wish_of
+from .size_field import length_field
 from .streamline import points_near
 from .supports import support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
-SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
-UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB = 0, 1, 2, 3, 4, 5  # what a point of the scan was judged to be
 PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
-# thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
-ROUGH_THICKNESS = 0.08
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,62 +121,7 @@ class SurfaceSamples:
         return is_graded(self.surface)
 
 
-class _Asked(NamedTuple):
-    """The settings that determine the samples."""
-
-    length: float
-    box_size: float | None
-    outlier_distance: float
-    drop_duplicates: bool
-    uneven: float  #: largest angle between mirrored normals where the scan bends evenly [degree]
-    wish: Wish | None
-    keep_rods: bool
-    piece: str
-    z_is_up: bool
-    limb_girth: float  #: below which limbs are cut off [desired lengths]
-    judge_always: bool  #: whether outliers are looked for even if no sample stands alone
-    smooth_scale: float  #: size of what is smoothed away [`length`]
-    sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
-
-    @classmethod
-    def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> _Asked:
-        """Return those for a cloud with an origin."""
-        outliers = settings.outlier_distance if settings.clean else 0.0
-        repeated = settings.clean and settings.drop_duplicates
-        uneven = min(UNEVEN_BEND, 0.5 * settings.ridge_angle) if settings.ridge_angle > 0.0 else UNEVEN_BEND
-        wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
-        rods, piece, scale = settings.keep_rods, settings.piece, settings.smooth_scale or 0.0
-        girth = 0.0 if settings.boundary else settings.limb_girth
-        return cls(
-            settings.length,
-            settings.box_size,
-            outliers,
-            repeated,
-            uneven,
-            wish,
-            rods,
-            piece,
-            z_is_up,
-            girth,
-            always,
-            scale,
-            settings.sharp_edges,
-        )
-
-
-class _Chosen(NamedTuple):
-    """The samples of a scan, and the points among which they were chosen."""
-
-    found: Linked
-    radius: float  #: of a sample
-    points: np.ndarray  #: (N, 3) the points given to the samples
-    whole: np.ndarray  #: (M, 3) all points of the scan
-    judged: np.ndarray | None  #: (M,) what each point given is: KEPT, OUTLIER, SPARSE_POINT; None if all are kept
-    smooth: bool  #: whether the scan bends evenly everywhere
-    rough: float = 0.0  #: share of the samples thicker than `ROUGH_THICKNESS`
-
-
-_SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[_Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
+_SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
@@ -203,7 +134,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         `length` and `box_size` determine the spacing of the samples; `clean`, `outlier_distance` and `drop_duplicates` which points
         are left out; `length_field` where members are longer; `sharp_edges` whether edges of bodies are looked at.
     """
-    asked = _Asked.of(settings, cloud.origin, cloud.z_is_up)
+    asked = Asked.of(settings, cloud.origin, cloud.z_is_up)
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
@@ -230,7 +161,7 @@ def samples_with(
     """Return the samples of the same points, or of those of `surface.points` that are kept (P,) bool, and of added ones (F, 3)."""
     points = samples.surface.points if kept is None else samples.surface.points[kept]
     both = np.concatenate([points, added])
-    asked = _Asked.of(settings, samples.origin, samples.floor is not None)._replace(
+    asked = Asked.of(settings, samples.origin, samples.floor is not None)._replace(
         outlier_distance=0.0, drop_duplicates=False, smooth_scale=0.0
     )
     if kept is not None:  # which parts are wanted is said by what is kept
@@ -313,7 +244,7 @@ def _prepare(
     points: np.ndarray,
     bounds: Bounds,
     spacing: float,
-    asked: _Asked,
+    asked: Asked,
     given: GivenNormals | None,
     measured: int | None = None,
 ) -> SurfaceSamples:
@@ -324,14 +255,14 @@ def _prepare(
         points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None
-    chosen = _chosen(points, bounds, spacing, asked, given, thinned)
+    chosen = choose_samples_of(points, bounds, spacing, asked, given, thinned)
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
     if not asked.keep_rods and thinned:
         rod = _rods_of(scan[judged == KEPT], spacing, asked)
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
-        chosen = _usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
+        chosen = usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
     surface, piece, on_edge = _faced(chosen, spacing, asked)
     rings: tuple[LimbRing, ...] = ()
     if asked.limb_girth and thinned:
@@ -339,7 +270,9 @@ def _prepare(
         if rings:
             judged[np.flatnonzero(judged == KEPT)[limb]] = LIMB
             left = np.ascontiguousarray(scan[judged == KEPT])
-            chosen = _chosen(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
+            chosen = choose_samples_of(
+                left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned
+            )
             surface, piece, on_edge = _faced(chosen, spacing, asked)
     found = chosen.found
     piece = number_pieces(piece)
@@ -374,86 +307,15 @@ def _prepare(
     )
 
 
-def radius_of_samples(asked: _Asked, spacing: float) -> float:
-    """Return the least distance between samples; their search boxes are `LINK_BOX` times as wide.
-
-    So they are never narrower than the spacing of the points, the lower bound of Eq. 1; holes need no upper one (docs/choices.md).
-    """
-    return max((asked.box_size or SAMPLE_SPACING) * asked.length, spacing / LINK_BOX)
-
-
-def _chosen(
-    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
-) -> _Chosen:
-    """Return larger samples where the scan allows it, else the usual ones."""
-    return _smooth_samples(points, bounds, spacing, asked, given, thinned) or _usual_samples(
-        points, bounds, spacing, asked, given, thinned
-    )
-
-
-def _faced(chosen: _Chosen, spacing: float, asked: _Asked) -> tuple[Surface, np.ndarray, np.ndarray]:
+def _faced(chosen: ChosenSamples, spacing: float, asked: Asked) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return the surface of the samples with its length field; each one's piece, and whether it lies on a sharp edge."""
     surface, piece, on_edge = faced_surface(chosen.found, chosen.radius, asked.length, spacing, asked.sharp_edges)
     return surface._replace(field=length_field(surface, asked.wish)), piece, on_edge
 
 
-def _rods_of(points: np.ndarray, spacing: float, asked: _Asked) -> np.ndarray:
+def _rods_of(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarray:
     """Return which points (N, 3) belong to rods, (N,) bool."""
     radius = radius_of_samples(asked, spacing)
     found = link_samples(points, radius, asked.length, spacing)
     supports = support_samples(found, asked.length) if asked.z_is_up else None
     return rod_points(found, len(points), asked.length, supports)
-
-
-def _smooth_samples(
-    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
-) -> _Chosen | None:
-    """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
-    length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    exact = asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges
-    if exact or spacing > SPARSE_SPACING * length:
-        return None
-    some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_samples(some, radius, length, spacing, given)
-    if has_outliers(found.neighbors) or not is_smooth(found, length, asked.uneven):
-        return None
-    return _Chosen(found, radius, some, points, None, True)
-
-
-def _usual_samples(
-    points: np.ndarray, bounds: Bounds, spacing: float, asked: _Asked, given: GivenNormals | None, thinned: bool
-) -> _Chosen:
-    """Return the samples of any scan without its outliers; those of a rough one are moved to the middle of its sheets.
-
-    Or its points are moved to the mean surface before.
-    """
-    length, judged = asked.length, None
-    radius = radius_of_samples(asked, spacing)
-    some = thin_dense(points, bounds, radius, spacing) if thinned else points
-    found = link_samples(some, radius, length, spacing, given)
-    if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
-        outlier, sparse = judge_points(points, asked.outlier_distance, length)
-        if outlier.any() or sparse.any():
-            judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
-            points = np.ascontiguousarray(points[judged == KEPT])
-            some = thin_dense(points, bounds_of(points), radius, spacing)
-            found = link_samples(some, radius, length, spacing, given)
-    if asked.smooth_scale:
-        points = some = mean_surface(some, asked.smooth_scale * length, length)
-        found = link_samples(some, radius, length, spacing)
-    if is_rough(found, SHEETS * length):
-        fine = link_finer(points, radius, length, spacing, given)
-        if fine is not None:
-            some, (found, radius) = points, fine
-    rough = float((found.thickness > ROUGH_THICKNESS * length).mean())
-    still = np.zeros(len(found.mean), np.bool_)
-    if asked.sharp_edges:
-        still = beside_edges(found, on_sharp_edges(found, found.normals.copy(), length), BESIDE_EDGE * length)
-    if is_rough(found, ROUGH * length, MANY_ROUGH):
-        found = found._replace(thickness=without_bends(found, ROUGH * length))
-    if is_rough(found, ROUGH * length, MANY_ROUGH):
-        found = settle_to_sheet(found, some, radius, length, spacing, still)
-    if asked.sharp_edges:
-        coarse = coarse_samples(found, length)
-        found = refined(found, some, coarse, max(0.5 * radius, spacing), length, spacing) if coarse.any() else found
-    return _Chosen(found, radius, some, points, judged, False, rough)
