@@ -16,7 +16,6 @@ from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
 from ..geometry.quadric import (
     COLUMNS,
     RESIDUAL,
-    TERMS_OF_PLANE,
     TERMS_OF_QUADRIC,
     WEIGHT,
     fit_heights,
@@ -27,7 +26,7 @@ from ..geometry.vectors import Vector, across, along, dot, norm, put_vector, row
 
 TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances count as equal
 SETTLING_TURNS = 3  # fits of a sheet, those after the first with points far off it weighing less
-BENT_SHARE = 0.7  # share of the spread about a plane below which that about a quadric says that the sheet is bent
+BENT_SHARE = 0.5  # share of the spread about a plane below which that about a quadric says that the sheet is bent
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
 LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
@@ -358,24 +357,36 @@ def settle_samples(
 @kernel
 def _settled_place(buffer: np.ndarray, taken: int, place: Vector, radius: float) -> Vector:
     """A place moved onto the sheet through the points of a buffer (relative to it): a plane, or a quadric where that fits much better."""
-    heights, matrix, off, least = np.empty(TERMS_OF_QUADRIC), np.empty((6, 7)), 0.0, math.inf
-    _weigh(buffer, taken, radius, math.inf)
-    normal = smallest_eigenvector(*second_moments(buffer, taken))
+    heights, matrix = np.empty(TERMS_OF_QUADRIC), np.empty((6, 7))
+    normal, off, spread = (0.0, 0.0, 1.0), 0.0, math.inf
+    for _ in range(SETTLING_TURNS):
+        _weigh(buffer, taken, radius, 1.5 * spread)
+        normal = smallest_eigenvector(*second_moments(buffer, taken))
+        off = total = 0.0
+        for i in range(taken):
+            buffer[i, RESIDUAL] = dot((buffer[i, 0], buffer[i, 1], buffer[i, 2]), normal)
+            off, total = off + buffer[i, WEIGHT] * buffer[i, RESIDUAL], total + buffer[i, WEIGHT]
+        off /= max(total, 1e-300)
+        for i in range(taken):
+            buffer[i, RESIDUAL] -= off
+        spread = _spread(buffer, taken)
     project(buffer, taken, radius, normal, across(normal))
-    for terms in (TERMS_OF_PLANE, TERMS_OF_QUADRIC):
-        _weigh(buffer, taken, radius, math.inf)
-        spread = 0.0
-        for _ in range(SETTLING_TURNS):
-            fit_heights(buffer, taken, radius, terms, heights, matrix)
-            spread, total = 0.0, 0.0
-            for i in range(taken):
-                spread += buffer[i, WEIGHT] * abs(buffer[i, RESIDUAL])
-                total += buffer[i, WEIGHT]
-            spread /= max(total, 1e-300)
-            _weigh(buffer, taken, radius, 1.5 * max(spread, 1e-300))
-        if spread < least:
-            off, least = heights[0], BENT_SHARE * spread
-    return along(place, off, normal)
+    bent = math.inf
+    for _ in range(SETTLING_TURNS):
+        _weigh(buffer, taken, radius, 1.5 * bent)
+        fit_heights(buffer, taken, radius, TERMS_OF_QUADRIC, heights, matrix)
+        bent = _spread(buffer, taken)
+    return along(place, heights[0] if bent < BENT_SHARE * spread else off, normal)
+
+
+@kernel
+def _spread(buffer: np.ndarray, taken: int) -> float:
+    """Mean distance of the points of a fit from what was fitted, by their weights; never 0."""
+    spread = total = 0.0
+    for i in range(taken):
+        spread += buffer[i, WEIGHT] * abs(buffer[i, RESIDUAL])
+        total += buffer[i, WEIGHT]
+    return max(spread / max(total, 1e-300), 1e-300)
 
 
 @kernel
