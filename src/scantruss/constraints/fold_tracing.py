@@ -12,6 +12,7 @@ from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
 from ..runtime.watch import Watch
+from ..surface.samples import distance_from_scan
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -216,11 +217,10 @@ class Tracer:
             return np.zeros(3)
         squares = (away**2).sum(axis=1)
         nearest = int(squares.argmin())
-        if (
-            squares[nearest] > max(FAR_OFF * self.length, 4.0 * self.spacing) ** 2
-        ):  # beside the scan, as a corner may be
+        far = max(FAR_OFF * self.length, 4.0 * self.spacing)
+        if squares[nearest] > far**2:  # beside the scan, as a corner may be, or beside this side of it only
             beside: np.ndarray = -away[nearest]
-            return beside
+            return beside if distance_from_scan(self.surface, place) > far else np.zeros(3)
         heights = away @ ahead
         radius = max(LOOK_AROUND * self.length, 2.5 * self.spacing)
         heights = np.sort(heights[squares - heights**2 < radius**2])

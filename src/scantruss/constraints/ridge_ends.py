@@ -12,7 +12,8 @@ ROUND = 0.8  # least cosine of the angle between the ends of one ridge and the w
 TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED = 1  # places at an end that are left out, because the third side disturbs them
 AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
-STEADY = 0.998  # least cosine of the angle between both directions of a straight ridge
+STRAIGHT = 0.01  # median distance of the places of a straight line from it, at most [distance of its ends]
+STRAIGHT_FITS = 4  # of a straight line, those after the first with places off it weighing less
 WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
 REACH_BACK = 0.5  # longest way back to a corner or another ridge, where an end has gone too far [member lengths]
 MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
@@ -99,11 +100,28 @@ def _closes(line: np.ndarray, length: float) -> bool:
 
 
 def end_of(line: np.ndarray, number: int, at: int) -> End:
-    """Return an end (0 or -1) of a line (K, 3); the straighter the line, the farther back its direction is taken from."""
+    """Return an end (0 or -1) of a line (K, 3); where the line is straight, on the straight line through its last places.
+
+    The very last ones lie aside, as the third side of a corner disturbs them.
+    """
     towards = line if at == -1 else line[::-1]
-    ahead = _direction(towards, AIM)
-    far = _direction(towards, FAR_AIM)
-    return End(number, at, towards[-1], far if far @ ahead > STEADY else ahead)
+    some = towards[-FAR_AIM:]
+    middle, ahead = _straight(some)
+    off = np.linalg.norm(np.cross(some - middle, ahead), axis=1)
+    if len(some) > AIM and np.median(off) < STRAIGHT * np.linalg.norm(some[-1] - some[0]):
+        return End(number, at, middle + ((towards[-1] - middle) @ ahead) * ahead, ahead)
+    return End(number, at, towards[-1], _direction(towards, AIM))
+
+
+def _straight(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a place (3,) on the straight line through most places of a line (K, 3), and its direction (3,), a unit vector."""
+    weight = np.ones(len(line))
+    for _ in range(STRAIGHT_FITS):
+        middle = weight @ line / weight.sum()
+        ahead = np.linalg.svd((line - middle) * np.sqrt(weight)[:, None])[2][0]
+        off = np.linalg.norm(np.cross(line - middle, ahead), axis=1)
+        weight = 1.0 / (1.0 + (off / max(2.0 * float(np.median(off)), 1e-300)) ** 2) ** 2
+    return middle, ahead if (line[-1] - line[0]) @ ahead >= 0.0 else -ahead
 
 
 def _direction(line: np.ndarray, places: int) -> np.ndarray:
