@@ -574,7 +574,8 @@ def test_the_demo_makes_all_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert report["topology"]["boundary_loops"] == loops
     found = st.read_grid(tmp_path / "deep" / "demo" / "grid.json").certificate
     assert found is not None and found.passed and found.missing < 0.005
-    assert {part.kind for part in found.left_out} <= {"outliers"}
+    assert {part.kind for part in found.left_out} <= {"outliers", "gap"}
+    assert all((part.size or 0.0) < 24.0 for part in found.left_out if part.kind == "gap")  # narrower than a member
 
 
 def test_a_demo_that_fails_takes_its_folder_away(

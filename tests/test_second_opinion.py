@@ -16,7 +16,9 @@ from typed import known, xyz
 
 import scantruss as st
 from scantruss.check.certify import certify
+from scantruss.check.distances import COMPARED_WITH_NODE
 from scantruss.grid.certificate import Certificate, Spread
+from scantruss.kernels.surface.mean_surface import ASIDE, FEWEST_FOR_PLANE, FEWEST_FOR_QUADRIC
 from scantruss.surface.samples import SurfaceSamples
 
 LENGTH = 1.0
@@ -79,6 +81,7 @@ def test_every_figure_is_that_of_brute_force(seed: int) -> None:
         compare(grid, found, cloud, steps.samples, settings)
         compare_topology(grid, found, steps)
         compare_members(grid, found)
+        compare_offsets(grid, found, steps.samples)
         compare_rest(grid, found, wanted)
 
 
@@ -88,7 +91,8 @@ def test_no_figure_of_the_certificate_is_left_without_a_second_opinion() -> None
         "unit", "reach", "manifold", "orientable", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles",
         "faults", "warnings", "widened", "points", "left_out", "crossings", "scan_within_reach", "missing", "grid_within_reach",
         "scan_distance", "triangle_distance", "node_distance", "noise", "shortest_member", "longest_member", "smallest_angle",
-        "largest_angle", "sharpest_fold", "fixed_error", "irregular", "irregular_forced",
+        "largest_angle", "sharpest_fold", "fixed_error", "irregular", "irregular_forced", "node_bias", "node_bias_p95",
+        "node_scatter",
     }  # fmt: skip
 
 
@@ -228,6 +232,36 @@ def compare_members(grid: st.Grid, found: Certificate) -> None:
             folds.append(np.degrees(np.arctan2(np.linalg.norm(np.cross(*arms)), arms[0] @ arms[1])))
     assert known(found.sharpest_fold).value == pytest.approx(min(folds), abs=1e-4)
     assert ("folded" in {fault.kind for fault in found.faults}) == (min(folds) < 30.0)
+
+
+def compare_offsets(grid: st.Grid, found: Certificate, samples: SurfaceSamples) -> None:
+    """Compare bias and scatter with quadrics fitted by plain weighted least squares to the points within a member of each node."""
+    every = len(samples.measured_points) // (COMPARED_WITH_NODE * len(grid.nodes)) + 1
+    points, offsets = samples.measured_points[::every], []
+    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
+    for v, node in enumerate(grid.nodes):
+        normal = np.cross(b - a, c - a)[(grid.triangles == v).any(axis=1)].sum(axis=0)
+        normal = normal / max(np.linalg.norm(normal), 1e-300)
+        away = points - node
+        away = away[np.linalg.norm(away, axis=1) < LENGTH]
+        weight = (1.0 - (away**2).sum(axis=1) / LENGTH**2) ** 2
+        if len(away) < FEWEST_FOR_PLANE:
+            continue
+        centre = weight @ away / weight.sum()
+        aside = np.linalg.norm(centre - (centre @ normal) * normal)
+        across = np.linalg.svd(normal[None])[2][1:]
+        x, y = across @ away.T
+        terms = [np.ones(len(x)), x, y]
+        if len(away) >= FEWEST_FOR_QUADRIC and aside < ASIDE * LENGTH:
+            terms += [x * x, x * y, y * y]
+        table, root = np.stack(terms, axis=1), np.sqrt(weight)
+        fit = np.linalg.lstsq(table * root[:, None], away @ normal * root, rcond=None)[0]
+        off = away @ normal - table @ fit
+        offsets.append((fit[0], np.sqrt(weight @ off**2 / weight.sum())))
+    bias, scatter = np.array(offsets).T
+    assert found.node_bias == pytest.approx(bias.mean(), abs=1e-4)
+    assert found.node_bias_p95 == pytest.approx(np.quantile(np.abs(bias), 0.95), abs=1e-4)
+    assert found.node_scatter == pytest.approx(np.median(scatter), abs=1e-4)
 
 
 def compare_rest(grid: st.Grid, found: Certificate, settings: st.Settings) -> None:

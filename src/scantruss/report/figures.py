@@ -179,7 +179,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
     for part in certificate.left_out:
         if part.kind == "far" and part.where is not None:  # a warning reports it
             continue
-        size = f"{part.size:.3g}{unit} {'long' if part.kind == 'limbs' else 'across'}"
+        size = f"{part.size or 0.0:.3g}{unit} {'long' if part.kind == 'limbs' else 'across'}"
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
         place = f", up to {part.size:.3g}{unit} across" if part.number > 1 else place
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
