@@ -1,0 +1,111 @@
+"""Write schedules: one workbook, or a CSV file for each table."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ..export.csv import encode_table
+from ..runtime.files import check_place, write_files
+from ..runtime.ours import MARK
+from .records import Column, Schedule, Schedules, Value
+
+SCHEDULE_SUFFIXES = (".csv", ".xlsx")
+NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
+DECIMALS = {
+    "mm": "0.0",
+    "degree": "0.00",
+    "kg": "0.00",
+    "m": "0.000",
+    "m2": "0.000",
+}  # shown in a cell; it holds all digits
+MAIN = "members"  # the table in the CSV file that is named
+
+
+def schedule_paths(path: Path) -> dict[str, Path]:
+    """Return the place of each table of a .csv: members in the named file, `roof.csv`, others beside it, `roof_node_types.csv`."""
+    names = [spec.name for spec in fields(Schedules)]
+    return {name: path if name == MAIN else path.with_name(f"{path.stem}_{name}{path.suffix}") for name in names}
+
+
+def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
+    """Write schedules: all tables in one workbook, or in one CSV file each; the same schedules give the same bytes.
+
+    Parameters
+    ----------
+    schedules : Schedules
+        What to write.
+    path : str or Path
+        File ending in .xlsx, or in .csv: the table of members, the others beside it.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    FormatError
+        Unknown suffix, no such folder, no space; nothing half-written is left.
+    """
+    path = check_place(path, SCHEDULE_SUFFIXES)
+    if path.suffix.lower() == ".xlsx":
+        return write_files({path: encode_xlsx(schedules)})
+    tables: dict[Path, Schedule] = {place: getattr(schedules, name) for name, place in schedule_paths(path).items()}
+    return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
+
+
+def encode_xlsx(schedules: Schedules) -> bytes:
+    """Return a workbook with a sheet for each table: the header frozen, numbers as numbers, sums in the last row."""
+    from openpyxl import Workbook
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Alignment, Font
+    from openpyxl.utils import get_column_letter
+
+    book = Workbook(write_only=True)
+    bold, wrapped = Font(bold=True), Alignment(wrap_text=True, vertical="top")
+
+    def cells(sheet: Any, columns: tuple[Column, ...], values: Iterable[Value], *, heavy: bool) -> list[Any]:
+        made = []
+        for column, value in zip(columns, values, strict=True):
+            cell = WriteOnlyCell(sheet, value)
+            if heavy:
+                cell.font, cell.alignment = bold, wrapped
+            if isinstance(value, float):
+                cell.number_format = DECIMALS.get(column.unit, "0.0000")
+            made.append(cell)
+        return made
+
+    for table in schedules.tables:
+        sheet = book.create_sheet(table.title)
+        sheet.freeze_panes = "B2"
+        for number, column in enumerate(table.columns, 1):
+            longest = max((len(value) for value in column.values if isinstance(value, str)), default=0)
+            sheet.column_dimensions[get_column_letter(number)].width = min(max(11, longest + 2), 50)
+        sheet.append(cells(sheet, table.columns, table.heads, heavy=True))
+        for row in table.rows:
+            sheet.append(cells(sheet, table.columns, row, heavy=False))
+        sums = [column.sum for column in table.columns[1:]]
+        if any(value is not None for value in sums):
+            sheet.append(cells(sheet, table.columns, ["sum", *sums], heavy=True))
+    book.properties.creator = MARK
+    stream = io.BytesIO()
+    book.save(stream)
+    return _without_dates(stream.getvalue())
+
+
+def _without_dates(content: bytes) -> bytes:
+    """Return a workbook without the time at which it was written."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            part = old.read(name)
+            if name == "docProps/core.xml":
+                part = re.sub(rb">\d{4}-\d\d-\d\dT[\d:.]+Z?<", b">1980-01-01T00:00:00Z<", part)
+            new.writestr(zipfile.ZipInfo(name, NO_DATE), part, zipfile.ZIP_DEFLATED)
+    return stream.getvalue()
