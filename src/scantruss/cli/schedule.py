@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
-    from ..schedules.records import Schedules
+    from ..schedules.records import Schedule, Schedules
     from ..schedules.settings import ScheduleSettings
     from .options import Parser
 
@@ -142,5 +141,15 @@ def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
         f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {cut:,.4g} m",
         f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm",
     ]
-    counts = Counter(str(words) for words in made.warnings["warning"])
-    return [*lines, *(f"warning: {words}, {count:,} x, see Warnings" for words, count in counts.items())]
+    return [*lines, *warning_lines(made.warnings)]
+
+
+def warning_lines(warnings: Schedule) -> list[str]:
+    """Say of each kind of warning how many there are, and the worst."""
+    lines = []
+    for words in dict.fromkeys(warnings["warning"]):
+        rows = [row for row in warnings.rows if row[0] == words]
+        _, at, _, value, limit, measure, *_ = max(rows, key=lambda row: abs(float(row[3] or 0) - float(row[4] or 0)))
+        place = "" if at is None else f" at {at}"
+        lines.append(f"warning: {words}: {len(rows):,}, the worst {value:.4g}, limit {limit:.4g} {measure}{place}")
+    return lines

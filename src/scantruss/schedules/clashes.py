@@ -12,7 +12,7 @@ from .records import Schedule, Value, column
 if TYPE_CHECKING:
     from .parts import Parts
 
-ROUNDING = 1e-9  # share of a length or angle within which two are the same
+SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
 SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
 Row = tuple[Value, ...]
 
@@ -35,7 +35,7 @@ def _scale(parts: Parts) -> list[Row]:
     if SHORTEST <= mean <= LONGEST:
         return []
     limit = SHORTEST if mean < SHORTEST else LONGEST
-    return [("mean length of members: is the scale right?", None, None, mean, limit, "mm", None, None, None)]
+    return [("is the scale right? mean length of members", None, None, mean, limit, "mm", None, None, None)]
 
 
 def _at_node(
@@ -68,16 +68,16 @@ def _at_node(
 def _small_angles(parts: Parts) -> list[Row]:
     """Members that meet at a small angle."""
     angle, limit = parts.joints.angle, parts.settings.least_angle
-    chosen = np.flatnonzero(angle < limit * (1.0 - ROUNDING))
+    chosen = np.flatnonzero(angle < limit * (1.0 - SAME_SIZE))
     return _at_node(parts, "small angle between members", chosen, angle, np.full(len(angle), limit), "degree")
 
 
 def _clashes(parts: Parts) -> list[Row]:
     """Tubes that overlap outside their ball, and members of which the balls leave nothing."""
     ball = 2.0 * parts.radius[parts.joints.node[parts.joints.pairs[:, 0]]]
-    chosen = np.flatnonzero(2.0 * parts.clear > ball * (1.0 + ROUNDING))
-    rows = _at_node(parts, "members overlap outside the ball of", chosen, ball, 2.0 * parts.clear, "mm")
-    for member in np.flatnonzero(parts.cut <= parts.length * ROUNDING).tolist():
+    chosen = np.flatnonzero(2.0 * parts.clear > ball * (1.0 + SAME_SIZE))
+    rows = _at_node(parts, "members overlap outside the ball", chosen, ball, 2.0 * parts.clear, "mm")
+    for member in np.flatnonzero(parts.cut <= parts.length * SAME_SIZE).tolist():
         a, b = parts.grid.edges[member].tolist()
         place = parts.grid.scan_nodes[[a, b]].mean(axis=0)
         rows.append(
@@ -99,7 +99,7 @@ def _touching_balls(parts: Parts) -> list[Row]:
     joined = np.isin(pairs @ [count, 1], parts.grid.edges @ [count, 1])
     apart = np.linalg.norm(parts.grid.nodes[pairs[:, 0]] - parts.grid.nodes[pairs[:, 1]], axis=1) * parts.size
     least = parts.radius[pairs].sum(axis=1)
-    chosen = np.flatnonzero(~joined & (apart <= least * (1.0 + ROUNDING)))
+    chosen = np.flatnonzero(~joined & (apart <= least * (1.0 + SAME_SIZE)))
     return [
         ("balls touch", parts.node_marks[a], parts.node_marks[b], distance, most, "mm",
          *parts.grid.scan_nodes[[a, b]].mean(axis=0).tolist())
@@ -112,7 +112,7 @@ def _folds(parts: Parts) -> list[Row]:
     fold = np.minimum(parts.fold, 360.0 - parts.fold)
     limit = parts.settings.least_fold
     rows: list[Row] = []
-    for member in np.flatnonzero(fold < limit * (1.0 - ROUNDING)).tolist():
+    for member in np.flatnonzero(fold < limit * (1.0 - SAME_SIZE)).tolist():
         one, two = parts.grid.edge_triangles[member].tolist()
         place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
         rows.append(

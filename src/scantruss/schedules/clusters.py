@@ -37,9 +37,9 @@ class Clusters:
 
 
 def _sorted_by_count(of: np.ndarray, representative: np.ndarray, misfit: np.ndarray) -> Clusters:
-    """Number the types by how many items they have; equal ones by their representatives."""
+    """Number the types by how many items they have; equal ones as they were found."""
     counts = np.bincount(of[of >= 0], minlength=len(representative))
-    order = np.lexsort((representative, -counts))
+    order = np.argsort(-counts, kind="stable")
     number = np.empty(len(order) + 1, np.int64)
     number[order] = np.arange(len(order))
     number[-1] = -1

@@ -16,15 +16,20 @@ if TYPE_CHECKING:
 BOUNDARY, INNER = "boundary", "inner"
 
 
-def building_places(grid: Grid, settings: ScheduleSettings) -> np.ndarray:
-    """Return the nodes in the building frame (V, 3) [scan unit, not scaled], turned about z and moved to its origin."""
+def into_building(vectors: np.ndarray, settings: ScheduleSettings) -> np.ndarray:
+    """Return vectors of the scan (N, 3) in the directions of the building frame, turned about z."""
     c, s = math.cos(math.radians(settings.rotation)), math.sin(math.radians(settings.rotation))
-    turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    shift = (
-        np.zeros(3) if settings.origin is None else np.asarray(grid.origin, float) - np.asarray(settings.origin, float)
-    )
-    places: np.ndarray = np.einsum("ij,vj->vi", turn, grid.nodes + shift)
-    return places if settings.origin is not None else places - places[np.unique(grid.triangles)].min(axis=0)
+    turned: np.ndarray = np.einsum("ij,vj->vi", np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), vectors)
+    return turned
+
+
+def building_places(grid: Grid, settings: ScheduleSettings) -> np.ndarray:
+    """Return the nodes in the building frame (V, 3) [scan unit, not scaled]."""
+    if settings.origin is not None:
+        shift = np.asarray(grid.origin, float) - np.asarray(settings.origin, float)
+        return into_building(grid.nodes + shift, settings)
+    places = into_building(grid.nodes, settings)
+    return places - places[np.unique(grid.triangles)].min(axis=0)
 
 
 def boundary_nodes(grid: Grid) -> np.ndarray:

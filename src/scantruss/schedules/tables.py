@@ -12,7 +12,7 @@ from ..grid.marks import numbered
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
 from .joints import angle_between
-from .places import BOUNDARY, INNER, boundary_nodes, building_places, member_groups, rings
+from .places import BOUNDARY, INNER, boundary_nodes, building_places, into_building, member_groups, rings
 from .records import Column, Schedule, Schedules, Value, column
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
             *_xyz("scan", parts.unit, parts.grid.scan_nodes[used]),
             *_xyz("", "mm", building_places(parts.grid, parts.settings)[used] * parts.size),
             column("valence", "", joints.valence[used]),
-            *_xyz("normal", "", joints.normal[used]),
+            *_xyz("normal", "", into_building(joints.normal[used], parts.settings)),
             column("smallest angle", DEGREE, least[used]),
             column("smallest angle in tangent plane", DEGREE, turn[used]),
             column("ball needed", "mm", 2.0 * parts.needed[used]),
