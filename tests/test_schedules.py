@@ -6,6 +6,7 @@ import math
 import re
 import zipfile
 from collections.abc import Callable
+from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -462,3 +463,19 @@ def test_the_command_writes_all_or_nothing(
     assert main("schedule bare.json d.xlsx --tube 60 --unit m --ball auto --clearance 5 --origin -1,0,2".split()) == 0
     assert main("schedule grid.json theirs.xlsx --tube 300 --ball 320 --force".split()) == 0
     assert "overlap outside the ball: " in capsys.readouterr().out
+
+
+def test_the_page_explains_every_table_column_option_and_warning() -> None:
+    root = Path(__file__).resolve().parents[1]
+    page = (root / "docs" / "schedules.md").read_text(encoding="utf-8")
+    made = st.schedule(fan(1000.0), TUBE)
+    for table in made.tables:
+        assert re.search(rf"^### {table.title}$|^\| {table.title} \|", page, re.MULTILINE)
+        for each in table.columns:
+            name = re.sub(r"\d$", "1", each.name)
+            assert re.search(rf"(^\| |[,*] |\*\*){name}\b", page, re.MULTILINE), f"{table.title}: {each.name}"
+    for spec in fields(st.ScheduleSettings):
+        assert f"`{spec.name}`" in page
+    source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
+    kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
+    assert len(kinds) == 6 and all(f"| {kind} |" in page for kind in kinds), kinds

@@ -74,13 +74,15 @@ def _cluster(
 
     Parameters
     ----------
-    keys : (I, 1 + M), a column that must be equal, and columns that differ by at most the misfit of two items
+    keys : (I, 1 + M), a column that must be equal, and three or more that differ by at most the misfit of two items
     tolerance : largest misfit
     misfits : of an item to several representatives
     count : length of the arrays returned
     items : (I,) the items, rising
     """
-    cells = np.floor(keys[:, 1:] / (tolerance * 1.001)).astype(np.int64)  # a little more, for rounding
+    reach = tolerance * 1.001  # a little more, for rounding
+    cells = np.floor(keys[:, 1:4] / reach).astype(np.int64)
+    key_of = dict(zip(items.tolist(), keys, strict=True))
     around = list(product((-1, 0, 1), repeat=cells.shape[1]))
     found: dict[tuple[int, ...], list[int]] = {}  # representatives by cell
     of, misfit = np.full(count, -1, np.int64), np.full(count, np.nan)
@@ -91,6 +93,9 @@ def _cluster(
             for step in around
             for number in found.get((same, *(c + s for c, s in zip(cell, step, strict=True))), ())
         )
+        if near:
+            apart = np.abs([key_of[representative[number]] for number in near] - key_of[item]).max(axis=1)
+            near = [number for number, far in zip(near, (apart > reach).tolist(), strict=True) if not far]
         if near:
             each = misfits(item, np.array([representative[number] for number in near]))
             best = int(np.argmin(each))
@@ -110,7 +115,7 @@ def cluster_panels(sides: np.ndarray, tolerance: float) -> Clusters:
         turned = np.stack([np.roll(sides[item], -k) for k in range(3)])
         return np.abs(sides[others][:, None] - turned).max(axis=2).min(axis=1)
 
-    keys = np.column_stack([np.full(len(sides), 3), sides.min(axis=1), np.median(sides, axis=1), sides.max(axis=1)])
+    keys = np.column_stack([np.full(len(sides), 3), np.sort(sides, axis=1)])
     return _cluster(keys, tolerance, misfits, len(sides), np.arange(len(sides)))
 
 
@@ -122,20 +127,23 @@ def cluster_nodes(joints: Joints, tolerance: float) -> Clusters:
     """
 
     def misfits(item: int, others: np.ndarray) -> np.ndarray:
-        return _misfits(joints, item, others)[0].min(axis=1)
+        return _misfits(joints, item, others).min(axis=1)
 
     used = np.flatnonzero(joints.valence)
-    first = joints.start[used]
     valence = joints.valence[used]
-    mean = np.add.reduceat(joints.tilt, first) / valence
-    # half the angle between two members changes by at most the misfit
-    to_next = np.where(np.isnan(joints.to_next), 0.0, joints.to_next) / 2.0
-    keys = np.column_stack([valence, mean, np.minimum.reduceat(to_next, first), np.maximum.reduceat(to_next, first)])
+    place = np.arange(len(joints.node)) - joints.start[joints.node]
+    ranked = np.zeros((2, len(joints.valence), int(valence.max())))
+    for table, values in zip(
+        ranked, (joints.tilt, joints.to_next / 2.0), strict=True
+    ):  # half an angle: two holes may be off
+        table[joints.node, place] = values[np.lexsort((values, joints.node))]
+    tilts, angles = ranked[:, used]
+    keys = np.column_stack([valence, tilts.sum(axis=1) / valence, angles[:, 0], angles.max(axis=1), angles, tilts])
     return _cluster(keys, tolerance, misfits, len(joints.valence), used)
 
 
-def _misfits(joints: Joints, item: int, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the misfit (C, v) of a node to C others of v members, for each of its members put into their first hole; and the turns."""
+def _misfits(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
+    """Return the misfit (C, v) of a node to C others of v members, for each of its members put into their first hole [degree]."""
     mine = joints.own[joints.start[item] : joints.start[item + 1]]
     count = len(mine)
     turned = mine[(np.arange(count)[:, None] + np.arange(count)) % count]  # (v, v, 3)
@@ -144,7 +152,7 @@ def _misfits(joints: Joints, item: int, others: np.ndarray) -> tuple[np.ndarray,
     turn = np.angle((np.conj(flat) * their_flat).sum(axis=-1))  # (C, v)
     across = np.abs(flat * np.exp(1j * turn)[..., None] - their_flat)
     chord = np.hypot(across, turned[..., 2] - theirs[..., 2])
-    return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1), turn
+    return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1)
 
 
 def holes_of_types(joints: Joints, types: Clusters) -> np.ndarray:
@@ -152,6 +160,6 @@ def holes_of_types(joints: Joints, types: Clusters) -> np.ndarray:
     holes = np.empty(len(joints.node), np.int64)
     for item in np.flatnonzero(types.of >= 0).tolist():
         begin, end = joints.start[item], joints.start[item + 1]
-        misfit, _ = _misfits(joints, item, types.representative[types.of[item]][None])
+        misfit = _misfits(joints, item, types.representative[types.of[item]][None])
         holes[begin:end] = (np.arange(end - begin) - int(np.argmin(misfit[0]))) % (end - begin)
     return holes

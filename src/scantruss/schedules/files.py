@@ -13,7 +13,7 @@ from typing import Any
 from ..export.csv import encode_table
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
-from .records import Column, Schedule, Schedules, Value
+from .records import Schedule, Schedules, Value
 
 SCHEDULE_SUFFIXES = (".csv", ".xlsx")
 NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
@@ -70,33 +70,36 @@ def encode_xlsx(schedules: Schedules) -> bytes:
     book = Workbook(write_only=True)
     bold, wrapped = Font(bold=True), Alignment(wrap_text=True, vertical="top")
 
-    def cells(sheet: Any, columns: tuple[Column, ...], values: Iterable[Value], *, heavy: bool) -> list[Any]:
-        made = []
-        for column, value in zip(columns, values, strict=True):
-            cell = WriteOnlyCell(sheet, value)
-            if heavy:
-                cell.font, cell.alignment = bold, wrapped
-            if isinstance(value, float):
-                cell.number_format = DECIMALS.get(column.unit, "0.0000")
-            made.append(cell)
-        return made
-
     for table in schedules.tables:
         sheet = book.create_sheet(table.title)
         sheet.freeze_panes = "B2"
+        cells, heavy = (
+            [WriteOnlyCell(sheet) for _ in table.columns] for _ in range(2)
+        )  # written at once, so used for all rows
         for number, column in enumerate(table.columns, 1):
             longest = max((len(value) for value in column.values if isinstance(value, str)), default=0)
             sheet.column_dimensions[get_column_letter(number)].width = min(max(11, longest + 2), 50)
-        sheet.append(cells(sheet, table.columns, table.heads, heavy=True))
+            for cell in (cells[number - 1], heavy[number - 1]):
+                if any(isinstance(value, float) for value in column.values):
+                    cell.number_format = DECIMALS.get(column.unit, "0.0000")
+            heavy[number - 1].font, heavy[number - 1].alignment = bold, wrapped
+        sheet.append(_filled(heavy, table.heads))
         for row in table.rows:
-            sheet.append(cells(sheet, table.columns, row, heavy=False))
+            sheet.append(_filled(cells, row))
         sums = [column.sum for column in table.columns[1:]]
         if any(value is not None for value in sums):
-            sheet.append(cells(sheet, table.columns, ["sum", *sums], heavy=True))
+            sheet.append(_filled(heavy, ["sum", *sums]))
     book.properties.creator = MARK
     stream = io.BytesIO()
     book.save(stream)
     return _without_dates(stream.getvalue())
+
+
+def _filled(cells: list[Any], values: Iterable[Value]) -> list[Any]:
+    """Return the cells with values in them."""
+    for cell, value in zip(cells, values, strict=True):
+        cell.value = value
+    return cells
 
 
 def _without_dates(content: bytes) -> bytes:
