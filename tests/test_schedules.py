@@ -24,6 +24,7 @@ from scantruss.grid.certificate import Certificate, Fault
 from scantruss.grid.line_sets import RIDGE, LineSet
 from scantruss.grid.marks import member_marks, node_marks, numbered, panel_marks
 from scantruss.runtime.ours import kind_of_ours
+from scantruss.schedules import files
 from scantruss.schedules.clusters import cluster_lengths, cluster_nodes, cluster_panels
 from scantruss.schedules.files import encode_xlsx, schedule_paths
 from scantruss.schedules.joints import clear_radii, find_joints
@@ -356,15 +357,15 @@ def read_csv(path: Path) -> list[list[Any]]:
 
 
 def test_workbook_and_csv_hold_the_tables_and_the_sums_are_right(tmp_path: Path) -> None:
-    made = st.schedule(rich(line_sets=(LineSet("a,b", RIDGE, np.array([0, 1])),)), TUBE)
+    made = st.schedule(rich(line_sets=(LineSet("=a,b", RIDGE, np.array([0, 1])),), lines=np.array([(0, 1)])), TUBE)
     st.write_schedules(made, tmp_path / "roof.xlsx")
-    files = st.write_schedules(made, tmp_path / "roof.csv")
-    assert files == list(schedule_paths(tmp_path / "roof.csv").values())
+    places = st.write_schedules(made, tmp_path / "roof.csv")
+    assert places == list(schedule_paths(tmp_path / "roof.csv").values())
     book = openpyxl.load_workbook(tmp_path / "roof.xlsx")
     assert book.sheetnames == [
         "Nodes", "Drilling", "Members", "Panels", "Node types", "Panel types", "Lengths", "Quantities", "Warnings",
     ]  # fmt: skip
-    for table, file in zip(made.tables, files, strict=True):
+    for table, file in zip(made.tables, places, strict=True):
         sheet = book[table.title]
         assert sheet.freeze_panes == "B2"
         head, *rows = [[cell.value for cell in row] for row in sheet.iter_rows()]
@@ -381,6 +382,19 @@ def test_workbook_and_csv_hold_the_tables_and_the_sums_are_right(tmp_path: Path)
                 pytest.approx(math.fsum(row[k] or 0 for row in rows[:-1])) if each.summed else None
             )
     assert (tmp_path / "roof.csv").read_text().startswith("member,start,end,group")
+
+
+def test_a_workbook_takes_any_name_and_says_when_there_are_too_many_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = LineSet("a\x07b", RIDGE, np.array([0, 1]))
+    made = st.schedule(fan(1000.0, lines=np.array([(0, 1)]), line_sets=(line,)), TUBE)
+    st.write_schedules(made, tmp_path / "a.xlsx")
+    assert openpyxl.load_workbook(tmp_path / "a.xlsx")["Members"]["D2"].value == "a?b"
+    monkeypatch.setattr(files, "MOST_ROWS", 20)
+    with pytest.raises(st.FormatError, match="write \\.csv"):
+        st.write_schedules(made, tmp_path / "b.xlsx")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.xlsx"]
 
 
 def test_the_same_schedules_give_the_same_bytes_at_any_time() -> None:
@@ -412,7 +426,8 @@ def test_a_grid_that_cannot_be_scheduled_is_refused(grid: st.Grid, words: str) -
     "values",
     [
         {"tube": 0}, {"tube": math.nan}, {"tube": "60"}, {"wall": 31.0}, {"ball": -1.0}, {"clearance": -1.0}, {"tolerance": 0.0},
-        {"angle_tolerance": 0}, {"scale": math.inf}, {"density": 7850.0, "wall": None}, {"unit": "furlong"}, {"origin": (0, 0)},
+        {"angle_tolerance": 0}, {"tolerance": 1e-9}, {"scale": math.inf}, {"density": 7850.0, "wall": None},
+        {"unit": "furlong"}, {"origin": (0, 0)},
     ],
 )  # fmt: skip
 def test_an_impossible_value_is_refused_by_name(values: dict[str, Any]) -> None:
@@ -451,6 +466,7 @@ def test_the_command_writes_all_or_nothing(
         ("grid.json c.xlsx --tube 60 --density 7850", 2, "wall"),
         ("grid.json c.xlsx --tube 60 --unit mm", 2, "the grid is in m"),
         ("bare.json c.xlsx --tube 60", 2, "--unit"),
+        ("grid.json c.xlsx --tube 60 --scale 1e9", 2, "mm long; check --scale 1e+09"),
         ("no.json c.xlsx --tube 60", 2, "there is no file no.json"),
         ("b_nodes.csv c.xlsx --tube 60", 2, "not JSON"),
         ("failed.json c.xlsx --tube 60", 3, "is torn"),

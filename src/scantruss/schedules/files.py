@@ -10,6 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from ..errors import FormatError
 from ..export.csv import encode_table
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
@@ -24,6 +25,8 @@ DECIMALS = {
     "m": "0.000",
     "m2": "0.000",
 }  # shown in a cell; it holds all digits
+MOST_ROWS = 1_048_576  # of a sheet
+NOT_IN_XML = re.compile("[\x00-\x08\x0b-\x1f\ufffe\uffff]")  # that a name of a line may hold
 MAIN = "members"  # the table in the CSV file that is named
 
 
@@ -55,6 +58,10 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
     """
     path = check_place(path, SCHEDULE_SUFFIXES)
     if path.suffix.lower() == ".xlsx":
+        if (rows := max(len(table) for table in schedules.tables) + 2) > MOST_ROWS:
+            raise FormatError(
+                f"cannot write {path}: a sheet holds {MOST_ROWS:,} rows and {rows:,} are needed; write .csv"
+            )
         return write_files({path: encode_xlsx(schedules)})
     tables: dict[Path, Schedule] = {place: getattr(schedules, name) for name, place in schedule_paths(path).items()}
     return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
@@ -98,7 +105,9 @@ def encode_xlsx(schedules: Schedules) -> bytes:
 def _filled(cells: list[Any], values: Iterable[Value]) -> list[Any]:
     """Return the cells with values in them."""
     for cell, value in zip(cells, values, strict=True):
-        cell.value = value
+        cell.value = NOT_IN_XML.sub("?", value) if isinstance(value, str) else value
+        if isinstance(value, str):
+            cell.data_type = "s"  # a name such as "=B2" is no formula
     return cells
 
 

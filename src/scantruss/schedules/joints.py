@@ -90,14 +90,13 @@ def check_grid(grid: Grid) -> None:
 
 
 def find_joints(grid: Grid) -> Joints:
-    """Return the member ends at all nodes of a grid.
+    """Return the member ends at all nodes of a grid that `check_grid` has passed.
 
     Raises
     ------
     InputError
-        See `check_grid`; or two members lie on each other.
+        Two members or panels lie on each other.
     """
-    check_grid(grid)
     node = np.concatenate([grid.edges[:, 0], grid.edges[:, 1]])
     other = np.concatenate([grid.edges[:, 1], grid.edges[:, 0]])
     member = np.tile(np.arange(len(grid.edges)), 2)

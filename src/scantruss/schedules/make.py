@@ -12,7 +12,7 @@ from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
 from ..settings import UNITS
 from .clusters import Clusters, cluster_lengths, cluster_nodes, cluster_panels
-from .joints import clear_radii, find_joints
+from .joints import check_grid, clear_radii, find_joints
 from .parts import Parts
 from .records import Schedules
 from .tables import all_tables
@@ -20,6 +20,8 @@ from .tables import all_tables
 if TYPE_CHECKING:
     from ..grid.grid import Grid
     from .settings import ScheduleSettings
+
+SMALLEST, LARGEST = 1e-3, 1e9  # lengths of which a schedule can be made [mm]
 
 
 def schedule(grid: Grid, settings: ScheduleSettings, *, keep_failed: bool = False) -> Schedules:
@@ -51,6 +53,12 @@ def schedule(grid: Grid, settings: ScheduleSettings, *, keep_failed: bool = Fals
             "the unit of the grid is not known, and a schedule needs it; give --unit mm, cm, m, inch or foot"
         )
     size = 1000.0 * metres * settings.scale
+    check_grid(grid)
+    longest = float(grid.lengths.max()) * size
+    if not SMALLEST <= longest <= LARGEST:
+        raise InputError(
+            f"the longest member would be {longest:g} mm long; check --scale {settings.scale:g} and the unit, {unit}"
+        )
     joints = find_joints(grid)
     clear = clear_radii(joints, settings.tube)
     needed = np.where(joints.valence > 0, settings.tube / 2.0, 0.0)

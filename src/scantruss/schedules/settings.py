@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..settings import UNITS
 
 ABOVE_0 = ("tube", "wall", "ball", "tolerance", "angle_tolerance", "scale", "density")
+LEAST_TOLERANCE = 1e-6  # below which rounding decides what is equal [mm, degree]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +52,8 @@ class ScheduleSettings:
                 raise InputError(f"{spec.name} must be a number, got {value!r}")
             if spec.name in ABOVE_0 and value <= 0:
                 raise InputError(f"{spec.name} must be a positive number, got {value:g}")
+            if spec.name.endswith("tolerance") and value < LEAST_TOLERANCE:
+                raise InputError(f"{spec.name} must be at least {LEAST_TOLERANCE:g}, got {value:g}")
         if self.clearance is not None and self.clearance < 0:
             raise InputError(f"clearance must be at least 0, got {self.clearance:g}")
         if self.wall is not None and self.wall > self.tube / 2:
