@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
 SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
-Row = tuple[Value, ...]
+WarningRow = tuple[Value, ...]
 
 
 def warnings_table(parts: Parts) -> Schedule:
@@ -29,7 +29,7 @@ def warnings_table(parts: Parts) -> Schedule:
     )
 
 
-def _scale(parts: Parts) -> list[Row]:
+def _scale(parts: Parts) -> list[WarningRow]:
     """Members so short or long that the scale or unit may be wrong."""
     mean = float(parts.length.mean())
     if SHORTEST <= mean <= LONGEST:
@@ -40,7 +40,7 @@ def _scale(parts: Parts) -> list[Row]:
 
 def _at_node(
     parts: Parts, words: str, chosen: np.ndarray, value: np.ndarray, limit: np.ndarray, measure: str
-) -> list[Row]:
+) -> list[WarningRow]:
     """Rows for pairs of members at a node."""
     one, two = (parts.joints.pairs[chosen, k] for k in (0, 1))
     nodes = parts.joints.node[one]
@@ -65,14 +65,14 @@ def _at_node(
     ]
 
 
-def _small_angles(parts: Parts) -> list[Row]:
+def _small_angles(parts: Parts) -> list[WarningRow]:
     """Members that meet at a small angle."""
     angle, limit = parts.joints.angle, parts.settings.least_angle
     chosen = np.flatnonzero(angle < limit * (1.0 - SAME_SIZE))
     return _at_node(parts, "small angle between members", chosen, angle, np.full(len(angle), limit), "degree")
 
 
-def _clashes(parts: Parts) -> list[Row]:
+def _clashes(parts: Parts) -> list[WarningRow]:
     """Tubes that overlap outside their ball, and members of which the balls leave nothing."""
     ball = 2.0 * parts.radius[parts.joints.node[parts.joints.pairs[:, 0]]]
     chosen = np.flatnonzero(2.0 * parts.clear > ball * (1.0 + SAME_SIZE))
@@ -87,7 +87,7 @@ def _clashes(parts: Parts) -> list[Row]:
     return rows
 
 
-def _touching_balls(parts: Parts) -> list[Row]:
+def _touching_balls(parts: Parts) -> list[WarningRow]:
     """Balls of nodes without a common member that touch, each compared with the nearest nodes."""
     used = np.flatnonzero(parts.joints.valence)
     nearby = Nearby.of(parts.grid.nodes[used])
@@ -107,11 +107,11 @@ def _touching_balls(parts: Parts) -> list[Row]:
     ]  # fmt: skip
 
 
-def _folds(parts: Parts) -> list[Row]:
+def _folds(parts: Parts) -> list[WarningRow]:
     """Sharp folds between panels."""
     fold = np.minimum(parts.fold, 360.0 - parts.fold)
     limit = parts.settings.least_fold
-    rows: list[Row] = []
+    rows: list[WarningRow] = []
     for member in np.flatnonzero(fold < limit * (1.0 - SAME_SIZE)).tolist():
         one, two = parts.grid.edge_triangles[member].tolist()
         place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
