@@ -71,6 +71,10 @@ WRONG = [
     "print theirs.json theirs.stl --member-diameter 0.1 --node-diameter 0.2",
     "print theirs.stl theirs.json --member-diameter 0.1 --node-diameter 0.2",
     "print theirs.json -o theirs.stl --member-diameter 0.1 --node-diameter 0.2",
+    "schedule theirs.json theirs.xlsx --tube 60",
+    "schedule theirs.json theirs.json --tube 60",
+    "schedule a.xyz d.csv --tube 60",
+    "schedule theirs.csv theirs.json --tube 60",
     "demo theirs.json",
     "grid theirs.json a.xyz --length L",
     "grid new.obj a.xyz --length L",
@@ -138,6 +142,7 @@ def test_results_of_our_own_are_replaced_and_those_of_others_by_force(
             main(["print", "one.json", "m.3mf", "-o", "m.stl", "--member-diameter", "0.1", "--node-diameter", "0.2"])
             == 0
         )
+        assert main(["schedule", "one.json", "s.xlsx", "s.csv", "--tube", "60", "--unit", "m"]) == 0
         assert main(["sweep", "a.xyz", "--length", "1.5,2", "-o", "sweep"]) == 0
     capsys.readouterr()
     assert main(["grid", "a.xyz", "theirs.obj", "--length", LENGTH, "--force"]) == 0

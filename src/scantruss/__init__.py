@@ -3,8 +3,8 @@
 In one call: `grid_from_scan(path, settings)` or `grid_from_points(points, settings)`, with `Settings(length=...)`; then `write`.
 Step by step: `read_points` (and `clean_points`), `sample_surface`, `find_boundary`, `find_constraints`, `orientation_fields`,
 `advance_fronts`, `optimize_fronts`. A `Grid` has nodes, triangles, members, `quality` and, if it was checked, a `certificate`.
-`print_model` writes a solid for printing. What cannot be done raises a `ScanTrussError`: `InputError`, `FormatError`, `FrontError`
-or `CertificateError`.
+`print_model` writes a solid for printing, `schedule` lists what a workshop makes. What cannot be done raises a `ScanTrussError`:
+`InputError`, `FormatError`, `FrontError` or `CertificateError`.
 """
 
 from __future__ import annotations
@@ -43,6 +43,11 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .scan.clean.steps import clean_points as clean_points
     from .scan.cloud import PointCloud as PointCloud
     from .scan.formats.reading import read_points as read_points
+    from .schedules.files import write_schedules as write_schedules
+    from .schedules.make import schedule as schedule
+    from .schedules.records import Schedule as Schedule
+    from .schedules.records import Schedules as Schedules
+    from .schedules.settings import ScheduleSettings as ScheduleSettings
     from .settings import Settings as Settings
     from .surface.samples import sample_surface as sample_surface
 
@@ -65,6 +70,8 @@ _HOMES = {
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
     "print_model": "export.solid",
+    "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
+    "Schedule": "schedules.records", "Schedules": "schedules.records",
 }  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])

@@ -15,6 +15,7 @@ from .demo import demo_parser, make_demo
 from .grid import grid, grid_parser
 from .info import info, info_parser
 from .print import print_parser, print_solid
+from .schedule import make_schedule, schedule_parser
 from .splice import splice, splice_parser
 from .sweep import sweep, sweep_parser
 from .thin import thin, thin_parser
@@ -35,6 +36,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "thin": (thin_parser, thin),
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
+    "schedule": (schedule_parser, make_schedule),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),

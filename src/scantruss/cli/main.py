@@ -29,6 +29,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
                                            make many grids to choose from: a table and pictures
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            turn a grid saved as .json into one watertight solid
+  scantruss schedule GRID OUT.xlsx|OUT.csv --tube DxT
+                                           list nodes, members and panels of such a grid as a workshop needs them
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
   scantruss demo  [FOLDER]                 do all of it on a bundled scan, a shell or (--scan bust) a bust

@@ -25,10 +25,10 @@ def nodes_path(path: Path) -> Path:
 def encode_csv(grid: Grid, path: Path, *, decimal_comma: bool = False) -> dict[Path, bytes]:
     """Return the two files: members at `path`, nodes beside it; with a decimal comma and semicolons if asked for."""
     tables = {path: _members(grid), nodes_path(path): _nodes(grid)}
-    return {place: _encoded(*table, decimal_comma=decimal_comma) for place, table in tables.items()}
+    return {place: encode_table(*table, decimal_comma=decimal_comma) for place, table in tables.items()}
 
 
-def _encoded(header: Iterable[str], rows: Iterable[Iterable[Any]], *, decimal_comma: bool) -> bytes:
+def encode_table(header: Iterable[str], rows: Iterable[Iterable[Any]], *, decimal_comma: bool = False) -> bytes:
     """Return the text of a table; numbers with every digit of a float64, nothing for None."""
     between = ";" if decimal_comma else ","
     words = ([_cell(value, between, "," if decimal_comma else ".") for value in row] for row in rows)

@@ -12,9 +12,10 @@ from ..errors import FormatError
 MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
 CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
-# tables have no place for a mark: those of members, of nodes, of a sweep
+# tables have no place for a mark: those of members, of nodes, of a sweep, of schedules
 TABLE_HEADS = re.compile(
-    rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b"
+    rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b|node,node type,ring,"
+    rb"|node,hole,member,|member,start,end,group,|panel,node 1,|(node|panel|length) type,count,|item,group,count,|warning,at,with,"
 )
 
 
@@ -25,7 +26,14 @@ def kind_of_ours(path: Path) -> str:
             head = file.read(BYTES_WITH_MARK)
         if head.startswith(b"PK") and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as content:
-                name = next((name for name in content.namelist() if name.endswith((".model", "made_by.npy"))), None)
+                name = next(
+                    (
+                        name
+                        for name in content.namelist()
+                        if name.endswith((".model", "made_by.npy", "docProps/core.xml"))
+                    ),
+                    None,
+                )
                 head = b"" if name is None else content.open(name).read(BYTES_WITH_MARK)
     except (OSError, zipfile.BadZipFile, EOFError):
         return ""

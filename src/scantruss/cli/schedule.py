@@ -1,0 +1,155 @@
+"""The command ``scantruss schedule``: what a workshop needs to make a saved grid."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .outputs import claim, outs_of
+
+if TYPE_CHECKING:
+    from ..schedules.records import Schedule, Schedules
+    from ..schedules.settings import ScheduleSettings
+    from .options import Parser
+
+
+def schedule_parser() -> Parser:
+    """Options of ``scantruss schedule``."""
+    from ..settings import UNITS
+    from .options import Parser, add_outs, number
+    from .positions import position
+
+    parser = Parser(
+        "schedule",
+        "GRID OUT.xlsx|OUT.csv [OUT ...] --tube DxT [options]",
+        "List the nodes, members and panels of a grid as a workshop needs them, their types, quantities and warnings.\n"
+        "Lengths of tubes, balls, clearance and tolerance are millimetres of what is built.",
+    )
+    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    add_outs(parser, "workbook .xlsx, or .csv: the members, the other tables beside it", "*")
+    parser.add_argument(
+        "--tube",
+        metavar="DxT",
+        type=tube,
+        required=True,
+        help="outer diameter of the members, and wall, e.g. 114.3x5 [mm]",
+    )
+    parser.add_argument(
+        "--ball",
+        metavar="D|auto",
+        type=ball,
+        help="diameter of all balls [mm]; auto (default): the smallest for each type of node",
+    )
+    parser.add_argument(
+        "--clearance",
+        metavar="C",
+        type=number,
+        help="from where tubes meet to the ball, along a member [mm] (default D/10)",
+    )
+    parser.add_argument(
+        "--tolerance", metavar="MM", type=number, help="largest misfit of equal members and panels (default 1)"
+    )
+    parser.add_argument(
+        "--angle-tolerance", metavar="DEG", type=number, help="largest misfit of equal nodes (default 0.5)"
+    )
+    parser.add_argument(
+        "--scale", metavar="S", type=number, help="size of the structure over that of the grid (default 1)"
+    )
+    units = "|".join(unit for unit in UNITS if unit)
+    parser.add_argument("--unit", metavar=units, help="unit of a grid that has none")
+    parser.add_argument(
+        "--density", metavar="KG/M3", type=number, help="density of members and balls, for masses, e.g. 7850"
+    )
+    parser.add_argument(
+        "--origin",
+        metavar="X,Y,Z",
+        type=position,
+        help="origin of the building frame in the scan (default: lowest corner)",
+    )
+    parser.add_argument(
+        "--rotation", metavar="DEG", type=number, help="from the scan's x axis to the building's, about z"
+    )
+    parser.add_argument(
+        "--least-angle", metavar="DEG", type=number, help="warn of smaller angles between members (default 30)"
+    )
+    parser.add_argument(
+        "--least-fold", metavar="DEG", type=number, help="warn of sharper folds, 180 is level (default 150)"
+    )
+    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    return parser
+
+
+def tube(text: str) -> tuple[float, float | None]:
+    """Return diameter and wall of "114.3x5"; no wall for "114.3"."""
+    diameter, times, wall = text.lower().partition("x")
+    try:
+        return float(diameter), float(wall) if times else None
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs a diameter and a wall in mm such as 114.3x5, got {text!r}") from None
+
+
+def ball(text: str) -> float | None:
+    """Return the diameter of a ball; None for "auto"."""
+    try:
+        return None if text == "auto" else float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs a diameter in mm, or auto, got {text!r}") from None
+
+
+def make_schedule(values: Namespace) -> None:
+    """Write the schedules of a saved grid."""
+    from dataclasses import fields
+
+    from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether, check_place
+    from ..schedules.files import SCHEDULE_SUFFIXES, schedule_paths, write_schedules
+    from ..schedules.settings import ScheduleSettings
+
+    outs = [check_place(out, SCHEDULE_SUFFIXES) for out in outs_of(values)]
+    names = {spec.name for spec in fields(ScheduleSettings)} - {"tube", "wall"}
+    given = {name: value for name, value in vars(values).items() if name in names and value is not None}
+    settings = ScheduleSettings(tube=values.tube[0], wall=values.tube[1], **given)
+    if not Path(values.grid).exists():
+        raise InputError(f"there is no file {values.grid}; schedule needs a grid saved as .json by scantruss grid")
+    taken = {Path(values.grid).resolve(): "grid"}
+    for out in outs:
+        for place in schedule_paths(out).values() if out.suffix.lower() == ".csv" else (out,):
+            check_place(place, SCHEDULE_SUFFIXES)
+            claim(place, "schedule", taken, force=values.force)
+    from ..export.json import read_grid
+    from ..schedules.make import schedule
+
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        bars("read", 0.0)
+        grid = read_grid(values.grid)
+        bars("schedules", 0.0)
+        made = schedule(grid, settings, keep_failed=values.keep_failed)
+        for number, out in enumerate(outs):
+            bars("write", number / len(outs))
+            write_schedules(made, save.beside(out))
+    print_lines([*schedule_lines(made, settings), f"wrote {' '.join(map(str, outs))}"])
+
+
+def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
+    """Say how much there is of what, and what is warned of."""
+    cut = sum(value for value in made.lengths["total"] if isinstance(value, float))
+    lines = [
+        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {settings.angle_tolerance:g} degrees",
+        f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {cut:,.4g} m",
+        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm",
+    ]
+    return [*lines, *warning_lines(made.warnings)]
+
+
+def warning_lines(warnings: Schedule) -> list[str]:
+    """Say of each kind of warning how many there are, and the worst."""
+    lines = []
+    for words in dict.fromkeys(warnings["warning"]):
+        rows = [row for row in warnings.rows if row[0] == words]
+        _, at, _, value, limit, measure, *_ = max(rows, key=lambda row: abs(float(row[3] or 0) - float(row[4] or 0)))
+        place = "" if at is None else f" at {at}"
+        lines.append(f"warning: {words}: {len(rows):,}, the worst {value:.4g}, limit {limit:.4g} {measure}{place}")
+    return lines

@@ -1,0 +1,1 @@
+"""Schedules: what a workshop needs to make the nodes, members and panels of a grid."""

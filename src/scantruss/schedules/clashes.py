@@ -1,0 +1,122 @@
+"""Warnings with places: what is hard or impossible to build as it stands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scan.clean.nearby import Nearby
+from .records import Schedule, Value, column
+
+if TYPE_CHECKING:
+    from .parts import Parts
+
+SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
+SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
+WarningRow = tuple[Value, ...]
+
+
+def warnings_table(parts: Parts) -> Schedule:
+    """Return a row for each place that is hard or impossible to build: what, which, how much, the limit and where."""
+    rows = [*_scale(parts), *_small_angles(parts), *_clashes(parts), *_touching_balls(parts), *_folds(parts)]
+    heads = ("warning", "at", "with", "value", "limit", "measure")
+    units = {"scan x": parts.unit, "scan y": parts.unit, "scan z": parts.unit}
+    names = [*heads, *units]
+    values = list(zip(*rows, strict=True)) or [()] * len(names)
+    return Schedule(
+        "Warnings", tuple(column(name, units.get(name, ""), each) for name, each in zip(names, values, strict=True))
+    )
+
+
+def _scale(parts: Parts) -> list[WarningRow]:
+    """Members so short or long that the scale or unit may be wrong."""
+    mean = float(parts.length.mean())
+    if SHORTEST <= mean <= LONGEST:
+        return []
+    limit = SHORTEST if mean < SHORTEST else LONGEST
+    return [("is the scale right? mean length of members", None, None, mean, limit, "mm", None, None, None)]
+
+
+def _at_node(
+    parts: Parts, words: str, chosen: np.ndarray, value: np.ndarray, limit: np.ndarray, measure: str
+) -> list[WarningRow]:
+    """Rows for pairs of members at a node."""
+    one, two = (parts.joints.pairs[chosen, k] for k in (0, 1))
+    nodes = parts.joints.node[one]
+    return [
+        (
+            words,
+            parts.node_marks[node],
+            f"{parts.member_marks[a]} {parts.member_marks[b]}",
+            each,
+            most,
+            measure,
+            *parts.grid.scan_nodes[node].tolist(),
+        )
+        for node, a, b, each, most in zip(
+            nodes.tolist(),
+            parts.joints.member[one].tolist(),
+            parts.joints.member[two].tolist(),
+            value[chosen].tolist(),
+            limit[chosen].tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _small_angles(parts: Parts) -> list[WarningRow]:
+    """Members that meet at a small angle."""
+    angle, limit = parts.joints.angle, parts.settings.least_angle
+    chosen = np.flatnonzero(angle < limit * (1.0 - SAME_SIZE))
+    return _at_node(parts, "small angle between members", chosen, angle, np.full(len(angle), limit), "degree")
+
+
+def _clashes(parts: Parts) -> list[WarningRow]:
+    """Tubes that overlap outside their ball, and members of which the balls leave nothing."""
+    ball = 2.0 * parts.radius[parts.joints.node[parts.joints.pairs[:, 0]]]
+    chosen = np.flatnonzero(2.0 * parts.clear > ball * (1.0 + SAME_SIZE))
+    rows = _at_node(parts, "members overlap outside the ball", chosen, ball, 2.0 * parts.clear, "mm")
+    for member in np.flatnonzero(parts.cut <= parts.length * SAME_SIZE).tolist():
+        a, b = parts.grid.edges[member].tolist()
+        place = parts.grid.scan_nodes[[a, b]].mean(axis=0)
+        rows.append(
+            ("balls leave no member", parts.member_marks[member], f"{parts.node_marks[a]} {parts.node_marks[b]}",
+             float(parts.cut[member]), 0.0, "mm", *place.tolist())
+        )  # fmt: skip
+    return rows
+
+
+def _touching_balls(parts: Parts) -> list[WarningRow]:
+    """Balls of nodes without a common member that touch, each compared with the nearest nodes."""
+    used = np.flatnonzero(parts.joints.valence)
+    nearby = Nearby.of(parts.grid.nodes[used])
+    neighbors = nearby.in_order(np.where(nearby.neighbors < 0, -1, nearby.tree.ids[nearby.neighbors]))
+    item, rank = np.nonzero(neighbors >= 0)
+    one, two = used[item], used[neighbors[item, rank]]
+    pairs = np.unique(np.sort(np.stack([one, two], axis=1), axis=1), axis=0)
+    count = len(parts.grid.nodes)
+    joined = np.isin(pairs @ [count, 1], parts.grid.edges @ [count, 1])
+    apart = np.linalg.norm(parts.grid.nodes[pairs[:, 0]] - parts.grid.nodes[pairs[:, 1]], axis=1) * parts.size
+    least = parts.radius[pairs].sum(axis=1)
+    chosen = np.flatnonzero(~joined & (apart <= least * (1.0 + SAME_SIZE)))
+    return [
+        ("balls touch", parts.node_marks[a], parts.node_marks[b], distance, most, "mm",
+         *parts.grid.scan_nodes[[a, b]].mean(axis=0).tolist())
+        for (a, b), distance, most in zip(pairs[chosen].tolist(), apart[chosen].tolist(), least[chosen].tolist(), strict=True)
+    ]  # fmt: skip
+
+
+def _folds(parts: Parts) -> list[WarningRow]:
+    """Sharp folds between panels."""
+    fold = np.minimum(parts.fold, 360.0 - parts.fold)
+    limit = parts.settings.least_fold
+    rows: list[WarningRow] = []
+    for member in np.flatnonzero(fold < limit * (1.0 - SAME_SIZE)).tolist():
+        one, two = parts.grid.edge_triangles[member].tolist()
+        place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
+        rows.append(
+            ("sharp fold", parts.member_marks[member], f"{parts.panel_marks[one]} {parts.panel_marks[two]}",
+             float(fold[member]), limit, "degree", *place.tolist())
+        )  # fmt: skip
+    return rows

@@ -1,0 +1,123 @@
+"""Write schedules: one workbook, or a CSV file for each table."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from ..errors import FormatError
+from ..export.csv import encode_table
+from ..runtime.files import check_place, write_files
+from ..runtime.ours import MARK
+from .records import Schedule, Schedules, Value
+
+SCHEDULE_SUFFIXES = (".csv", ".xlsx")
+NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
+DECIMALS = {
+    "mm": "0.0",
+    "degree": "0.00",
+    "kg": "0.00",
+    "m": "0.000",
+    "m2": "0.000",
+}  # shown in a cell; it holds all digits
+MOST_ROWS = 1_048_576  # of a sheet
+NOT_IN_XML = re.compile("[\x00-\x08\x0b-\x1f\ufffe\uffff]")  # that a name of a line may hold
+MAIN = "members"  # the table in the CSV file that is named
+
+
+def schedule_paths(path: Path) -> dict[str, Path]:
+    """Return the place of each table of a .csv: members in the named file, `roof.csv`, others beside it, `roof_node_types.csv`."""
+    names = [spec.name for spec in fields(Schedules)]
+    return {name: path if name == MAIN else path.with_name(f"{path.stem}_{name}{path.suffix}") for name in names}
+
+
+def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
+    """Write schedules: all tables in one workbook, or in one CSV file each; the same schedules give the same bytes.
+
+    Parameters
+    ----------
+    schedules : Schedules
+        What to write.
+    path : str or Path
+        File ending in .xlsx, or in .csv: the table of members, the others beside it.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    FormatError
+        Unknown suffix, no such folder, no space; nothing half-written is left.
+    """
+    path = check_place(path, SCHEDULE_SUFFIXES)
+    if path.suffix.lower() == ".xlsx":
+        if (rows := max(len(table) for table in schedules.tables) + 2) > MOST_ROWS:
+            raise FormatError(
+                f"cannot write {path}: a sheet holds {MOST_ROWS:,} rows and {rows:,} are needed; write .csv"
+            )
+        return write_files({path: encode_xlsx(schedules)})
+    tables: dict[Path, Schedule] = {place: getattr(schedules, name) for name, place in schedule_paths(path).items()}
+    return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
+
+
+def encode_xlsx(schedules: Schedules) -> bytes:
+    """Return a workbook with a sheet for each table: the header frozen, numbers as numbers, sums in the last row."""
+    from openpyxl import Workbook
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.styles import Alignment, Font
+    from openpyxl.utils import get_column_letter
+
+    book = Workbook(write_only=True)
+    bold, wrapped = Font(bold=True), Alignment(wrap_text=True, vertical="top")
+
+    for table in schedules.tables:
+        sheet = book.create_sheet(table.title)
+        sheet.freeze_panes = "B2"
+        cells, heavy = (
+            [WriteOnlyCell(sheet) for _ in table.columns] for _ in range(2)
+        )  # written at once, so used for all rows
+        for number, column in enumerate(table.columns, 1):
+            longest = max((len(value) for value in column.values if isinstance(value, str)), default=0)
+            sheet.column_dimensions[get_column_letter(number)].width = min(max(11, longest + 2), 50)
+            for cell in (cells[number - 1], heavy[number - 1]):
+                if any(isinstance(value, float) for value in column.values):
+                    cell.number_format = DECIMALS.get(column.unit, "0.0000")
+            heavy[number - 1].font, heavy[number - 1].alignment = bold, wrapped
+        sheet.append(_filled(heavy, table.heads))
+        for row in table.rows:
+            sheet.append(_filled(cells, row))
+        sums = [column.sum for column in table.columns[1:]]
+        if any(value is not None for value in sums):
+            sheet.append(_filled(heavy, ["sum", *sums]))
+    book.properties.creator = MARK
+    stream = io.BytesIO()
+    book.save(stream)
+    return _without_dates(stream.getvalue())
+
+
+def _filled(cells: list[Any], values: Iterable[Value]) -> list[Any]:
+    """Return the cells with values in them."""
+    for cell, value in zip(cells, values, strict=True):
+        cell.value = NOT_IN_XML.sub("?", value) if isinstance(value, str) else value
+        if isinstance(value, str):
+            cell.data_type = "s"  # a name such as "=B2" is no formula
+    return cells
+
+
+def _without_dates(content: bytes) -> bytes:
+    """Return a workbook without the time at which it was written."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            part = old.read(name)
+            if name == "docProps/core.xml":
+                part = re.sub(rb">\d{4}-\d\d-\d\dT[\d:.]+Z?<", b">1980-01-01T00:00:00Z<", part)
+            new.writestr(zipfile.ZipInfo(name, NO_DATE), part, zipfile.ZIP_DEFLATED)
+    return stream.getvalue()

@@ -1,0 +1,69 @@
+"""Where nodes and members belong: the building frame, groups of members, rings of assembly."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.geometry.components import component_labels
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from .settings import ScheduleSettings
+
+BOUNDARY, INNER = "boundary", "inner"
+
+
+def into_building(vectors: np.ndarray, settings: ScheduleSettings) -> np.ndarray:
+    """Return vectors of the scan (N, 3) in the directions of the building frame, turned about z."""
+    c, s = math.cos(math.radians(settings.rotation)), math.sin(math.radians(settings.rotation))
+    turned: np.ndarray = np.einsum("ij,vj->vi", np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), vectors)
+    return turned
+
+
+def building_places(grid: Grid, settings: ScheduleSettings) -> np.ndarray:
+    """Return the nodes in the building frame (V, 3) [scan unit, not scaled]."""
+    if settings.origin is not None:
+        shift = np.asarray(grid.origin, float) - np.asarray(settings.origin, float)
+        return into_building(grid.nodes + shift, settings)
+    places = into_building(grid.nodes, settings)
+    return places - places[np.unique(grid.triangles)].min(axis=0)
+
+
+def boundary_nodes(grid: Grid) -> np.ndarray:
+    """(V,) bool, the nodes on the boundary."""
+    found = np.zeros(len(grid.nodes), bool)
+    found[grid.edges[grid.edge_triangles[:, 1] < 0]] = True
+    return found
+
+
+def member_groups(grid: Grid) -> list[str]:
+    """Return the group of each member: boundary, the name of its fixed line or ridge, or inner."""
+    groups = np.full(len(grid.edges), INNER, object)
+    on_line = np.flatnonzero(grid.edge_on_line)
+    for line in reversed(grid.line_sets):  # the first that holds both nodes stands
+        groups[on_line[np.isin(grid.edges[on_line], line.nodes).all(axis=1)]] = line.name
+    groups[grid.edge_triangles[:, 1] < 0] = BOUNDARY
+    return [str(group) for group in groups]
+
+
+def rings(grid: Grid, height: np.ndarray) -> np.ndarray:
+    """Return the ring of each node (V,): members on the way to the boundary, of a closed piece to its lowest node; -1 without members."""
+    ring = np.full(len(grid.nodes), -1, np.int64)
+    reached = boundary_nodes(grid)
+    piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    used = np.unique(grid.triangles)
+    closed = used[~np.isin(piece[used], piece[reached])]
+    closed = closed[np.lexsort((height[closed], piece[closed]))]
+    reached[closed[np.unique(piece[closed], return_index=True)[1]]] = True
+    number = 0
+    while reached.any():  # each turn numbers nodes that had no number
+        ring[reached] = number
+        near = reached[grid.edges].any(axis=1)
+        reached = np.zeros(len(ring), bool)
+        reached[grid.edges[near]] = True
+        reached &= ring < 0
+        number += 1
+    return ring

@@ -1,0 +1,266 @@
+"""The tables of a schedule, from what was found of the nodes, members and panels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.marks import numbered
+from .clashes import warnings_table
+from .clusters import Clusters, holes_of_types
+from .joints import angle_between
+from .places import BOUNDARY, INNER, boundary_nodes, building_places, into_building, member_groups, rings
+from .records import Column, Schedule, Schedules, Value, column
+
+if TYPE_CHECKING:
+    from .parts import Parts
+
+DEGREE = "degree"
+
+
+def all_tables(parts: Parts) -> Schedules:
+    """Return all schedules."""
+    ring = rings(parts.grid, building_places(parts.grid, parts.settings)[:, 2])
+    groups = member_groups(parts.grid)
+    ball, member = _ball_masses(parts), _member_masses(parts)
+    return Schedules(
+        nodes=_nodes(parts, ring, ball),
+        drilling=_drilling(parts),
+        members=_members(parts, ring, groups, member),
+        panels=_panels(parts),
+        node_types=_node_types(parts, ball),
+        panel_types=_panel_types(parts),
+        lengths=_lengths(parts),
+        quantities=_quantities(parts, groups, ball, member),
+        warnings=warnings_table(parts),
+    )
+
+
+def _ball_masses(parts: Parts) -> np.ndarray | None:
+    """Return the mass of each ball (V,), solid, holes not taken off [kg]; None without a density."""
+    if parts.settings.density is None:
+        return None
+    return math.pi / 6.0 * (2.0 * parts.radius / 1000.0) ** 3 * parts.settings.density
+
+
+def _member_masses(parts: Parts) -> np.ndarray | None:
+    """Return the mass of each member (E,), as long as it is cut [kg]; None without a density."""
+    area = parts.settings.section_area
+    if parts.settings.density is None or area is None:
+        return None
+    return np.maximum(parts.cut, 0.0) / 1000.0 * area / 1e6 * parts.settings.density
+
+
+def _mass(mass: np.ndarray | None) -> list[Column]:
+    """Return the column of masses where they are known."""
+    return [] if mass is None else [column("mass", "kg", mass, summed=True)]
+
+
+def _of(marks: Sequence[str], ids: np.ndarray) -> list[str]:
+    """Return the marks of some items."""
+    return [marks[number] for number in ids.tolist()]
+
+
+def _xyz(name: str, unit: str, places: np.ndarray) -> list[Column]:
+    """Return three columns of coordinates or of a direction."""
+    return [column(f"{name} {axis}".strip(), unit, places[:, k]) for k, axis in enumerate("xyz")]
+
+
+def _type_marks(letters: str, types: Clusters) -> list[str]:
+    return numbered(letters, len(types.representative), 3)
+
+
+def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
+    """One row for each node with members."""
+    joints, used = parts.joints, np.flatnonzero(parts.joints.valence)
+    least, turn = np.full((2, len(joints.valence)), np.inf)
+    np.minimum.at(least, joints.node[joints.pairs[:, 0]], joints.angle)
+    np.minimum.at(turn, joints.node, joints.turn_to_next)
+    return Schedule(
+        "Nodes",
+        (
+            column("node", "", _of(parts.node_marks, used)),
+            column("node type", "", _of(_type_marks("NT", parts.node_types), parts.node_types.of[used])),
+            column("ring", "", ring[used]),
+            *_xyz("scan", parts.unit, parts.grid.scan_nodes[used]),
+            *_xyz("", "mm", building_places(parts.grid, parts.settings)[used] * parts.size),
+            column("valence", "", joints.valence[used]),
+            *_xyz("normal", "", into_building(joints.normal[used], parts.settings)),
+            column("smallest angle", DEGREE, least[used]),
+            column("smallest angle in tangent plane", DEGREE, turn[used]),
+            column("ball needed", "mm", 2.0 * parts.needed[used]),
+            column("ball", "mm", 2.0 * parts.radius[used]),
+            *_mass(None if mass is None else mass[used]),
+        ),
+    )
+
+
+def _drilling(parts: Parts) -> Schedule:
+    """One row for each hole of each ball, in the frame of the ball."""
+    joints = parts.joints
+    return Schedule(
+        "Drilling",
+        (
+            column("node", "", _of(parts.node_marks, joints.node)),
+            column("hole", "", np.arange(len(joints.node)) - joints.start[joints.node] + 1),
+            column("member", "", _of(parts.member_marks, joints.member)),
+            column("hole of type", "", holes_of_types(joints, parts.node_types) + 1),
+            column("azimuth", DEGREE, joints.azimuth),
+            column("angle to normal", DEGREE, joints.tilt),
+            *_xyz("ball", "", joints.own),
+            column("angle to next", DEGREE, joints.to_next),
+            column("angle to next in tangent plane", DEGREE, joints.turn_to_next),
+        ),
+    )
+
+
+def end_angles(parts: Parts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each member the angles to the normals of its start and end, towards the other node, and the twist (E,) [degree].
+
+    The twist is the angle by which the normal of the start must be turned about the member, right-handed from start to end, to lie in one
+    plane with that of the end.
+    """
+    nodes, edges = parts.grid.nodes, parts.grid.edges
+    axis = nodes[edges[:, 1]] - nodes[edges[:, 0]]
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    first, second = parts.joints.normal[edges[:, 0]], parts.joints.normal[edges[:, 1]]
+    flat = [normal - (normal * axis).sum(axis=1, keepdims=True) * axis for normal in (first, second)]
+    twist = np.degrees(np.arctan2((np.cross(*flat) * axis).sum(axis=1), (flat[0] * flat[1]).sum(axis=1)))
+    return angle_between(first, axis), angle_between(second, -axis), twist
+
+
+def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray | None) -> Schedule:
+    """One row for each member."""
+    edges, settings = parts.grid.edges, parts.settings
+    start, end, twist = end_angles(parts)
+    wall = [] if settings.wall is None else [column("wall", "mm", [settings.wall] * len(edges))]
+    return Schedule(
+        "Members",
+        (
+            column("member", "", parts.member_marks),
+            column("start", "", _of(parts.node_marks, edges[:, 0])),
+            column("end", "", _of(parts.node_marks, edges[:, 1])),
+            column("group", "", groups),
+            column("ring", "", ring[edges].max(axis=1)),
+            column("length type", "", _of(_type_marks("L", parts.length_types), parts.length_types.of)),
+            column("length", "mm", parts.length, summed=True),
+            column("start deduction", "mm", parts.radius[edges[:, 0]]),
+            column("end deduction", "mm", parts.radius[edges[:, 1]]),
+            column("cut length", "mm", parts.cut, summed=True),
+            column("tube", "mm", [settings.tube] * len(edges)),
+            *wall,
+            column("start angle to normal", DEGREE, start),
+            column("end angle to normal", DEGREE, end),
+            column("twist", DEGREE, twist),
+            *_mass(mass),
+        ),
+    )
+
+
+def _areas(parts: Parts) -> np.ndarray:
+    """Return the area of each panel (T,) [m2]."""
+    a, b, c = (parts.grid.nodes[parts.grid.triangles[:, k]] for k in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0 * (parts.size / 1000.0) ** 2
+
+
+def _panels(parts: Parts) -> Schedule:
+    """One row for each panel; side 1 runs from node 1 to node 2, and so on."""
+    grid = parts.grid
+    sides = grid.half_edge_edges.reshape(3, -1).T
+    neighbour = grid.edge_triangles[sides].sum(axis=2) - np.arange(len(sides))[:, None]  # -1 beyond the boundary
+    marks = [*parts.panel_marks, None]
+    return Schedule(
+        "Panels",
+        (
+            column("panel", "", parts.panel_marks),
+            *(column(f"node {k + 1}", "", _of(parts.node_marks, grid.triangles[:, k])) for k in range(3)),
+            column("panel type", "", _of(_type_marks("PT", parts.panel_types), parts.panel_types.of)),
+            *(column(f"side {k + 1}", "mm", parts.sides[:, k]) for k in range(3)),
+            *(column(f"angle {k + 1}", DEGREE, grid.angles[:, k]) for k in range(3)),
+            column("area", "m2", _areas(parts), summed=True),
+            *(column(f"neighbour {k + 1}", "", [marks[t] for t in neighbour[:, k].tolist()]) for k in range(3)),
+            *(column(f"fold {k + 1}", DEGREE, parts.fold[sides[:, k]]) for k in range(3)),
+        ),
+    )
+
+
+def _types(title: str, letters: str, types: Clusters, marks: Sequence[str], unit: str, *more: Column) -> Schedule:
+    """One row for each type, the most frequent first."""
+    return Schedule(
+        title,
+        (
+            column(title.lower().removesuffix("s").replace("length", "length type"), "", _type_marks(letters, types)),
+            column("count", "", types.counts, summed=True),
+            column("representative", "", _of(marks, types.representative)),
+            *more,
+            column("largest misfit", unit, types.misfit[types.worst]),
+            column("misfit at", "", _of(marks, types.worst)),
+        ),
+    )
+
+
+def _node_types(parts: Parts, mass: np.ndarray | None) -> Schedule:
+    """One row for each type of node; how it is drilled stands at its representative."""
+    types, one = parts.node_types, parts.node_types.representative
+    more = [] if mass is None else [column("mass of one", "kg", mass[one])]
+    return _types(
+        "Node types", "NT", types, parts.node_marks, DEGREE,
+        column("valence", "", parts.joints.valence[one]), column("ball", "mm", 2.0 * parts.radius[one]), *more,
+    )  # fmt: skip
+
+
+def _panel_types(parts: Parts) -> Schedule:
+    """One row for each type of panel."""
+    types, one = parts.panel_types, parts.panel_types.representative
+    return _types(
+        "Panel types", "PT", types, parts.panel_marks, "mm",
+        *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(3)), column("area of one", "m2", _areas(parts)[one]),
+    )  # fmt: skip
+
+
+def _lengths(parts: Parts) -> Schedule:
+    """One row for each type of member."""
+    types = parts.length_types
+    total = np.bincount(types.of, parts.cut) / 1000.0
+    return _types(
+        "Lengths", "L", types, parts.member_marks, "mm",
+        column("cut length", "mm", parts.cut[types.representative]), column("total", "m", total, summed=True),
+    )  # fmt: skip
+
+
+def _quantities(parts: Parts, groups: list[str], ball: np.ndarray | None, member: np.ndarray | None) -> Schedule:
+    """One row for each group of nodes and members, and one for all panels."""
+    rows: list[tuple[Value, ...]] = []
+    on_boundary, used = boundary_nodes(parts.grid), parts.joints.valence > 0
+
+    def total(values: np.ndarray | None, chosen: np.ndarray) -> float | None:
+        return None if values is None else float(values[chosen].sum())
+
+    for group, chosen in ((BOUNDARY, on_boundary & used), (INNER, ~on_boundary & used)):
+        if chosen.any():
+            rows.append(("nodes", group, int(chosen.sum()), None, None, None, total(ball, chosen)))
+    of_member = np.array(groups)
+    names = dict.fromkeys(groups)
+    for group in [*(name for name in (BOUNDARY, INNER) if name in names), *sorted(names.keys() - {BOUNDARY, INNER})]:
+        chosen = of_member == group
+        length, cut = (total(values / 1000.0, chosen) for values in (parts.length, parts.cut))
+        rows.append(("members", group, int(chosen.sum()), length, cut, None, total(member, chosen)))
+    areas = _areas(parts)
+    rows.append(("panels", "all", len(areas), None, None, float(areas.sum()), None))
+    heads = (
+        ("item", ""),
+        ("group", ""),
+        ("count", ""),
+        ("length", "m"),
+        ("cut length", "m"),
+        ("area", "m2"),
+        ("mass", "kg"),
+    )
+    columns = [
+        column(name, unit, values, summed=name == "mass")
+        for (name, unit), values in zip(heads, zip(*rows, strict=True), strict=True)
+    ]
+    return Schedule("Quantities", tuple(columns if ball is not None else columns[:-1]))
