@@ -16,6 +16,7 @@ from .grid import grid, grid_parser
 from .info import info, info_parser
 from .print import print_parser, print_solid
 from .splice import splice, splice_parser
+from .structure import structure, structure_parser
 from .sweep import sweep, sweep_parser
 from .thin import thin, thin_parser
 
@@ -35,6 +36,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "thin": (thin_parser, thin),
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
+    "structure": (structure_parser, structure),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),

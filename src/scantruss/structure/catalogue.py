@@ -201,7 +201,7 @@ def _named(name: str, what: str, known: tuple[Named, ...]) -> Named:
 
 def _key(name: str) -> str:
     """Return a name without what does not matter: case, spaces, zeros behind the decimal point."""
-    word = name.replace("×", "x").replace(" ", "").replace(",", ".").lower()
+    word = name.replace("\u00d7", "x").replace(" ", "").replace(",", ".").lower()
     return re.sub(r"(\.\d*?)0+(?=x|$)", lambda found: found[1].rstrip("."), word)
 
 

@@ -37,7 +37,9 @@ class CheckSettings:
     gamma_m0: float = 1.0  #: partial factor of cross-sections, EN 1993-1-1 6.1
     gamma_m1: float = 1.0  #: partial factor of members that buckle, EN 1993-1-1 6.1
     slenderness: float = 200.0  #: greatest buckling length over radius of gyration; practice, no clause
-    deflection: float = 300.0  #: span over the greatest displacement of SLS; practice, EN 1990 A1.4 leaves it to the client
+    deflection: float = (
+        300.0  #: span over the greatest displacement of SLS; practice, EN 1990 A1.4 leaves it to the client
+    )
 
     def __post_init__(self) -> None:
         """Refuse what is no positive number."""
@@ -108,9 +110,7 @@ def strengths(truss: Truss, settings: CheckSettings | None = None) -> Strength:
     for number, curve in enumerate(curves):
         mine = truss.section_of == number
         chi[mine] = reduction(relative[mine], curve)
-    modulus = np.stack(
-        [np.where(plastic, of(f"plastic_{axis}"), of(f"elastic_{axis}")) for axis in "yz"], axis=1
-    )
+    modulus = np.stack([np.where(plastic, of(f"plastic_{axis}"), of(f"elastic_{axis}")) for axis in "yz"], axis=1)
     return Strength(
         truss=truss,
         settings=settings,

@@ -1,8 +1,8 @@
 """Stiffness of members and of the whole: Euler-Bernoulli members in space, by their six natural deformations.
 
 A member between two nodes deforms in six ways: it lengthens, twists, and bends at both ends about both axes (Argyris' natural
-modes). `transforms` takes displacements of the nodes to these, `natural_stiffness` these to forces; rotational springs at the ends are condensed by
-fixity factors (Monforton and Wu 1963). A pinned structure has the first way and three displacements a node only.
+modes). `transforms` takes displacements of the nodes to these, `natural_stiffness` these to forces; rotational springs at the
+ends are condensed by fixity factors (Monforton and Wu 1963). A pinned structure has the first way and three displacements a node only.
 """
 
 from __future__ import annotations

@@ -2,14 +2,17 @@
 
 A load on an area is shared by the three nodes of each triangle. Loads of one name are one load case.
 
-| words | what |
-| --- | --- |
-| `self` | weight of the members, more by the allowance for the nodes |
-| `cladding:0.5kN/m2` | weight on the surface |
-| `snow:1kN/m2` | on the plan area of what faces up |
-| `half-snow:1kN/m2` | the same on one half in plan, from the middle of the area to +x, +y, -x, -y: four cases; `@30` that at 30 degrees from x |
-| `wind:0.8kN/m2:-0.7` | pressure times coefficient against the outer normal; `:0.8/-0.5@90` what faces a wind towards 90 degrees from x, and the rest |
-| `temperature:30K` | of all members |
+On the command line:
+
+- `self`: weight of the members, more by the allowance for the nodes
+- `cladding:0.5kN/m2`: weight on the surface
+- `snow:1kN/m2`: on the plan area of what faces up
+- `half-snow:1kN/m2`: the same beyond the middle of the area towards +x, +y, -x and -y, four cases; `@30` towards 30 degrees from x
+- `wind:0.8kN/m2:-0.7`: pressure times coefficient against the outer normal; `wind:0.8kN/m2:0.8/-0.5@90` with one coefficient
+  for what faces a wind that blows towards 90 degrees from x, another for the rest
+- `temperature:30K`: of all members
+
+`_of_table` says what a settings file can hold.
 """
 
 from __future__ import annotations
@@ -184,7 +187,9 @@ def _wind(truss: Truss, pressure: float, coefficient: str, angle: float | None) 
     try:
         windward, leeward = float(words[0]), float(words[-1])
     except ValueError:
-        raise InputError(f"coefficients of wind are numbers, as in wind:0.8kN/m2:0.8/-0.5@90, got {coefficient!r}") from None
+        raise InputError(
+            f"coefficients of wind are numbers, as in wind:0.8kN/m2:0.8/-0.5@90, got {coefficient!r}"
+        ) from None
     if (len(words) == 2) != (angle is not None) or len(words) > 2:
         raise InputError("wind takes one coefficient, or two with a direction: wind:0.8kN/m2:0.8/-0.5@90")
     if angle is None:
@@ -214,12 +219,26 @@ def _of_table(truss: Truss, table: Mapping[str, Any], node_allowance: float) -> 
     at `nodes`; `line` [N/m, three numbers] on `members`; `temperature` [K], `lengthening` [m] or `strain` on `members`;
     `settlement` [m, three numbers] at `nodes`. `nodes` and `members` are lists of marks, `nodes` also what a support can be.
     """
-    known = {"case", "action", "load", "force", "line", "temperature", "lengthening", "strain", "settlement", "nodes", "members"}
+    known = {
+        "case",
+        "action",
+        "load",
+        "force",
+        "line",
+        "temperature",
+        "lengthening",
+        "strain",
+        "settlement",
+        "nodes",
+        "members",
+    }
     if unknown := sorted(table.keys() - known):
         raise InputError(f"a load has no {unknown[0]!r}; known are {' '.join(sorted(known))}")
     kinds = sorted(table.keys() & (known - {"case", "action", "nodes", "members"}))
     if len(kinds) != 1:
-        raise InputError(f"a load needs one of load, force, line, temperature, lengthening, strain, settlement, got {kinds}")
+        raise InputError(
+            f"a load needs one of load, force, line, temperature, lengthening, strain, settlement, got {kinds}"
+        )
     kind, name = kinds[0], str(table.get("case", "point" if kinds[0] == "force" else kinds[0]))
     action = str(table.get("action", {"settlement": "permanent", "temperature": "temperature"}.get(kind, "variable")))
     if action not in ACTIONS:
@@ -228,7 +247,9 @@ def _of_table(truss: Truss, table: Mapping[str, Any], node_allowance: float) -> 
         made = _of_words(truss, str(table["load"]), node_allowance)
         if len(made) > 1 and "case" in table:
             raise InputError(f"{table['load']!r} is {len(made)} load cases; name one with a direction, as in @0")
-        return replace(made[0], name=str(table.get("case", made[0].name)), action=str(table.get("action", made[0].action)))
+        return replace(
+            made[0], name=str(table.get("case", made[0].name)), action=str(table.get("action", made[0].action))
+        )
     if kind in ("force", "settlement"):
         nodes = _nodes(truss, table.get("nodes"), name)
         vector = _vector(table[kind], FORCE if kind == "force" else LENGTH, name)

@@ -90,7 +90,11 @@ def report_structure(
     truss, checks = solution.truss, checks or CheckSettings()
     strength = strengths(truss, checks)
     any_uls = any(combination.state == "ULS" for combination in truss.combinations)
-    worst, clause, load = np.zeros(len(truss.members)), np.zeros(len(truss.members), int), np.zeros(len(truss.members), int)
+    worst, clause, load = (
+        np.zeros(len(truss.members)),
+        np.zeros(len(truss.members), int),
+        np.zeros(len(truss.members), int),
+    )
     figures: list[CaseFigures] = []
     for number, result in enumerate(solution.all_results()):
         each = utilizations(strength, result) if strength.known else None

@@ -11,8 +11,17 @@ from scipy.sparse import csc_matrix, diags, identity
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import InputError
-from .frame import BEND_Y1, BEND_Z1, LENGTHEN, fixed_end_forces, freedoms, member_freedoms, natural_stiffness
-from .frame import stiffness_matrix, transforms
+from .frame import (
+    BEND_Y1,
+    BEND_Z1,
+    LENGTHEN,
+    fixed_end_forces,
+    freedoms,
+    member_freedoms,
+    natural_stiffness,
+    stiffness_matrix,
+    transforms,
+)
 from .mechanism import refuse_mechanism, softest_motion
 from .truss import GRAVITY, LoadCase, Truss
 
@@ -87,7 +96,9 @@ class CaseResult:
         length = self.truss.lengths
         for column, shear, load in ((4, 2, self.line[:, 2]), (5, 1, -self.line[:, 1])):  # where the shear is nil
             first = self.along[:, 0, shear] if shear == 2 else -self.along[:, 0, shear]
-            place = np.divide(first, load, out=np.zeros_like(first), where=np.abs(load) * length > 1e-12 * np.abs(first))
+            place = np.divide(
+                first, load, out=np.zeros_like(first), where=np.abs(load) * length > 1e-12 * np.abs(first)
+            )
             place = np.clip(place, 0.0, length)
             moment = self.along[:, 0, column] + first * place - load * place**2 / 2
             made[:, column] = np.maximum(made[:, column], np.abs(moment))
@@ -142,7 +153,9 @@ class Solution:
     def _combined(self, name: str, state: str, factors: tuple[tuple[str, float], ...]) -> CaseResult:
         by_name = {case.name: case for case in self.cases}
         if missing := [case for case, _ in factors if case not in by_name]:
-            raise InputError(f"the combination {name!r} names no load case {missing[0]!r}; there are {', '.join(by_name)}")
+            raise InputError(
+                f"the combination {name!r} names no load case {missing[0]!r}; there are {', '.join(by_name)}"
+            )
         sums = [
             sum((factor * getattr(by_name[case], part) for case, factor in factors), np.zeros(1))
             for part in ("displacements", "reactions", "natural", "line", "nodal")
