@@ -44,6 +44,9 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .scan.cloud import PointCloud as PointCloud
     from .scan.formats.reading import read_points as read_points
     from .settings import Settings as Settings
+    from .structure.json import read_structure as read_structure
+    from .structure.statics import solve as solve
+    from .structure.truss import Truss as Truss
     from .surface.samples import sample_surface as sample_surface
 
 __version__ = "0.1.0"
@@ -65,6 +68,7 @@ _HOMES = {
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
     "print_model": "export.solid",
+    "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
 }  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])

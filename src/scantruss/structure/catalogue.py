@@ -195,8 +195,18 @@ def _named(name: str, what: str, known: tuple[Named, ...]) -> Named:
     by_key = {_key(each.name): each for each in known}
     if (key := _key(name)) in by_key:
         return by_key[key]
-    near = [by_key[word].name for word in get_close_matches(key, by_key, 3, 0.4)]
-    raise InputError(f"no {what} {name!r} is known; nearest are {' '.join(near or [each.name for each in known[:5]])}")
+    near = [word for word in sorted(by_key, key=lambda word: _distance(key, word)) if _distance(key, word) < math.inf]
+    near = near or get_close_matches(key, by_key, 3, 0.4) or list(by_key)
+    raise InputError(f"no {what} {name!r} is known; nearest are {' '.join(by_key[word].name for word in near[:3])}")
+
+
+def _distance(one: str, other: str) -> float:
+    """Return how far the numbers in two names are apart; infinite if there are none, or the letters differ."""
+    first, second = (re.split(r"(\d+\.?\d*)", word) for word in (one, other))
+    if first[::2] != second[::2] or len(first) < 2:
+        return math.inf
+    pairs = zip(map(float, first[1::2]), map(float, second[1::2]), strict=True)
+    return sum(abs(math.log(max(a, 1e-9) / max(b, 1e-9))) for a, b in pairs)
 
 
 def _key(name: str) -> str:

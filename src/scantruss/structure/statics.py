@@ -171,15 +171,18 @@ class Factored:
     stiffness: csc_matrix  #: of all displacements, supports not yet held
     free: np.ndarray  #: (F,) numbers of the displacements that are free
     root: np.ndarray  #: (F,) square roots of the diagonal, by which it is scaled
-    factor: SuperLU  #: of the scaled stiffness of the free displacements
+    factor: SuperLU | None  #: of the scaled stiffness of the free displacements; None where all is held
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F, C) free displacements of loads, refined once."""
+        if self.factor is None:
+            return loads
         part = self.stiffness[self.free][:, self.free]
         found = self._once(loads)
         return found + self._once(loads - part @ found)
 
     def _once(self, loads: np.ndarray) -> np.ndarray:
+        assert self.factor is not None
         return self.factor.solve(np.ascontiguousarray(loads / self.root[:, None])) / self.root[:, None]
 
 
@@ -196,7 +199,7 @@ def factor_stiffness(truss: Truss) -> Factored:
     held = np.isinf(truss.supports[:, : freedoms(truss)]).ravel()
     free = np.flatnonzero(~held)
     if len(free) == 0:
-        raise InputError("the supports hold all displacements of all nodes; nothing is left to solve")
+        return Factored(truss, stiffness, free, np.ones(0), None)
     part = stiffness[free][:, free]
     diagonal = part.diagonal()
     root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))

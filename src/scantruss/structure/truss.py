@@ -162,6 +162,8 @@ class Truss:
         from .loads import cases_of, usual_combinations
         from .supports import node_sets, support_nodes, support_stiffness
 
+        if grid.unit and unit and unit != grid.unit:
+            raise InputError(f"the grid is in {grid.unit}, not in {unit}; leave --unit out")
         metres = scale_of(grid.unit or unit, scale)
         pinned, spring = _joints(joints)
         nodes = np.ascontiguousarray(grid.nodes, float) * metres
@@ -195,7 +197,7 @@ class Truss:
             origin=np.asarray(grid.origin, float) * metres,
             node_marks=tuple(node_marks(grid)),
             member_marks=tuple(member_marks(grid)),
-            scale=scale,
+            scale=float(scale),
         )
         held = support_nodes(truss, supports)
         truss = truss.replace(supports=support_stiffness(len(nodes), held, support_type))
