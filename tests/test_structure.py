@@ -10,7 +10,9 @@ from small_grids import dome, fan
 from small_trusses import EA, EI, FREE, HELD, HINGED, STEEL, TUBE, forces, line_of, make_truss, stiff_along
 
 import scantruss as st
-from scantruss.structure.statics import solve
+from scantruss.structure import modes as modes_module
+from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
+from scantruss.structure.statics import factor_stiffness, solve
 from scantruss.structure.truss import LoadCase, Truss
 
 FOUR_DIGITS = 5e-5
@@ -310,3 +312,80 @@ def test_sections_of_two_sizes_are_two_stiffnesses() -> None:
         sections=(TUBE, thick), section_of=np.array([0, 1]),
     )  # fmt: skip
     assert solve(truss)["load"].displacements[:, 0] == pytest.approx([0, 1000 / EA, 2000 / EA])
+
+
+ENDS = {  # Timoshenko and Gere, Theory of Elastic Stability, 2.1 to 2.4: buckling length over length, supports of the ends
+    "cantilever": (2.0, HELD, FREE),
+    "hinged": (1.0, (np.inf, np.inf, np.inf, 0, 0, np.inf), (np.inf, np.inf, 0, 0, 0, np.inf)),
+    "held and hinged": (0.699157, HELD, (np.inf, np.inf, 0, 0, 0, np.inf)),
+    "held": (0.5, HELD, (np.inf, np.inf, 0, np.inf, np.inf, np.inf)),
+}
+
+
+@pytest.mark.parametrize("ends", ENDS)
+def test_a_column_buckles_at_the_load_of_euler(ends: str) -> None:
+    share, foot, top = ENDS[ends]
+    length, count = 4.0, 16
+    nodes = np.linspace(0, 1, count + 1)[:, None] * np.array([0, 0, length])
+    members = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+    truss = make_truss(nodes, members, {0: foot, count: top}, forces(count + 1, {count: (0, 0, -1000.0)}))
+    factored = factor_stiffness(truss)
+    modes = buckling_modes(factored, solve(truss, factored)["load"], 2)
+    assert 1000 * modes.values[0] == pytest.approx(math.pi**2 * EI / (share * length) ** 2, rel=FOUR_DIGITS)
+    assert modes.values[1] == pytest.approx(modes.values[0])  # about the other axis of a tube
+    assert np.abs(modes.shapes).max() == 1.0
+
+
+def test_many_freedoms_have_the_modes_of_few() -> None:
+    """Sparse and dense eigenvalues of one structure are the same."""
+    truss = shell(joints=20000.0, loads="self,snow:1kN/m2")
+    factored = factor_stiffness(truss)
+    snow = solve(truss, factored)["snow"]
+    sparse = buckling_modes(factored, snow, 3).values, vibration_modes(factored, 3).values
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(modes_module, "FEW_FREEDOMS", 10**6)
+        dense = buckling_modes(factored, snow, 3).values, vibration_modes(factored, 3).values
+    assert sparse[0] == pytest.approx(dense[0], rel=1e-6) and sparse[1] == pytest.approx(dense[1], rel=1e-6)
+
+
+def test_hinged_members_of_a_frame_stay_straight_when_it_buckles() -> None:
+    """By hand: a column on a hinge, held at its top by a spring k sideways, falls over at k L."""
+    springs = (1e4, 1e4, 0.0, 0.0, 0.0, np.inf)
+    for pinned in (True, False):
+        supports = {0: HELD, 1: springs if pinned else (*springs[:3], *HELD[3:])}
+        load, ends = forces(2, {1: (0, 0, -1000.0)}), np.full((1, 2, 2), 1e-9)
+        truss = make_truss([(0, 0, 0), (0, 0, 3.0)], [(0, 1)], supports, load, pinned=pinned, end_stiffness=ends)
+        factored = factor_stiffness(truss)
+        found = buckling_modes(factored, solve(truss, factored)["load"], 1)
+        assert 1000 * found.values[0] == pytest.approx(1e4 * 3.0, rel=1e-6)
+
+
+def test_what_is_only_pulled_does_not_buckle() -> None:
+    truss = make_truss([(0, 0, 0), (0, 0, 3.0)], [(0, 1)], {0: HELD}, forces(2, {1: (0, 0, 1000.0)}))
+    factored = factor_stiffness(truss)
+    assert len(buckling_modes(factored, solve(truss, factored)["load"], 2).values) == 0
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0.6, 0.0, 0.8)])
+def test_a_beam_swings_at_the_frequency_of_the_textbook(axis: tuple[float, float, float]) -> None:
+    """Chopra, Dynamics of Structures, 16.3: a beam on two supports has n2 pi / 2 L2 sqrt(E I / m)."""
+    length, count = 6.0, 16
+    nodes = np.linspace(0, 1, count + 1)[:, None] * length * np.asarray(axis)
+    members = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+    held = (np.inf, np.inf, np.inf, np.inf, 0.0, 0.0) if axis[2] == 0 else (np.inf, np.inf, np.inf, 1e9, 0.0, 1e9)
+    truss = make_truss(nodes, members, {0: held, count: held}, LoadCase("self", "permanent", self_weight=1.0))
+    first = math.pi / (2 * length**2) * math.sqrt(EI / (TUBE.area * STEEL.density))
+    found = vibration_modes(factor_stiffness(truss), 2).values
+    assert found[0] == pytest.approx(first, rel=FOUR_DIGITS)
+    heavy = vibration_modes(factor_stiffness(truss.replace(cases=(LoadCase("self", "permanent", self_weight=4.0),))), 1)
+    assert heavy.values[0] == pytest.approx(found[0] / 2)
+
+
+def test_the_worst_combination_buckles_first() -> None:
+    truss = shell()
+    factored = factor_stiffness(truss)
+    solution = solve(truss, factored)
+    worst = worst_buckling(factored, solution, 2)
+    assert worst.of.startswith("ULS") and 0 < worst.values[0] <= worst.values[1]
+    each = buckling_modes(factored, solution[worst.of], 1).values[0]
+    assert worst.values[0] == pytest.approx(each, rel=1e-6)

@@ -46,6 +46,21 @@ def test_the_report_holds_what_it_promises(place: Path, capsys: pytest.CaptureFi
     assert "wrote out.json report.json" in said and "snow" in said
 
 
+def test_buckling_and_frequencies_come_where_they_are_asked_for(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = "structure grid.json out.json --scale 50 --loads self,snow:1kN/m2 --buckling 3 --frequencies 2 --report report.json"
+    assert run(words) == 0
+    report = json.loads(Path("report.json").read_text())
+    assert (
+        len(report["buckling_factors"]) == 3 and report["buckling_factors"][0] > 1 and "snow" in report["buckling_case"]
+    )
+    assert len(report["frequencies"]) == 2 and 0 < report["frequencies"][0] <= report["frequencies"][1]
+    assert np.shape(json.loads(Path("out.json").read_text())["buckling_modes"]) == (3, 49, 3)
+    said = capsys.readouterr().out
+    assert "buckling factors of ULS" in said and "natural frequencies" in said
+
+
 def test_a_structure_is_read_back_to_the_last_bit(place: Path) -> None:
     grid = dome(7, 40.0)
     table = [
@@ -165,6 +180,7 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --loads ,", "no loads"),
         ("grid.json out.json --loads no.toml", "cannot read no.toml"),
         ("grid.json out.json --scale 0", "scale must be a positive number"),
+        ("grid.json out.json --buckling 99", "numbers of modes, 0 to 50"),
         ("grid.json out.json --node-allowance -1", "node_allowance is a share"),
         ("grid.json out.json --settings no.toml", "cannot read no.toml"),
         ("grid.json out.obj", 'no format for ".obj"'),

@@ -86,7 +86,7 @@ def test_own_sections_and_materials_come_from_csv(tmp_path: Path) -> None:
     with pytest.raises(st.InputError, match="holds 2 sections; name one"):
         find_section(str(table))
     table.write_text("name,shape,width [mm],thickness [mm]\nT1,CHS,100,60\n")
-    with pytest.raises(st.FormatError, match="row 1 .*leave no hole"):
+    with pytest.raises(st.FormatError, match=r"row 1 .*leave no hole"):
         find_section(str(table))
     materials = tmp_path / "m.csv"
     head = "name,kind,E [GPa],G [GPa],density [kg/m3],alpha [1e-6/K],yield [MPa],ultimate [MPa]\n"

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from .options import Parser
 
 STRUCTURE_SUFFIXES = (".json",)
+NOT_OF_GRID = ("checks", "buckling", "frequencies")  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
-    ("scale", "S", "scale of the structure to the grid (default 1)"),
+    ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
     ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
@@ -31,13 +32,15 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("loads", "LOAD,...|FILE",
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
-    ("node_allowance", "SHARE", "weight of the nodes as a share of that of the members (default 0)"),
+    ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
+    ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
+    ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
 )  # fmt: skip
 
 
 def structure_parser() -> Parser:
     """Options of ``scantruss structure``."""
-    from .options import Parser, add_outs, number
+    from .options import Parser, add_outs, number, whole_number
 
     parser = Parser(
         "structure",
@@ -51,7 +54,7 @@ def structure_parser() -> Parser:
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
     )
     for name, metavar, said in OWN_OPTIONS:
-        kind = number if name in ("scale", "node_allowance") else str
+        kind = {"NUMBER": number, "COUNT": whole_number}.get(metavar, str)
         parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
     return parser
@@ -75,8 +78,9 @@ def structure(values: Namespace) -> None:
     from ..export.json import read_grid
     from ..grid.certificate import check_passed
     from ..structure.json import encode_structure
-    from ..structure.report import STRUCTURE_HEAD, report_structure, structure_lines
-    from ..structure.statics import solve
+    from ..structure.modes import vibration_modes, worst_buckling
+    from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
+    from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
@@ -84,9 +88,13 @@ def structure(values: Namespace) -> None:
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
-        solution = solve(truss)
-        bars("checks", 0.6)
-        report = report_structure(solution, settings.checks, _notes(settings))
+        factored = factor_stiffness(truss)
+        solution = solve(truss, factored)
+        bars("modes", 0.4)
+        buckling = worst_buckling(factored, solution, settings.buckling) if settings.buckling else None
+        vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
+        bars("checks", 0.8)
+        report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
         for out in outs:
             save.beside(out).write_bytes(encode_structure(truss, solution, report))
         if report_place is not None:
@@ -97,6 +105,7 @@ def structure(values: Namespace) -> None:
         [
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {truss.sections[0].name} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
+            *mode_lines(report),
             *(f"warning: {words}" for words in report.warnings),
             f"wrote {' '.join(map(str, wrote))}",
         ]
@@ -125,7 +134,7 @@ def _inputs(values: Namespace) -> Taken:
 
 def _arguments(grid: Grid, settings: StructureSettings) -> dict[str, Any]:
     """Return the settings as `Truss.from_grid` takes them."""
-    given = {spec.name: getattr(settings, spec.name) for spec in fields(settings) if spec.name != "checks"}
+    given = {spec.name: getattr(settings, spec.name) for spec in fields(settings) if spec.name not in NOT_OF_GRID}
     if Path(settings.supports).is_file():
         given["supports"] = _nodes_near(grid, settings.supports)
     return given

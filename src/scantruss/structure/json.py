@@ -67,6 +67,9 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         values["report"] = report.to_dict()
         values["utilization"] = report.utilization
         values["governing"] = list(report.governing)
+        for name, modes in (("buckling_modes", report.buckling), ("vibration_modes", report.vibration)):
+            if modes is not None:
+                values[name] = modes.shapes
     parts = [f"{json.dumps(name)}: {_text(value)}" for name, value in values.items()]
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 

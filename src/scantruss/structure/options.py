@@ -13,6 +13,9 @@ from ..errors import FormatError, InputError
 from .checks import CheckSettings
 from .truss import Combination
 
+MOST_MODES = 50  #: of buckling or vibration
+NUMBERS = ("scale", "node_allowance", "buckling", "frequencies")  #: settings that are numbers
+
 
 @dataclass(frozen=True)
 class StructureSettings:
@@ -27,8 +30,17 @@ class StructureSettings:
     joints: str = "rigid"
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
+    buckling: int = 0  #: buckling factors that are asked for
+    frequencies: int = 0  #: natural frequencies that are asked for
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
     checks: CheckSettings = field(default_factory=CheckSettings)  #: of a file
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of modes that are none."""
+        if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
+            raise InputError(
+                f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"
+            )
 
     def replace(self, **changes: Any) -> StructureSettings:
         """Return a copy with some fields changed."""
@@ -59,7 +71,9 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
             given[name] = loads_of_words(value) if isinstance(value, str) else tuple(value)
         elif name in ("scale", "node_allowance") and isinstance(value, int | float):
             given[name] = float(value)
-        elif name in known and isinstance(value, str | int | float) and name not in ("scale", "node_allowance"):
+        elif name in ("buckling", "frequencies") and isinstance(value, int):
+            given[name] = value
+        elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
             given[name] = str(value)
         else:
             raise InputError(

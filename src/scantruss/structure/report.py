@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from .checks import CLAUSES, CheckSettings, span_of, strengths, utilizations
+from .modes import Modes
 from .statics import CaseResult, Solution
 from .truss import Truss
 
@@ -39,9 +40,8 @@ class StructureReport:
     utilization: np.ndarray | None  #: (M,) the greatest of all ULS combinations, or of all cases where there are none
     governing: tuple[str, ...]  #: (M,) the clause and load of that
     warnings: tuple[str, ...]
-    buckling_factors: tuple[float, ...] | None = None
-    frequencies: tuple[float, ...] | None = None  #: [Hz]
-    extra: dict[str, Any] = field(default_factory=dict)
+    buckling: Modes | None = None  #: of the combination that buckles first, where it was asked for
+    vibration: Modes | None = None  #: where it was asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -66,15 +66,21 @@ class StructureReport:
             "sections": {section.name: count for section, count in zip(self.truss.sections, counts, strict=True)},
             "warnings": list(self.warnings),
         }
-        if self.buckling_factors is not None:
-            values["buckling_factors"] = list(self.buckling_factors)
-        if self.frequencies is not None:
-            values["frequencies"] = list(self.frequencies)
-        return values | self.extra
+        if self.buckling is not None:
+            values["buckling_factors"] = self.buckling.values.tolist()
+            values["buckling_case"] = self.buckling.of
+        if self.vibration is not None:
+            values["frequencies"] = self.vibration.values.tolist()
+        return values
 
 
 def report_structure(
-    solution: Solution, checks: CheckSettings | None = None, notes: Sequence[str] = ()
+    solution: Solution,
+    checks: CheckSettings | None = None,
+    notes: Sequence[str] = (),
+    *,
+    buckling: Modes | None = None,
+    vibration: Modes | None = None,
 ) -> StructureReport:
     """Return the figures of all load cases and combinations, the checks of the members, and warnings.
 
@@ -86,6 +92,8 @@ def report_structure(
         Buckling length, partial factors, limits.
     notes : sequence of str
         Warnings of whoever made the structure.
+    buckling, vibration : Modes, optional
+        Of `worst_buckling` and `vibration_modes`.
     """
     truss, checks = solution.truss, checks or CheckSettings()
     strength = strengths(truss, checks)
@@ -112,8 +120,16 @@ def report_structure(
         words = f"{truss.member_marks[first]} {worst[first]:.2f} by {governing[first]}"
         said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
     said += _limits(truss, figures, checks)
+    if buckling is not None and (first := float(buckling.values.min(initial=math.inf))) < 1:
+        said.append(f"the structure buckles at {first:.3g} times {buckling.of} by linear theory")
     return StructureReport(
-        truss, tuple(figures), worst if strength.known else None, governing if strength.known else (), tuple(said)
+        truss=truss,
+        cases=tuple(figures),
+        utilization=worst if strength.known else None,
+        governing=governing if strength.known else (),
+        warnings=tuple(said),
+        buckling=buckling,
+        vibration=vibration,
     )
 
 
@@ -175,6 +191,19 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
         )
         for case in cases + chosen
     ]
+
+
+def mode_lines(report: StructureReport) -> list[str]:
+    """Return lines on buckling and vibration, where they were asked for."""
+    said = []
+    if report.buckling is not None:
+        factors = ", ".join(f"{value:.4g}" for value in report.buckling.values)
+        said.append(
+            f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
+        )
+    if report.vibration is not None:
+        said.append("natural frequencies: " + ", ".join(f"{value:.4g}" for value in report.vibration.values) + " Hz")
+    return said
 
 
 STRUCTURE_HEAD = (
