@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .options import Parser
 
 STRUCTURE_SUFFIXES = (".json",)
-NOT_OF_GRID = ("checks", "buckling", "frequencies")  #: settings that the structure itself does not depend on
+NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
@@ -33,6 +33,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
     ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
+    ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
 )  # fmt: skip
@@ -80,6 +81,7 @@ def structure(values: Namespace) -> None:
     from ..structure.json import encode_structure
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
+    from ..structure.sizing import size_members
     from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
 
@@ -88,6 +90,8 @@ def structure(values: Namespace) -> None:
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
+        if settings.size:
+            truss = size_members(truss, settings.size, settings.checks)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         bars("modes", 0.4)
@@ -100,10 +104,14 @@ def structure(values: Namespace) -> None:
         if report_place is not None:
             save.json(report_place, report.to_dict())
     print_table(STRUCTURE_HEAD, structure_lines(report))
+    counts = report.to_dict()["sections"]
+    names = (
+        " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
+    )
     wrote = [*outs, *([report_place] if report_place else [])]
     print_lines(
         [
-            f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {truss.sections[0].name} {truss.material.name},"
+            f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             *mode_lines(report),
             *(f"warning: {words}" for words in report.warnings),

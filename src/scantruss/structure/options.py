@@ -14,7 +14,7 @@ from .checks import CheckSettings
 from .truss import Combination
 
 MOST_MODES = 50  #: of buckling or vibration
-NUMBERS = ("scale", "node_allowance", "buckling", "frequencies")  #: settings that are numbers
+NUMBERS = ("scale", "node_allowance", "size", "buckling", "frequencies")  #: settings that are numbers
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class StructureSettings:
     joints: str = "rigid"
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
+    size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
@@ -37,6 +38,8 @@ class StructureSettings:
 
     def __post_init__(self) -> None:
         """Refuse numbers of modes that are none."""
+        if self.size < 0:
+            raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
         if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
             raise InputError(
                 f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"
@@ -71,7 +74,7 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
             given[name] = loads_of_words(value) if isinstance(value, str) else tuple(value)
         elif name in ("scale", "node_allowance") and isinstance(value, int | float):
             given[name] = float(value)
-        elif name in ("buckling", "frequencies") and isinstance(value, int):
+        elif name in ("size", "buckling", "frequencies") and isinstance(value, int):
             given[name] = value
         elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
             given[name] = str(value)
