@@ -1,5 +1,6 @@
 """Structures made by hand, for the tests of statics."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +22,7 @@ def stiff_along(section: Section = TUBE, factor: float = 1e6) -> Section:
 
 
 def make_truss(
-    nodes: ArrayLike, members: ArrayLike, supports: dict[int, tuple[float, ...]], *cases: LoadCase, **others: Any
+    nodes: ArrayLike, members: ArrayLike, supports: Mapping[int, tuple[float, ...]], *cases: LoadCase, **others: Any
 ) -> Truss:
     """Return a structure of lists; normals point up, or along y of members that stand."""
     nodes = np.asarray(nodes, float)

@@ -143,7 +143,7 @@ def test_patch_of_the_bar_keeps_a_strain_that_is_the_same_everywhere() -> None:
     flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
     truss = Truss.from_grid(flat, scale=1, unit="mm", supports="boundary", joints="pinned")
     field = truss.nodes @ np.array([[1e-3, 4e-4, 0], [4e-4, -2e-3, 0], [0, 0, 0]])
-    rim = truss.supports.any(axis=1)
+    rim = np.isinf(truss.supports[:, 0])
     supports = truss.supports.copy()
     supports[:, 2] = np.inf
     moved = np.where(rim[:, None], field, np.nan)
@@ -338,7 +338,7 @@ def test_a_column_buckles_at_the_load_of_euler(ends: str) -> None:
 
 def test_many_freedoms_have_the_modes_of_few() -> None:
     """Sparse and dense eigenvalues of one structure are the same."""
-    truss = shell(joints=20000.0, loads="self,snow:1kN/m2")
+    truss = Truss.from_grid(dome(7, 40.0), scale=50, joints=20000.0, loads="self,snow:1kN/m2")
     factored = factor_stiffness(truss)
     snow = solve(truss, factored)["snow"]
     sparse = buckling_modes(factored, snow, 3).values, vibration_modes(factored, 3).values

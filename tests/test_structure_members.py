@@ -12,7 +12,7 @@ import scantruss as st
 from scantruss.structure.catalogue import bundled_materials, bundled_sections, find_material, find_section
 from scantruss.structure.checks import (
     CLAUSES,
-    CheckSettings,
+    MemberChecks,
     buckling_curve,
     section_class,
     span_of,
@@ -124,7 +124,7 @@ def test_a_column_buckles_at_the_load_worked_out_by_hand() -> None:
         == pytest.approx(used["6.3.3 bending and compression"])
         == pytest.approx(0.5008, rel=2e-3)
     )
-    half = strengths(truss, CheckSettings(effective_length=0.5))
+    half = strengths(truss, MemberChecks(effective_length=0.5))
     assert half.relative[0] == pytest.approx(strength.relative[0] / 2) and half.buckling[0] > strength.buckling[0]
 
 
@@ -153,8 +153,8 @@ def test_twice_the_load_is_twice_the_use_in_bending_and_more_in_buckling() -> No
 
 def test_what_is_no_steel_of_class_1_to_3_is_not_checked_and_says_so() -> None:
     grid = dome(6, 40.0)
-    for options in ({"section": "R60x120", "material": "GL24h"}, {"section": "CHS508x6.3"}):
-        report = report_structure(solve(Truss.from_grid(grid, scale=50, **options)))
+    for section, material in (("R60x120", "GL24h"), ("CHS508x6.3", "S355")):
+        report = report_structure(solve(Truss.from_grid(grid, scale=50, section=section, material=material)))
         assert report.to_dict()["utilization_max"] is None and report.utilization is None
         assert any("no member is checked" in words for words in report.warnings)
 
@@ -179,4 +179,4 @@ def test_the_span_is_twice_the_way_to_the_nearest_support() -> None:
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), "1"])
 def test_limits_must_be_positive(value: float) -> None:
     with pytest.raises(st.InputError, match="gamma_m0 must be a positive number"):
-        CheckSettings(gamma_m0=value)
+        MemberChecks(gamma_m0=value)

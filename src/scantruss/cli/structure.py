@@ -95,7 +95,8 @@ def structure(values: Namespace) -> None:
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         bars("modes", 0.4)
-        buckling = worst_buckling(factored, solution, settings.buckling) if settings.buckling else None
+        modes = settings.buckling or int(settings.size > 0)
+        buckling = worst_buckling(factored, solution, modes) if modes else None
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
         bars("checks", 0.8)
         report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
@@ -114,6 +115,7 @@ def structure(values: Namespace) -> None:
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             *mode_lines(report),
+            *([] if buckling else ["the stability of the whole is not looked at; --buckling 1 does"]),
             *(f"warning: {words}" for words in report.warnings),
             f"wrote {' '.join(map(str, wrote))}",
         ]

@@ -26,16 +26,17 @@ CLAUSES = (
 )
 #: imperfection factors of the buckling curves, table 6.1
 IMPERFECTION = {"a0": 0.13, "a": 0.21, "b": 0.34, "c": 0.49, "d": 0.76}
-SHORT = 0.2  #: relative slenderness up to which a member does not buckle, 6.3.1.2(4)
+NO_BUCKLING = 0.2  #: relative slenderness up to which a member does not buckle, 6.3.1.2(4)
 
 
 @dataclass(frozen=True)
-class CheckSettings:
+class MemberChecks:
     """What the checks take for granted."""
 
     effective_length: float = 1.0  #: buckling length over system length
     gamma_m0: float = 1.0  #: partial factor of cross-sections, EN 1993-1-1 6.1
     gamma_m1: float = 1.0  #: partial factor of members that buckle, EN 1993-1-1 6.1
+    buckling_factor: float = 10.0  #: least factor of linear buckling for analysis of first order, EN 1993-1-1 5.2.1(3)
     slenderness: float = 200.0  #: greatest buckling length over radius of gyration; practice, no clause
     deflection: float = (
         300.0  #: span over the greatest displacement of SLS; practice, EN 1990 A1.4 leaves it to the client
@@ -70,9 +71,9 @@ def buckling_curve(section: Section, material: Material) -> str:
 def reduction(slenderness: np.ndarray, curve: str) -> np.ndarray:
     """Return chi for relative slendernesses (EN 1993-1-1 6.3.1.2, equation 6.49)."""
     alpha = IMPERFECTION[curve]
-    phi = 0.5 * (1 + alpha * (slenderness - SHORT) + slenderness**2)
+    phi = 0.5 * (1 + alpha * (slenderness - NO_BUCKLING) + slenderness**2)
     chi = 1 / (phi + np.sqrt(np.maximum(phi**2 - slenderness**2, 0.0)))
-    return np.where(slenderness <= SHORT, 1.0, np.minimum(chi, 1.0))
+    return np.where(slenderness <= NO_BUCKLING, 1.0, np.minimum(chi, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ class Strength:
     """What the members of a structure resist [N, Nm]; made once for all load cases."""
 
     truss: Truss
-    settings: CheckSettings
+    settings: MemberChecks
     axial: np.ndarray  #: (M,) N,pl,Rd
     buckling: np.ndarray  #: (M,) N,b,Rd, axes y and z, the smaller
     relative: np.ndarray  #: (M, 2) relative slenderness about y and z
@@ -94,9 +95,9 @@ class Strength:
         return self.truss.material.kind == "steel" and max(self.classes) < 4
 
 
-def strengths(truss: Truss, settings: CheckSettings | None = None) -> Strength:
+def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
     """Return what the members resist."""
-    settings = settings or CheckSettings()
+    settings = settings or MemberChecks()
     material, of = truss.material, truss.of_section
     strength, area = material.yield_strength, of("area")
     classes = tuple(section_class(section, material) for section in truss.sections)
@@ -139,7 +140,7 @@ def utilizations(strength: Strength, result: CaseResult) -> np.ndarray:
     buckling = compression / strength.buckling
     plastic = np.array([cls < 3 for cls in strength.classes])[strength.truss.section_of]
     slender = strength.relative.max(axis=1)
-    growth = np.where(plastic, np.minimum(slender - SHORT, 0.8), np.minimum(0.6 * slender, 0.6))  # tables B.1
+    growth = np.where(plastic, np.minimum(slender - NO_BUCKLING, 0.8), np.minimum(0.6 * slender, 0.6))  # tables B.1
     factor = 1 + np.maximum(growth, 0.0) * buckling
     moments = (result.greatest[:, 4:6] / strength.moment).sum(axis=1) * strength.settings.gamma_m1
     moments /= strength.settings.gamma_m0

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FormatError, InputError
-from .checks import CheckSettings
+from .checks import MemberChecks
 from .truss import Combination
 
 MOST_MODES = 50  #: of buckling or vibration
@@ -34,7 +34,7 @@ class StructureSettings:
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
-    checks: CheckSettings = field(default_factory=CheckSettings)  #: of a file
+    checks: MemberChecks = field(default_factory=MemberChecks)  #: of a file
 
     def __post_init__(self) -> None:
         """Refuse numbers of modes that are none."""
@@ -64,7 +64,7 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
     known = {spec.name for spec in fields(StructureSettings)} - {"combinations", "checks"}
     given: dict[str, Any] = {}
     checks: dict[str, Any] = {}
-    check_names = {spec.name for spec in fields(CheckSettings)}
+    check_names = {spec.name for spec in fields(MemberChecks)}
     for name, value in values.items():
         if name in check_names:
             checks[name] = value
@@ -82,7 +82,7 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
             raise InputError(
                 f"{path} has {name!r} = {value!r}; known are {' '.join(sorted(known | check_names | {'combinations'}))}"
             )
-    return StructureSettings(**given, checks=CheckSettings(**checks))
+    return StructureSettings(**given, checks=MemberChecks(**checks))
 
 
 def loads_of_words(words: str) -> tuple[Any, ...]:

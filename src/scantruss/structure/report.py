@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .checks import CLAUSES, CheckSettings, span_of, strengths, utilizations
+from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .modes import Modes
 from .statics import CaseResult, Solution
 from .truss import Truss
@@ -76,7 +76,7 @@ class StructureReport:
 
 def report_structure(
     solution: Solution,
-    checks: CheckSettings | None = None,
+    checks: MemberChecks | None = None,
     notes: Sequence[str] = (),
     *,
     buckling: Modes | None = None,
@@ -88,16 +88,16 @@ def report_structure(
     ----------
     solution : Solution
         Of `solve`.
-    checks : CheckSettings, optional
+    checks : MemberChecks, optional
         Buckling length, partial factors, limits.
     notes : sequence of str
         Warnings of whoever made the structure.
     buckling, vibration : Modes, optional
         Of `worst_buckling` and `vibration_modes`.
     """
-    truss, checks = solution.truss, checks or CheckSettings()
+    truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)
-    any_uls = any(combination.state == "ULS" for combination in truss.combinations)
+    any_uls: bool = any(combination.state == "ULS" for combination in truss.combinations)
     worst, clause, load = (
         np.zeros(len(truss.members)),
         np.zeros(len(truss.members), int),
@@ -116,12 +116,15 @@ def report_structure(
         why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
         said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
     elif (over := int((worst > 1).sum())) > 0:
-        first = int(worst.argmax())
-        words = f"{truss.member_marks[first]} {worst[first]:.2f} by {governing[first]}"
+        most = int(worst.argmax())
+        words = f"{truss.member_marks[most]} {worst[most]:.2f} by {governing[most]}"
         said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
     said += _limits(truss, figures, checks)
-    if buckling is not None and (first := float(buckling.values.min(initial=math.inf))) < 1:
-        said.append(f"the structure buckles at {first:.3g} times {buckling.of} by linear theory")
+    if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
+        said.append(
+            f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
+            " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
+        )
     return StructureReport(
         truss=truss,
         cases=tuple(figures),
@@ -149,7 +152,7 @@ def _figures_of(result: CaseResult, used: np.ndarray | None) -> CaseFigures:
     )
 
 
-def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: CheckSettings) -> list[str]:
+def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) -> list[str]:
     """Return warnings of slender members and great displacements."""
     said = []
     radius = np.array([section.radius for section in truss.sections])[truss.section_of]

@@ -6,11 +6,13 @@ import numpy as np
 
 from ..errors import InputError
 from .catalogue import Section, bundled_sections
-from .checks import CheckSettings, section_class, strengths, utilizations
-from .statics import CaseResult, solve
+from .checks import MemberChecks, section_class, strengths, utilizations
+from .modes import worst_buckling
+from .statics import CaseResult, Solution, factor_stiffness, solve
 from .truss import Truss
 
-ROUNDS = 30  #: of solving and choosing
+ROUNDS = 60  #: of solving and choosing
+GROWTH = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
 
 
 def candidates(truss: Truss) -> list[Section]:
@@ -38,12 +40,13 @@ def candidates(truss: Truss) -> list[Section]:
     return chain
 
 
-def size_members(truss: Truss, count: int, checks: CheckSettings | None = None) -> Truss:
+def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -> Truss:
     """Return the structure with sections that pass all checks under all ULS combinations (all load cases where there are none).
 
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
     that resists its forces, never a lighter one than before; then the sections are made few, at the least mass, by heavier
-    ones.
+    ones. Once all pass, the lightest sections grow until the structure buckles at no less than the factor of the checks (EN 1993-1-1
+    5.2.1(3)).
 
     Parameters
     ----------
@@ -51,7 +54,7 @@ def size_members(truss: Truss, count: int, checks: CheckSettings | None = None) 
         Its first section tells the kind.
     count : int
         Different sections at most.
-    checks : CheckSettings, optional
+    checks : MemberChecks, optional
         Buckling length, partial factors.
 
     Raises
@@ -63,26 +66,40 @@ def size_members(truss: Truss, count: int, checks: CheckSettings | None = None) 
         raise InputError(f"the number of different sections must be 1 or more, got {count}")
     chain = candidates(truss)
     chosen = np.zeros(len(truss.members), np.int64)
-    checks = checks or CheckSettings()
+    checks = checks or MemberChecks()
     for _ in range(ROUNDS):
         chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
-        needed = _needed(truss, chosen, checks)
+        factored = factor_stiffness(truss)
+        solution = solve(truss, factored)
+        needed = _needed(solution, chosen, checks)
+        if (needed <= chosen).all():
+            least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
+            if least < checks.buckling_factor:
+                needed = _stiffer(chosen, chain, checks.buckling_factor / least)
         if (needed <= chosen).all():
             kept, numbers = np.unique(chosen, return_inverse=True)
             return truss.replace(sections=tuple(chain[k] for k in kept), section_of=numbers.ravel().astype(np.int64))
         if needed.max() == len(chain):
             mark = truss.member_marks[int(needed.argmax())]
             raise InputError(
-                f"no section up to {chain[-1].name} passes for {mark}; use more supports or shorter members"
+                f"no section up to {chain[-1].name} is enough at {mark}; use more supports or shorter members"
             )
         chosen = np.maximum(chosen, needed)
     raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")
 
 
-def _needed(truss: Truss, chosen: np.ndarray, checks: CheckSettings) -> np.ndarray:
+def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndarray:
+    """Return sections of which the lightest has grown in bending, as much as buckling lacks and at most half as much again."""
+    inertia = np.array([section.inertia_y for section in chain])
+    least = int(chosen.min())
+    grown = max(least + 1, int(np.searchsorted(inertia, inertia[least] * min(factor, GROWTH))))
+    return np.maximum(chosen, grown)
+
+
+def _needed(solution: Solution, chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
     """Return for each member the first section of the structure, from the chosen one on, that resists its forces of every combination."""
-    solution = solve(truss)
+    truss = solution.truss
     judged = [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
     needed = chosen.copy()
     for result in judged:
@@ -95,7 +112,7 @@ def _needed(truss: Truss, chosen: np.ndarray, checks: CheckSettings) -> np.ndarr
     return needed
 
 
-def _use(truss: Truss, result: CaseResult, checks: CheckSettings) -> np.ndarray:
+def _use(truss: Truss, result: CaseResult, checks: MemberChecks) -> np.ndarray:
     """Return the (M,) greatest utilization of members under the forces of a result."""
     used: np.ndarray = utilizations(strengths(truss, checks), result).max(axis=1)
     return used

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from .truss import Truss
 
-CORNER_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
+SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
 SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME"
 HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
 
@@ -110,4 +110,4 @@ def _corners(nodes: np.ndarray, loop: np.ndarray) -> np.ndarray:
     cosine = (before * after).sum(axis=1) / np.maximum(product, 1e-300)
     turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     around = np.max([np.roll(turn, step) for step in (-2, -1, 1, 2)], axis=0)
-    return loop[(turn > CORNER_TURN) & (turn >= around - 1e-6)]
+    return loop[(turn > SUPPORT_TURN) & (turn >= around - 1e-6)]

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..grid.marks import member_marks, node_marks
-from ..settings import UNITS
-from .catalogue import Material, Section, find_material, find_section
+from .catalogue import Material, Section
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -159,52 +156,21 @@ class Truss:
         InputError
             The unit is not known, a name is not known, there is no support, or a load cannot be understood.
         """
-        from .loads import cases_of, usual_combinations
-        from .supports import node_sets, support_nodes, support_stiffness
-
-        if grid.unit and unit and unit != grid.unit:
-            raise InputError(f"the grid is in {grid.unit}, not in {unit}; leave --unit out")
-        metres = scale_of(grid.unit or unit, scale)
-        pinned, spring = _joints(joints)
-        nodes = np.ascontiguousarray(grid.nodes, float) * metres
-        members, triangles = np.asarray(grid.edges, np.int64), np.asarray(grid.triangles, np.int64)
-        if len(members) == 0:
-            raise InputError("the grid has no members; a structure needs some")
-        lengths = np.linalg.norm(nodes[members[:, 0]] - nodes[members[:, 1]], axis=1)
-        if lengths.min() <= 0:
-            a, b = members[lengths.argmin()]
-            raise InputError(f"member {member_marks(grid)[lengths.argmin()]} between nodes {a} and {b} has no length")
-        areas = area_vectors(nodes, triangles)
-        if areas[:, 2].sum() < -1e-9 * np.abs(areas).sum():  # a shell is loaded from above
-            triangles, areas = triangles[:, ::-1].copy(), -areas
-        node_normals = np.zeros_like(nodes)
-        for corner in triangles.T:
-            np.add.at(node_normals, corner, areas)
-        node_normals = _unit(node_normals)
-        truss = cls(
-            nodes=nodes,
-            members=members,
-            triangles=triangles,
-            node_normals=node_normals,
-            member_normals=_unit(_at_members(grid, _unit(areas))),
-            sections=(find_section(section) if isinstance(section, str) else section,),
-            section_of=np.zeros(len(members), np.int64),
-            material=find_material(material) if isinstance(material, str) else material,
-            supports=np.zeros((len(nodes), 6)),
-            end_stiffness=np.full((len(members), 2, 2), spring),
-            pinned=pinned,
-            node_sets=node_sets(grid),
-            origin=np.asarray(grid.origin, float) * metres,
-            node_marks=tuple(node_marks(grid)),
-            member_marks=tuple(member_marks(grid)),
-            scale=float(scale),
+        build = import_module("scantruss.structure.build")  # it needs this record
+        truss: Truss = build.truss_of_grid(
+            grid,
+            scale=scale,
+            unit=unit,
+            section=section,
+            material=material,
+            supports=supports,
+            support_type=support_type,
+            loads=loads,
+            joints=joints,
+            node_allowance=node_allowance,
+            combinations=combinations,
         )
-        held = support_nodes(truss, supports)
-        truss = truss.replace(supports=support_stiffness(len(nodes), held, support_type))
-        cases = cases_of(truss, loads, node_allowance)
-        return truss.replace(
-            cases=cases, combinations=usual_combinations(cases) if combinations is None else tuple(combinations)
-        )
+        return truss
 
     @property
     def warnings(self) -> list[str]:
@@ -223,52 +189,6 @@ def area_vectors(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the (T, 3) area vectors of triangles, along their normals."""
     a, b, c = (nodes[corner] for corner in triangles.T)
     return np.cross(b - a, c - a) / 2
-
-
-def scale_of(unit: str, scale: float) -> float:
-    """Return the metres of the structure for one unit of the grid.
-
-    Raises
-    ------
-    InputError
-        The unit is not known, or the scale is no positive number.
-    """
-    if not (isinstance(scale, int | float) and 0 < scale < math.inf):
-        raise InputError(f"scale must be a positive number, got {scale!r}")
-    metres = UNITS.get(unit)
-    if not metres:
-        known = " ".join(name for name in UNITS if name)
-        got = f"no unit {unit!r}" if unit else "the unit of the grid is not known"
-        raise InputError(f"{got}, and a structure needs lengths in metres; give --unit, one of {known}")
-    return metres * scale
-
-
-def _joints(joints: str | float) -> tuple[bool, float]:
-    """Return whether members carry axial forces only, and the stiffness of the springs at their ends."""
-    if joints == "pinned":
-        return True, 0.0
-    if joints == "rigid":
-        return False, math.inf
-    try:
-        stiffness = float(joints)
-    except (TypeError, ValueError):
-        stiffness = -1.0
-    if not stiffness > 0:
-        raise InputError(f"joints must be rigid, pinned or a rotational stiffness in Nm/rad, got {joints!r}")
-    return False, stiffness
-
-
-def _at_members(grid: Grid, normals: np.ndarray) -> np.ndarray:
-    """Return the (E, 3) sums of the normals of the triangles at each member."""
-    total = np.zeros((len(grid.edges), 3))
-    np.add.at(total, grid.half_edge_edges, np.tile(normals, (3, 1)))
-    return total
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors of length 1; those without length stay as they are."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _readable(length: float) -> str:
