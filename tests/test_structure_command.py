@@ -28,7 +28,10 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(words: str) -> int:
-    return main(words.split())
+    """Run a command, on the boundary where it names no supports."""
+    given = words.split()
+    usual = [] if "--supports" in words or "--settings" in words else ["--supports", "boundary"]
+    return main([*given, *usual])
 
 
 def test_the_report_holds_what_it_promises(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +71,7 @@ def test_a_structure_is_read_back_to_the_last_bit(place: Path) -> None:
         {"settlement": [0, 0, -0.01], "nodes": "N001"},
         "temperature:30K",
     ]
-    truss = st.Truss.from_grid(grid, scale=50, loads=table, joints=5000.0)
+    truss = st.Truss.from_grid(grid, supports="boundary", scale=50, loads=table, joints=5000.0)
     Path("out.json").write_bytes(encode_structure(truss))
     back = st.read_structure("out.json")
     assert encode_structure(back) == encode_structure(truss)
@@ -137,7 +140,9 @@ def test_everything_can_stand_in_a_settings_file(place: Path) -> None:
     assert weights[0] == pytest.approx(-1.2 * 9.80665 * report["mass"])
     assert run("structure grid.json out.json --settings settings.toml --section CHS114.3x5 --report report.json") == 0
     assert list(json.loads(Path("report.json").read_text())["sections"]) == ["CHS114.3x5"]
-    Path("settings.json").write_text(json.dumps({"scale": 50, "loads": "self,snow:1kN/m2", "joints": 5000}))
+    Path("settings.json").write_text(
+        json.dumps({"scale": 50, "supports": "boundary", "loads": "self,snow:1kN/m2", "joints": 5000})
+    )
     assert run("structure grid.json out.json --settings settings.json") == 0
     Path("more.json").write_text(json.dumps({"loads": [{"case": "lamp", "force": [0, 0, -100], "nodes": "N025"}]}))
     assert run("structure grid.json out.json --scale 50 --loads self,more.json --report report.json") == 0
@@ -167,7 +172,8 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --material S350", "no material 'S350' is known; nearest are S355"),
         ("grid.json out.json --supports fixed", "no supports: the grid has no fixed nodes"),
         ("grid.json out.json --supports line:ring", "no supports: the grid has no line:ring; nearest are line:rim"),
-        ("grid.json out.json --supports somewhere", "supports must be corners, boundary, lowest:H"),
+        ("grid.json out.json --supports=", "no supports; name some with --supports: corners"),
+        ("grid.json out.json --supports somewhere", "no supports 'somewhere'; name some with --supports: corners, boundary, lowest:H"),
         ("grid.json out.json --support-type glued", "support type must be pinned, fixed, roller or springs:K"),
         ("grid.json out.json --support-type springs", "needs a stiffness, such as springs:5MN/m"),
         ("grid.json out.json --support-type roller", "a mechanism: the supports let the whole structure move"),
@@ -219,7 +225,7 @@ def test_what_cannot_be_used_is_one_line(
 def test_a_settings_file_that_cannot_be_used_is_one_line(
     text: str, said: str, place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("settings.toml").write_text(text)
+    Path("settings.toml").write_text(f"supports = 'boundary'\n{text}")
     assert run("structure grid.json out.json --settings settings.toml") == 2
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1 and not Path("out.json").exists()
@@ -275,6 +281,6 @@ def test_a_damaged_structure_is_refused(change: dict[str, Any], said: str, place
 
 def test_a_grid_without_members_or_with_one_of_no_length_is_refused() -> None:
     with pytest.raises(st.InputError, match="no members"):
-        st.Truss.from_grid(make_grid([(0, 0, 0)], []))
+        st.Truss.from_grid(make_grid([(0, 0, 0)], []), supports="boundary")
     with pytest.raises(st.InputError, match="has no length"):
-        st.Truss.from_grid(make_grid([(0, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 1, 2)]))
+        st.Truss.from_grid(make_grid([(0, 0, 0), (0, 0, 0), (1, 0, 0)], [(0, 1, 2)]), supports="boundary")

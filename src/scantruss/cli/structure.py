@@ -25,7 +25,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
     ("supports", "WHERE|FILE",
-     "corners, boundary (default), lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
+     "corners, boundary, lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
      " positions X,Y,Z in the frame of the scan"),
     ("support_type", "TYPE", "pinned (default), fixed, roller or springs:K, with K such as 5MN/m"),
     ("joints", "TYPE", "rigid (default), pinned (axial forces only) or the stiffness of springs at the member ends in Nm/rad"),
@@ -45,7 +45,7 @@ def structure_parser() -> Parser:
 
     parser = Parser(
         "structure",
-        "GRID OUT.json [--section CHS114.3x5] [--supports corners] [--loads self,snow:1kN/m2] [options]",
+        "GRID OUT.json --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")

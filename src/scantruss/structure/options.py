@@ -25,7 +25,7 @@ class StructureSettings:
     unit: str = ""
     section: str = "CHS114.3x5"
     material: str = "S355"
-    supports: str = "boundary"
+    supports: str = ""
     support_type: str = "pinned"
     joints: str = "rigid"
     loads: tuple[Any, ...] = ("self",)

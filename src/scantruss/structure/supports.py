@@ -50,6 +50,10 @@ def support_nodes(truss: Truss, where: str | np.ndarray) -> np.ndarray:
         if len(ids) == 0 or ids.min() < 0 or ids.max() >= len(truss.nodes):
             raise InputError(f"supports must be ids of nodes, 0 to {len(truss.nodes) - 1}, and at least one")
         return np.unique(ids)
+    if not where.strip():
+        raise InputError(
+            f"no supports; name some with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
+        )
     found = [_nodes_of(truss, word.strip()) for word in where.split("+")]
     return np.unique(np.concatenate(found))
 
@@ -94,7 +98,9 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
         raise InputError(f"no supports: the grid has no {word}; nearest are {' '.join(near)}")
     if word.startswith("line:"):
         raise InputError(f"no supports: the grid has no lines, so no {word}")
-    raise InputError(f"supports must be {SUPPORT_WAYS}, a node such as N001 or a file of positions, got {word!r}")
+    raise InputError(
+        f"no supports {word!r}; name some with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
+    )
 
 
 def _length(points: np.ndarray) -> float:

@@ -119,7 +119,7 @@ class Truss:
         unit: str = "",
         section: str | Section = "CHS114.3x5",
         material: str | Material = "S355",
-        supports: str | np.ndarray = "boundary",
+        supports: str | np.ndarray,
         support_type: str = "pinned",
         loads: str | Sequence[Any] = "self",
         joints: str | float = "rigid",
