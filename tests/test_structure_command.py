@@ -219,6 +219,10 @@ def test_what_cannot_be_used_is_one_line(
         ("[[loads]]\nforce = [0, 0, 1]\nline = [0, 0, 1]", "a load needs one of load, force"),
         ("[[loads]]\nline = [0, 0, 1]\nmembers = ['M9999']", "names members that are not there"),
         ("[[loads]]\nsettlement = [0, 0, 1]\nnodes = 'N025'", "moves N025, which no support holds"),
+        (
+            "[[combinations]]\nname = 'self'\nfactors = { self = 1.0 }",
+            "two load cases or combinations are named 'self'",
+        ),
         ("[[loads]]\npush = 3", "a load has no 'push'"),
     ],
 )

@@ -168,6 +168,7 @@ def _nodes_near(grid: Grid, path: str) -> np.ndarray:
 
 def _notes(settings: StructureSettings) -> list[str]:
     """Return warnings of what was taken for granted."""
-    if any(isinstance(load, str) and load.startswith("wind:") and ":" not in load[5:] for load in settings.loads):
+    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
+    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
         return ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
     return []

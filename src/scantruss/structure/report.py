@@ -163,7 +163,7 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
             f"{over.sum():,} of {len(over):,} members are more slender than {checks.slenderness:g}, the most {first} with"
             f" {slender.max():.0f}"
         )
-    service = [case for case in figures if case.state == "SLS"] or list(figures)
+    service = [each for each in figures if each.state == "SLS"] or [each for each in figures if each.state == "case"]
     most = max(service, key=lambda case: case.displacement_max)
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:

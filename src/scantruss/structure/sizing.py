@@ -12,7 +12,7 @@ from .statics import CaseResult, Solution, factor_stiffness, solve
 from .truss import Truss
 
 ROUNDS = 60  #: of solving and choosing
-GROWTH = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
+GROWTH_A_ROUND = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
 
 
 def candidates(truss: Truss) -> list[Section]:
@@ -93,7 +93,7 @@ def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndar
     """Return sections of which the lightest has grown in bending, as much as buckling lacks and at most half as much again."""
     inertia = np.array([section.inertia_y for section in chain])
     least = int(chosen.min())
-    grown = max(least + 1, int(np.searchsorted(inertia, inertia[least] * min(factor, GROWTH))))
+    grown = max(least + 1, int(np.searchsorted(inertia, inertia[least] * min(factor, GROWTH_A_ROUND))))
     return np.maximum(chosen, grown)
 
 

@@ -228,10 +228,13 @@ def check_whole(truss: Truss) -> None:
     Raises
     ------
     InputError
-        There is no support; a load does not suit the joints; a settlement is of a node that is not held.
+        There is no support; a name stands twice; a load does not suit the joints; a settlement is of a node that is not held.
     """
     if not truss.supports.any():
         raise InputError("no supports: hold some nodes, as with --supports boundary")
+    names = [case.name for case in truss.cases] + [combination.name for combination in truss.combinations]
+    if twice := next((name for name in names if names.count(name) > 1), ""):
+        raise InputError(f"two load cases or combinations are named {twice!r}; give each a name of its own")
     for case in truss.cases:
         if truss.pinned and case.nodal is not None and case.nodal[:, 3:].any():
             raise InputError(f"the load case {case.name!r} has moments on nodes, which pinned members cannot carry")
