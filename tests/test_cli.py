@@ -334,7 +334,7 @@ def test_help_and_version_import_nothing_heavy() -> None:
     heavy = "numpy numba rich scipy trimesh laspy matplotlib"
     code = (
         "import sys, scantruss.cli.main as cli\n"
-        "for words in '--help', 'grid --help', 'clean --help', 'info -h', 'print --help', 'demo -h', '--version', '':\n"
+        "for words in '--help', 'grid --help', 'clean --help', 'info -h', 'print --help', 'structure -h', 'demo -h', '--version', '':\n"
         "    assert cli.main(words.split()) == 0\n"
         f"assert not set('{heavy}'.split()) & set(sys.modules)"
     )

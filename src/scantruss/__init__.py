@@ -49,6 +49,9 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .schedules.records import Schedules as Schedules
     from .schedules.settings import ScheduleSettings as ScheduleSettings
     from .settings import Settings as Settings
+    from .structure.json import read_structure as read_structure
+    from .structure.statics import solve as solve
+    from .structure.truss import Truss as Truss
     from .surface.samples import sample_surface as sample_surface
 
 __version__ = "0.1.0"
@@ -72,6 +75,7 @@ _HOMES = {
     "print_model": "export.solid",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",
+    "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
 }  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])

@@ -17,6 +17,7 @@ from .info import info, info_parser
 from .print import print_parser, print_solid
 from .schedule import make_schedule, schedule_parser
 from .splice import splice, splice_parser
+from .structure import structure, structure_parser
 from .sweep import sweep, sweep_parser
 from .thin import thin, thin_parser
 
@@ -37,6 +38,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
     "schedule": (schedule_parser, make_schedule),
+    "structure": (structure_parser, structure),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),

@@ -1,0 +1,174 @@
+"""The command ``scantruss structure``: supports, loads, linear statics and checks of a saved grid."""
+
+from __future__ import annotations
+
+from argparse import SUPPRESS, Namespace
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from .outputs import Taken, claim, outs_of
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..grid.grid import Grid
+    from ..structure.options import StructureSettings
+    from .options import Parser
+
+STRUCTURE_SUFFIXES = (".json",)
+NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
+OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
+    ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
+    ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
+    ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, R100x200 or FILE.csv[:NAME]"),
+    ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
+    ("supports", "WHERE|FILE",
+     "corners, boundary, lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
+     " positions X,Y,Z in the frame of the scan"),
+    ("support_type", "TYPE", "pinned (default), fixed, roller or springs:K, with K such as 5MN/m"),
+    ("joints", "TYPE", "rigid (default), pinned (axial forces only) or the stiffness of springs at the member ends in Nm/rad"),
+    ("loads", "LOAD,...|FILE",
+     "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
+     " loads (default self)"),
+    ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
+    ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
+    ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
+    ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
+)  # fmt: skip
+
+
+def structure_parser() -> Parser:
+    """Options of ``scantruss structure``."""
+    from .options import Parser, add_outs, number, whole_number
+
+    parser = Parser(
+        "structure",
+        "GRID OUT.json --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
+        "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
+    )
+    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    add_outs(parser, "structure with its results, .json", "*")
+    parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
+    parser.add_argument(
+        "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
+    )
+    for name, metavar, said in OWN_OPTIONS:
+        kind = {"NUMBER": number, "COUNT": whole_number}.get(metavar, str)
+        parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
+    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    return parser
+
+
+def structure(values: Namespace) -> None:
+    """Make the structure of a saved grid, solve it and save it."""
+    from ..report.terminal import Bars, print_lines, print_table
+    from ..runtime.files import SaveTogether, check_place
+
+    outs = [check_place(out, STRUCTURE_SUFFIXES) for out in outs_of(values)]
+    if not Path(values.grid).exists():
+        raise InputError(f"there is no file {values.grid}; structure needs a grid saved as .json by scantruss grid")
+    report_place = None if values.report is None else check_place(values.report, (".json",))
+    settings = structure_settings(values)
+    taken = _inputs(values)
+    for out in outs:
+        claim(out, "structure", taken, force=values.force)
+    if report_place is not None:
+        claim(report_place, "report", taken, force=values.force)
+    from ..export.json import read_grid
+    from ..grid.certificate import check_passed
+    from ..structure.json import encode_structure
+    from ..structure.modes import vibration_modes, worst_buckling
+    from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
+    from ..structure.sizing import size_members
+    from ..structure.statics import factor_stiffness, solve
+    from ..structure.truss import Truss
+
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        grid = read_grid(values.grid)
+        check_passed(grid, values.keep_failed)
+        bars("structure", 0.1)
+        truss = Truss.from_grid(grid, **_arguments(grid, settings))
+        if settings.size:
+            truss = size_members(truss, settings.size, settings.checks)
+        factored = factor_stiffness(truss)
+        solution = solve(truss, factored)
+        bars("modes", 0.4)
+        modes = settings.buckling or int(settings.size > 0)
+        buckling = worst_buckling(factored, solution, modes) if modes else None
+        vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
+        bars("checks", 0.8)
+        report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
+        for out in outs:
+            save.beside(out).write_bytes(encode_structure(truss, solution, report))
+        if report_place is not None:
+            save.json(report_place, report.to_dict())
+    print_table(STRUCTURE_HEAD, structure_lines(report))
+    counts = report.to_dict()["sections"]
+    names = (
+        " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
+    )
+    wrote = [*outs, *([report_place] if report_place else [])]
+    print_lines(
+        [
+            f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
+            f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
+            *mode_lines(report),
+            *([] if buckling else ["the stability of the whole is not looked at; --buckling 1 does"]),
+            *(f"warning: {words}" for words in report.warnings),
+            f"wrote {' '.join(map(str, wrote))}",
+        ]
+    )
+
+
+def structure_settings(values: Namespace) -> StructureSettings:
+    """Return the settings of a command line: those of ``--settings``, overridden by explicit options."""
+    from ..structure.options import StructureSettings, loads_of_words, read_structure_settings
+
+    kept = read_structure_settings(values.settings) if values.settings else StructureSettings()
+    given = {spec.name: vars(values)[spec.name] for spec in fields(StructureSettings) if spec.name in vars(values)}
+    if "loads" in given:
+        given["loads"] = loads_of_words(given["loads"])
+    return kept.replace(**given)
+
+
+def _inputs(values: Namespace) -> Taken:
+    """Return the files that the command line names for reading."""
+    named = [(values.grid, "grid"), (values.settings, "settings")]
+    words = [*str(vars(values).get("loads", "")).split(",")]
+    words += [str(vars(values).get(name, "")).partition(".csv:")[0] for name in ("section", "material", "supports")]
+    named += [(word, "file of the structure") for word in words if word and Path(word).is_file()]
+    return {Path(name).resolve(): what for name, what in named if name}
+
+
+def _arguments(grid: Grid, settings: StructureSettings) -> dict[str, Any]:
+    """Return the settings as `Truss.from_grid` takes them."""
+    given = {spec.name: getattr(settings, spec.name) for spec in fields(settings) if spec.name not in NOT_OF_GRID}
+    if Path(settings.supports).is_file():
+        given["supports"] = _nodes_near(grid, settings.supports)
+    return given
+
+
+def _nodes_near(grid: Grid, path: str) -> np.ndarray:
+    """Return the nodes at the positions of a file, each within half a member."""
+    import numpy as np
+
+    from .positions import read_positions
+
+    found, reach = [], float(grid.lengths.mean()) / 2
+    for place in read_positions(path):
+        distance = np.linalg.norm(grid.scan_nodes - place, axis=1)
+        if distance.min() > reach:
+            words = ", ".join(f"{c:g}" for c in place)
+            raise InputError(f"{path}: no node lies within half a member, {reach:.3g} {grid.unit}, of {words}")
+        found.append(int(distance.argmin()))
+    return np.unique(found)
+
+
+def _notes(settings: StructureSettings) -> list[str]:
+    """Return warnings of what was taken for granted."""
+    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
+    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
+        return ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return []

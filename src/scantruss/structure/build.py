@@ -1,0 +1,125 @@
+"""From a grid to a structure: units, normals, supports and loads of `Truss.from_grid`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..grid.marks import member_marks, node_marks
+from ..settings import UNITS
+from .catalogue import Material, Section, find_material, find_section
+from .loads import cases_of, usual_combinations
+from .supports import node_sets, support_nodes, support_stiffness
+from .truss import Combination, Truss, area_vectors
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+
+
+def truss_of_grid(
+    grid: Grid,
+    *,
+    scale: float,
+    unit: str,
+    section: str | Section,
+    material: str | Material,
+    supports: str | np.ndarray,
+    support_type: str,
+    loads: str | Sequence[Any],
+    joints: str | float,
+    node_allowance: float,
+    combinations: Sequence[Combination] | None,
+) -> Truss:
+    """Return the structure of a grid; see `Truss.from_grid`."""
+    if grid.unit and unit and unit != grid.unit:
+        raise InputError(f"the grid is in {grid.unit}, not in {unit}; leave --unit out")
+    metres = scale_of(grid.unit or unit, scale)
+    pinned, spring = _joints(joints)
+    nodes = np.ascontiguousarray(grid.nodes, float) * metres
+    members, triangles = np.asarray(grid.edges, np.int64), np.asarray(grid.triangles, np.int64)
+    if len(members) == 0:
+        raise InputError("the grid has no members; a structure needs some")
+    marks = member_marks(grid)
+    lengths = np.linalg.norm(nodes[members[:, 0]] - nodes[members[:, 1]], axis=1)
+    if lengths.min() <= 0:
+        raise InputError(f"member {marks[int(lengths.argmin())]} has no length; a structure needs nodes apart")
+    areas = area_vectors(nodes, triangles)
+    if areas[:, 2].sum() < -1e-9 * np.abs(areas).sum():  # a shell is loaded from above
+        triangles, areas = triangles[:, ::-1].copy(), -areas
+    node_normals = np.zeros_like(nodes)
+    for corner in triangles.T:
+        np.add.at(node_normals, corner, areas)
+    truss = Truss(
+        nodes=nodes,
+        members=members,
+        triangles=triangles,
+        node_normals=_unit(node_normals),
+        member_normals=_unit(_at_members(grid, _unit(areas))),
+        sections=(find_section(section) if isinstance(section, str) else section,),
+        section_of=np.zeros(len(members), np.int64),
+        material=find_material(material) if isinstance(material, str) else material,
+        supports=np.zeros((len(nodes), 6)),
+        end_stiffness=np.full((len(members), 2, 2), spring),
+        pinned=pinned,
+        node_sets=node_sets(grid),
+        origin=np.asarray(grid.origin, float) * metres,
+        node_marks=tuple(node_marks(grid)),
+        member_marks=tuple(marks),
+        scale=float(scale),
+    )
+    held = support_nodes(truss, supports)
+    truss = truss.replace(supports=support_stiffness(len(nodes), held, support_type))
+    cases = cases_of(truss, loads, node_allowance)
+    return truss.replace(
+        cases=cases, combinations=usual_combinations(cases) if combinations is None else tuple(combinations)
+    )
+
+
+def scale_of(unit: str, scale: float) -> float:
+    """Return the metres of the structure for one unit of the grid.
+
+    Raises
+    ------
+    InputError
+        The unit is not known, or the scale is no positive number.
+    """
+    if not (isinstance(scale, int | float) and 0 < scale < math.inf):
+        raise InputError(f"scale must be a positive number, got {scale!r}")
+    metres = UNITS.get(unit)
+    if not metres:
+        known = " ".join(name for name in UNITS if name)
+        got = f"no unit {unit!r}" if unit else "the unit of the grid is not known"
+        raise InputError(f"{got}, and a structure needs lengths in metres; give --unit, one of {known}")
+    return metres * scale
+
+
+def _joints(joints: str | float) -> tuple[bool, float]:
+    """Return whether members carry axial forces only, and the stiffness of the springs at their ends."""
+    if joints == "pinned":
+        return True, 0.0
+    if joints == "rigid":
+        return False, math.inf
+    try:
+        stiffness = float(joints)
+    except (TypeError, ValueError):
+        stiffness = -1.0
+    if not stiffness > 0:
+        raise InputError(f"joints must be rigid, pinned or a rotational stiffness in Nm/rad, got {joints!r}")
+    return False, stiffness
+
+
+def _at_members(grid: Grid, normals: np.ndarray) -> np.ndarray:
+    """Return the (E, 3) sums of the normals of the triangles at each member."""
+    total = np.zeros((len(grid.edges), 3))
+    np.add.at(total, grid.half_edge_edges, np.tile(normals, (3, 1)))
+    return total
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors of length 1; those without length stay as they are."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

@@ -1,0 +1,179 @@
+"""Our own format of a structure: JSON that holds it without loss, and its results for other programs.
+
+The structure is read back to the last bit; the results follow from it and are not read back. A stiffness that is infinite is
+"rigid", what is not given is null. No dates are written: the same structure gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FormatError
+from ..runtime.ours import MARK
+from .catalogue import Material, Section
+from .report import StructureReport
+from .statics import Solution
+from .truss import Combination, LoadCase, Truss
+
+STRUCTURE_FORMAT = "scantruss-structure"
+STRUCTURE_VERSION = 1
+UNITS_WRITTEN = {"length": "m", "force": "N", "mass": "kg"}
+_ARRAYS = {  # of the record: columns and type
+    "nodes": (3, float), "members": (2, int), "triangles": (3, int), "node_normals": (3, float), "member_normals": (3, float),
+    "section_of": (1, int), "supports": (6, float),
+}  # fmt: skip
+_OF_CASE = {"nodal": 6, "line": 3, "temperature": 1, "strain": 1, "settlement": 3}  # columns
+
+
+def encode_structure(truss: Truss, solution: Solution | None = None, report: StructureReport | None = None) -> bytes:
+    """Return the text of the JSON file, one line per node, member and triangle."""
+    values: dict[str, Any] = {
+        "format": STRUCTURE_FORMAT,
+        "format_version": STRUCTURE_VERSION,
+        "made_by": MARK,
+        "units": UNITS_WRITTEN,
+        "scale": truss.scale,
+        "pinned": truss.pinned,
+        "origin": truss.origin,
+        "material": asdict(truss.material),
+        "sections": [asdict(section) for section in truss.sections],
+        "node_marks": list(truss.node_marks),
+        "member_marks": list(truss.member_marks),
+        "node_sets": truss.node_sets,
+        **{name: getattr(truss, name) for name in _ARRAYS},
+        "end_stiffness": truss.end_stiffness.reshape(-1, 4),
+        "cases": [vars(case) for case in truss.cases],
+        "combinations": [{**vars(each), "factors": dict(each.factors)} for each in truss.combinations],
+    }
+    if solution is not None:
+        values["results"] = [
+            {
+                "name": case.name,
+                "displacements": case.displacements,
+                "reactions": {
+                    truss.node_marks[n]: case.reactions[n] for n in np.flatnonzero(case.reactions.any(axis=1))
+                },
+                "axial": case.axial,
+            }
+            for case in solution.cases
+        ]
+    if report is not None:
+        values["report"] = report.to_dict()
+        values["utilization"] = report.utilization
+        values["governing"] = list(report.governing)
+        for name, modes in (("buckling_modes", report.buckling), ("vibration_modes", report.vibration)):
+            if modes is not None:
+                values[name] = modes.shapes
+    parts = [f"{json.dumps(name)}: {_text(value)}" for name, value in values.items()]
+    return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
+
+
+def _text(value: Any) -> str:
+    """Return JSON of a value, arrays and lists with a row a line."""
+    plain = _plain(value)
+    if isinstance(plain, list) and len(plain) > 6:
+        return "[\n" + ",\n".join(json.dumps(row, allow_nan=False, ensure_ascii=False) for row in plain) + "\n]"
+    return json.dumps(plain, allow_nan=False, ensure_ascii=False)
+
+
+def _plain(value: Any) -> Any:
+    """Return plain values: lists of arrays, "rigid" for infinity, null for NaN."""
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f" and not np.isfinite(value).all():
+            return _plain(value.tolist())
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else "rigid"
+    return value
+
+
+def read_structure(path: str | Path) -> Truss:
+    """Read a structure from our own JSON format, without loss.
+
+    Parameters
+    ----------
+    path : str or Path
+        File written by the command `scantruss structure`.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, or it is not a structure of ours.
+    """
+    try:
+        values = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError):
+        raise FormatError(f"{path} is not JSON; a structure saved by scantruss structure is needed") from None
+    if not isinstance(values, dict) or values.get("format") != STRUCTURE_FORMAT:
+        raise FormatError(
+            f'{path} has no "format": "{STRUCTURE_FORMAT}"; a structure saved by scantruss structure is needed'
+        )
+    if values.get("format_version") != STRUCTURE_VERSION:
+        raise FormatError(f"{path} has format_version {values.get('format_version')!r}, known is {STRUCTURE_VERSION}")
+    try:
+        return _truss_of(values)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        words = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
+        raise FormatError(f"{path} is a damaged structure: {words}; write it again with scantruss structure") from None
+
+
+def _truss_of(values: dict[str, Any]) -> Truss:
+    """Return the structure that plain values describe; ValueError, TypeError or KeyError where they do not."""
+    arrays = {name: _array(values[name], columns, kind) for name, (columns, kind) in _ARRAYS.items()}
+    count, members = len(arrays["nodes"]), len(arrays["members"])
+    marks = tuple(map(str, values["node_marks"])), tuple(map(str, values["member_marks"]))
+    sections = tuple(Section(**each) for each in values["sections"])
+    for name, limit in (("members", count), ("triangles", count), ("section_of", len(sections))):
+        if arrays[name].size and not 0 <= arrays[name].min() <= arrays[name].max() < limit:
+            raise ValueError(f"{name} must be ids, 0 to {limit - 1}")
+    sizes = (("node_normals", count), ("supports", count), ("member_normals", members), ("section_of", members))
+    if any(len(arrays[name]) != size for name, size in sizes) or (len(marks[0]), len(marks[1])) != (count, members):
+        raise ValueError("its lists have different lengths")
+    cases = []
+    for each in values["cases"]:
+        loads = {name: None if each[name] is None else _array(each[name], width) for name, width in _OF_CASE.items()}
+        for name, load in loads.items():
+            if load is not None and len(load) != (count if name in ("nodal", "settlement") else members):
+                raise ValueError(f"the load case {each['name']} has {len(load)} rows of {name}")
+        cases.append(LoadCase(str(each["name"]), str(each["action"]), float(each["self_weight"]), **loads))
+    return Truss(
+        **arrays,
+        sections=sections,
+        material=Material(**values["material"]),
+        end_stiffness=_array(values["end_stiffness"], 4).reshape(members, 2, 2),
+        pinned=bool(values["pinned"]),
+        cases=tuple(cases),
+        combinations=tuple(
+            Combination(each["name"], each["state"], tuple(each["factors"].items())) for each in values["combinations"]
+        ),
+        node_sets={name: np.array(nodes, np.int64) for name, nodes in values["node_sets"].items()},
+        origin=_array(values["origin"], 1),
+        node_marks=marks[0],
+        member_marks=marks[1],
+        scale=float(values["scale"]),
+    )
+
+
+def _array(rows: Any, columns: int, kind: type = float) -> np.ndarray:
+    """Return rows of numbers as an array: "rigid" is infinite, null NaN."""
+    made = np.array(_numbers(rows), np.int64 if kind is int else np.float64)
+    return made.reshape(-1, columns) if columns > 1 else made.ravel()
+
+
+def _numbers(value: Any) -> Any:
+    """Return numbers for what stands for them."""
+    if isinstance(value, list):
+        return [_numbers(each) for each in value]
+    return math.inf if value == "rigid" else math.nan if value is None else value

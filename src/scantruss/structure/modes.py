@@ -1,0 +1,158 @@
+"""Linear buckling and natural frequencies: the eigenmodes of a structure.
+
+Both are the largest eigenvalues of A x = mu K x, with the factored stiffness K: A is the mass, or less the geometric stiffness.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ..errors import InputError
+from .frame import BEND_Y1, BEND_Z1, LENGTHEN, assemble, fixities, freedoms, member_freedoms, transforms
+from .statics import CaseResult, Factored, Solution
+from .truss import GRAVITY, Truss
+
+FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
+SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
+NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Eigenvalues and shapes of a structure."""
+
+    values: np.ndarray  #: (K,) load factors, or frequencies [Hz], smallest first
+    shapes: np.ndarray  #: (K, V, 3) displacements of the nodes, the greatest of each mode 1
+    of: str  #: name of the load case or combination; "" of vibration
+
+
+def buckling_modes(factored: Factored, result: CaseResult, count: int) -> Modes:
+    """Return the smallest positive factors of a load case at which the structure buckles, by linear theory.
+
+    The geometric stiffness is the consistent one (Przemieniecki, Theory of Matrix Structural Analysis, 15.2), with springs at the ends
+    condensed as in `frame`. Members within which half waves fit need nodes within them: here a member is one element, so that
+    the buckling of single members is left to the check of EN 1993-1-1 6.3.1.
+
+    Raises
+    ------
+    InputError
+        `count` is no positive number.
+    """
+    truss = factored.truss
+    matrices = _geometric(truss, result.natural[:, LENGTHEN])
+    geometric = assemble(member_freedoms(truss), matrices, factored.stiffness.shape[0])
+    values, shapes = _largest(factored, -geometric, count)
+    return Modes(1 / values, shapes, result.name)
+
+
+def vibration_modes(factored: Factored, count: int) -> Modes:
+    """Return the lowest natural frequencies; masses are lumped at the nodes and those of the permanent loads.
+
+    Raises
+    ------
+    InputError
+        `count` is no positive number.
+    """
+    truss = factored.truss
+    mass = np.zeros((len(truss.nodes), freedoms(truss)))
+    mass[:, :3] = node_masses(truss)[:, None]
+    values, shapes = _largest(factored, diags(mass.ravel()).tocsc(), count)
+    return Modes(1 / (2 * math.pi * np.sqrt(values)), shapes, "")
+
+
+def node_masses(truss: Truss) -> np.ndarray:
+    """Return the (V,) masses that the permanent loads mean, or the members alone where there are none [kg]."""
+    mass = np.zeros(len(truss.nodes))
+    permanent = [case for case in truss.cases if case.action == "permanent"]
+    share = sum(case.self_weight for case in permanent)
+    members = truss.member_mass * (share or float(not permanent))
+    for case in permanent:
+        if case.line is not None:
+            members = members + np.maximum(-case.line[:, 2], 0.0) * truss.lengths / GRAVITY
+        if case.nodal is not None:
+            mass += np.maximum(-case.nodal[:, 2], 0.0) / GRAVITY
+    for end in truss.members.T:
+        np.add.at(mass, end, members / 2)
+    return mass
+
+
+def worst_buckling(factored: Factored, solution: Solution, count: int) -> Modes:
+    """Return the modes of the combination that buckles first.
+
+    Looked at are the ULS combinations with the greatest compression, at most `SEVERAL_LEADING` with different leading actions; all
+    load cases where there are no combinations.
+    """
+    permanent = {case.name for case in factored.truss.cases if case.action == "permanent"}
+    leading = {
+        each.name: next((name for name, _ in each.factors if name not in permanent), "")
+        for each in factored.truss.combinations
+    }
+    chosen: dict[str, tuple[float, CaseResult]] = {}
+    every = list(solution.all_results())
+    for result in [each for each in every if each.state == "ULS"] or every:
+        pressed = float((np.maximum(-result.natural[:, LENGTHEN], 0.0) * factored.truss.lengths).sum())
+        lead = leading.get(result.name, result.name)
+        if lead not in chosen or pressed > chosen[lead][0]:
+            chosen[lead] = pressed, result
+    most = sorted(chosen.values(), key=lambda pair: -pair[0])[:SEVERAL_LEADING]
+    found = [buckling_modes(factored, result, count) for _, result in most]
+    return min(found, key=lambda modes: float(modes.values.min(initial=math.inf)))
+
+
+def _geometric(truss: Truss, axial: np.ndarray) -> np.ndarray:
+    """Return the (M, 2 d, 2 d) geometric stiffness of members with axial forces, tension positive."""
+    length, axes = truss.lengths, truss.axes
+    count = freedoms(truss)
+    across = np.zeros((len(length), 2, 2 * count))
+    across[:, :, :3], across[:, :, count : count + 3] = -axes[:, 1:], axes[:, 1:]
+    made = (axial / length)[:, None, None] * (across.transpose(0, 2, 1) @ across)
+    if truss.pinned:
+        return made
+    change, fixity = transforms(truss), fixities(truss)
+    for axis, row in enumerate((BEND_Y1, BEND_Z1)):
+        first, second = fixity[:, 0, axis], fixity[:, 1, axis]
+        under = 4 - first * second
+        inner = np.array(  # from turns of the nodes to turns of the member's ends, behind the springs
+            [
+                [1 - 4 * (1 - first) / under, -2 * second * (1 - first) / under],
+                [-2 * first * (1 - second) / under, 1 - 4 * (1 - second) / under],
+            ]
+        ).transpose(2, 0, 1)
+        turns = inner @ change[:, row : row + 2]
+        weight = (axial * length / 30)[:, None, None] * np.array([[4.0, -1.0], [-1.0, 4.0]])
+        made += turns.transpose(0, 2, 1) @ weight @ turns
+    return made
+
+
+def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the largest positive eigenvalues of `matrix` x = mu K x, largest first, and (K, V, 3) shapes."""
+    if not isinstance(count, int) or count < 1:
+        raise InputError(f"the number of modes must be 1 or more, got {count!r}")
+    free, root = factored.free, factored.root
+    nodes, width = len(factored.truss.nodes), freedoms(factored.truss)
+    scale = diags(1 / root)
+    part = (scale @ matrix[free][:, free] @ scale).tocsc()
+    if factored.factor is None or not np.any(part.data):
+        return np.zeros(0), np.zeros((0, nodes, 3))
+    stiff = (scale @ factored.stiffness[free][:, free] @ scale).tocsc()
+    if len(free) <= max(FEW_FREEDOMS, 3 * count):
+        values, vectors = eigh(part.toarray(), stiff.toarray())
+    else:
+        inverse = LinearOperator(stiff.shape, matvec=factored.factor.solve, dtype=float)
+        start = np.random.default_rng(1).standard_normal(len(free))
+        values, vectors = eigsh(part, k=count, M=stiff, Minv=inverse, which="LA", v0=start, tol=1e-10)
+    order = [k for k in np.argsort(-values)[:count] if values[k] > NEGLIGIBLE * np.abs(values).max()]
+    shapes = np.zeros((len(order), nodes, 3))
+    for number, k in enumerate(order):
+        moves = np.zeros(nodes * width)
+        moves[free] = vectors[:, k] / root
+        shapes[number] = moves.reshape(nodes, width)[:, :3]
+        most = shapes[number].flat[np.abs(shapes[number]).argmax()]
+        shapes[number] /= most if most else 1.0  # a mode of turns alone moves no node
+    return values[order], shapes

@@ -1,0 +1,129 @@
+"""What `scantruss structure` can be told: one record, from options and from a readable file (TOML or JSON)."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import FormatError, InputError
+from .checks import MemberChecks
+from .truss import Combination
+
+MOST_MODES = 50  #: of buckling or vibration
+NUMBERS = ("scale", "node_allowance", "size", "buckling", "frequencies")  #: settings that are numbers
+
+
+@dataclass(frozen=True)
+class StructureSettings:
+    """Everything that turns a grid into a solved structure; a file has the same names."""
+
+    scale: float = 1.0
+    unit: str = ""
+    section: str = "CHS114.3x5"
+    material: str = "S355"
+    supports: str = ""
+    support_type: str = "pinned"
+    joints: str = "rigid"
+    loads: tuple[Any, ...] = ("self",)
+    node_allowance: float = 0.0
+    size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
+    buckling: int = 0  #: buckling factors that are asked for
+    frequencies: int = 0  #: natural frequencies that are asked for
+    combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
+    checks: MemberChecks = field(default_factory=MemberChecks)  #: of a file
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of modes that are none."""
+        if self.size < 0:
+            raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
+        if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
+            raise InputError(
+                f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"
+            )
+
+    def replace(self, **changes: Any) -> StructureSettings:
+        """Return a copy with some fields changed."""
+        return replace(self, **changes)
+
+
+def read_structure_settings(path: str | Path) -> StructureSettings:
+    """Return the settings in a TOML or JSON file.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read.
+    InputError
+        It holds a name or a value that cannot be used.
+    """
+    values = _read_table(path)
+    known = {spec.name for spec in fields(StructureSettings)} - {"combinations", "checks"}
+    given: dict[str, Any] = {}
+    checks: dict[str, Any] = {}
+    check_names = {spec.name for spec in fields(MemberChecks)}
+    for name, value in values.items():
+        if name in check_names:
+            checks[name] = value
+        elif name == "combinations":
+            given[name] = tuple(_combination_of(path, each) for each in value)
+        elif name == "loads":
+            given[name] = loads_of_words(value) if isinstance(value, str) else tuple(value)
+        elif name in ("scale", "node_allowance") and isinstance(value, int | float):
+            given[name] = float(value)
+        elif name in ("size", "buckling", "frequencies") and isinstance(value, int):
+            given[name] = value
+        elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
+            given[name] = str(value)
+        else:
+            raise InputError(
+                f"{path} has {name!r} = {value!r}; known are {' '.join(sorted(known | check_names | {'combinations'}))}"
+            )
+    return StructureSettings(**given, checks=MemberChecks(**checks))
+
+
+def loads_of_words(words: str) -> tuple[Any, ...]:
+    """Return loads of the command line: words with commas between them, files among them with all that they hold."""
+    found: list[Any] = []
+    for word in (each.strip() for each in words.split(",")):
+        if Path(word).suffix.lower() in (".toml", ".json"):
+            values = _read_table(word)
+            if not isinstance(values.get("loads"), list) or not values["loads"]:
+                raise FormatError(f"{word} holds no list of loads; it needs [[loads]] tables")
+            found += values["loads"]
+        elif word:
+            found.append(word)
+    return tuple(found)
+
+
+def _combination_of(path: str | Path, each: Any) -> Combination:
+    """Return the combination of a table: name, state and factors."""
+    try:
+        factors = tuple((str(name), float(factor)) for name, factor in each["factors"].items())
+        state = str(each.get("state", "ULS"))
+        if state not in ("ULS", "SLS"):
+            raise ValueError(f"state must be ULS or SLS, got {state!r}")
+        return Combination(str(each["name"]), state, factors)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        words = f"no {error.args[0]}" if isinstance(error, KeyError) else error
+        raise InputError(
+            f"{path} has a combination that cannot be used: {words}; it needs name, state, factors"
+        ) from None
+
+
+def _read_table(path: str | Path) -> Mapping[str, Any]:
+    """Return the names and values of a TOML or JSON file."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        values = tomllib.loads(text) if Path(path).suffix.lower() == ".toml" else json.loads(text)
+    except OSError as error:
+        raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:
+        kind = "TOML" if Path(path).suffix.lower() == ".toml" else "JSON"
+        raise FormatError(f"{path} is not {kind}: {error}") from None
+    if not isinstance(values, dict):
+        raise FormatError(f"{path} holds no table of names and values")
+    return values

@@ -1,0 +1,46 @@
+"""Numbers with units as people write them: 0.5kN/m2, 20K, 12mm."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from ..errors import InputError
+
+FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6}  #: [N]
+LENGTH = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
+PRESSURE = {f"{name}/m2": value for name, value in FORCE.items()} | {"Pa": 1.0, "kPa": 1e3}  #: [N/m2]
+FORCE_PER_LENGTH = {f"{name}/m": value for name, value in FORCE.items()} | {"N/mm": 1e3, "kN/mm": 1e6}  #: [N/m]
+TEMPERATURE = {"K": 1.0, "C": 1.0}  #: of a change [K]
+
+
+def quantity(text: object, units: dict[str, float], what: str, *, plain: bool = False) -> float:
+    """Return the value of "0.5kN/m2" in SI units.
+
+    Parameters
+    ----------
+    text : str or float
+        Number and unit; `plain`: a number alone is in SI units.
+    units : dict
+        Known units with their size in SI units.
+    what : str
+        For the message.
+
+    Raises
+    ------
+    InputError
+        No number, no unit, or one of another kind.
+    """
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", str(text))
+    example = next(reversed(units)) if "kN/m2" not in units else "kN/m2"
+    if found:
+        unit = found[2].replace("²", "2").replace("^2", "2").replace("°", "")
+        try:
+            value = float(found[1]) * (units[unit] if unit or not plain else 1.0)
+            if math.isfinite(value):
+                return value
+        except (KeyError, ValueError):
+            pass
+        if not unit:
+            raise InputError(f"the unit is missing: {what} is {text!r}; write it as {found[1]}{example}")
+    raise InputError(f"{what} must be a number with one of the units {' '.join(units)}, got {text!r}")

@@ -1,0 +1,214 @@
+"""The report of a structure: its figures as plain values, and in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .modes import Modes
+from .statics import CaseResult, Solution
+from .truss import Truss
+
+
+@dataclass(frozen=True)
+class CaseFigures:
+    """Figures of a load case or a combination."""
+
+    name: str
+    state: str  #: case, ULS or SLS
+    applied: tuple[float, ...]  #: [N]
+    reactions: tuple[float, ...]  #: [N]
+    displacement_max: float  #: [m]
+    force_min: float  #: smallest axial force, compression negative [N]
+    force_max: float  #: [N]
+    utilization_max: float | None  #: by EN 1993-1-1; None where no clause applies
+    governing: str  #: the member of that, and its clause
+    equilibrium_error: float  #: relative
+
+
+@dataclass(frozen=True, eq=False)
+class StructureReport:
+    """All figures of a structure."""
+
+    truss: Truss
+    cases: tuple[CaseFigures, ...]
+    utilization: np.ndarray | None  #: (M,) the greatest of all ULS combinations, or of all cases where there are none
+    governing: tuple[str, ...]  #: (M,) the clause and load of that
+    warnings: tuple[str, ...]
+    buckling: Modes | None = None  #: of the combination that buckles first, where it was asked for
+    vibration: Modes | None = None  #: where it was asked for
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON; SI units."""
+        cases = {
+            case.name: {
+                name: list(value) if isinstance(value, tuple) else value
+                for name, value in vars(case).items()
+                if name != "name"
+            }
+            for case in self.cases
+        }
+        judged = [case for case in self.cases if case.state == "ULS"] or list(self.cases)
+        used = [case.utilization_max for case in judged if case.utilization_max is not None]
+        counts = np.bincount(self.truss.section_of, minlength=len(self.truss.sections)).tolist()
+        values: dict[str, Any] = {
+            "mass": self.truss.mass,
+            "cases": cases,
+            "displacement_max": max(case.displacement_max for case in self.cases),
+            "force_min": min(case.force_min for case in self.cases),
+            "force_max": max(case.force_max for case in self.cases),
+            "utilization_max": max(used) if used else None,
+            "sections": {section.name: count for section, count in zip(self.truss.sections, counts, strict=True)},
+            "warnings": list(self.warnings),
+        }
+        if self.buckling is not None:
+            values["buckling_factors"] = self.buckling.values.tolist()
+            values["buckling_case"] = self.buckling.of
+        if self.vibration is not None:
+            values["frequencies"] = self.vibration.values.tolist()
+        return values
+
+
+def report_structure(
+    solution: Solution,
+    checks: MemberChecks | None = None,
+    notes: Sequence[str] = (),
+    *,
+    buckling: Modes | None = None,
+    vibration: Modes | None = None,
+) -> StructureReport:
+    """Return the figures of all load cases and combinations, the checks of the members, and warnings.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of `solve`.
+    checks : MemberChecks, optional
+        Buckling length, partial factors, limits.
+    notes : sequence of str
+        Warnings of whoever made the structure.
+    buckling, vibration : Modes, optional
+        Of `worst_buckling` and `vibration_modes`.
+    """
+    truss, checks = solution.truss, checks or MemberChecks()
+    strength = strengths(truss, checks)
+    any_uls: bool = any(combination.state == "ULS" for combination in truss.combinations)
+    worst, clause, load = (
+        np.zeros(len(truss.members)),
+        np.zeros(len(truss.members), int),
+        np.zeros(len(truss.members), int),
+    )
+    figures: list[CaseFigures] = []
+    for number, result in enumerate(solution.all_results()):
+        each = utilizations(strength, result) if strength.known else None
+        figures.append(_figures_of(result, each))
+        if each is not None and (result.state == "ULS" or not any_uls):
+            more = each.max(axis=1) > worst
+            worst[more], clause[more], load[more] = each.max(axis=1)[more], each.argmax(axis=1)[more], number
+    governing = tuple(f"{CLAUSES[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
+    said = [*truss.warnings, *notes]
+    if not strength.known:
+        why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
+        said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
+    elif (over := int((worst > 1).sum())) > 0:
+        most = int(worst.argmax())
+        words = f"{truss.member_marks[most]} {worst[most]:.2f} by {governing[most]}"
+        said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
+    said += _limits(truss, figures, checks)
+    if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
+        said.append(
+            f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
+            " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
+        )
+    return StructureReport(
+        truss=truss,
+        cases=tuple(figures),
+        utilization=worst if strength.known else None,
+        governing=governing if strength.known else (),
+        warnings=tuple(said),
+        buckling=buckling,
+        vibration=vibration,
+    )
+
+
+def _figures_of(result: CaseResult, used: np.ndarray | None) -> CaseFigures:
+    most = None if used is None else divmod(int(used.argmax()), used.shape[1])
+    return CaseFigures(
+        name=result.name,
+        state=result.state,
+        applied=tuple(result.applied.tolist()),
+        reactions=tuple(result.reaction.tolist()),
+        displacement_max=result.displacement_max,
+        force_min=float(result.axial.min()),
+        force_max=float(result.axial.max()),
+        utilization_max=None if used is None else float(used.max()),
+        governing="" if most is None else f"{result.truss.member_marks[most[0]]} {CLAUSES[most[1]]}",
+        equilibrium_error=result.equilibrium_error,
+    )
+
+
+def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) -> list[str]:
+    """Return warnings of slender members and great displacements."""
+    said = []
+    radius = np.array([section.radius for section in truss.sections])[truss.section_of]
+    slender = checks.effective_length * truss.lengths / radius
+    if (over := slender > checks.slenderness).any():
+        first = truss.member_marks[int(slender.argmax())]
+        said.append(
+            f"{over.sum():,} of {len(over):,} members are more slender than {checks.slenderness:g}, the most {first} with"
+            f" {slender.max():.0f}"
+        )
+    service = [each for each in figures if each.state == "SLS"] or [each for each in figures if each.state == "case"]
+    most = max(service, key=lambda case: case.displacement_max)
+    span = span_of(truss)
+    if span > 0 and most.displacement_max > span / checks.deflection:
+        ratio = span / most.displacement_max if most.displacement_max else math.inf
+        said.append(
+            f"the displacement of {1e3 * most.displacement_max:.3g} mm under {most.name} is span/{ratio:.0f}, more than"
+            f" span/{checks.deflection:g} of the span {span:.3g} m"
+        )
+    return said
+
+
+def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[str, ...]]:
+    """Return rows of a table: each load case, then the worst combinations; see `STRUCTURE_HEAD`."""
+    cases = [case for case in report.cases if case.state == "case"]
+    others = [case for case in report.cases if case.state != "case"]
+    others.sort(key=lambda case: (case.state != "ULS", -(case.utilization_max or 0.0), -case.displacement_max))
+    chosen = [case for case in others if case.state == "ULS"][: most // 2]
+    chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[:1]
+    return [
+        (
+            case.name,
+            f"{case.applied[2] / 1e3:.4g}",
+            f"{case.reactions[2] / 1e3:.4g}",
+            f"{1e3 * case.displacement_max:.3g}",
+            f"{case.force_min / 1e3:.4g}",
+            f"{case.force_max / 1e3:.4g}",
+            "-" if case.utilization_max is None else f"{case.utilization_max:.2f}",
+        )
+        for case in cases + chosen
+    ]
+
+
+def mode_lines(report: StructureReport) -> list[str]:
+    """Return lines on buckling and vibration, where they were asked for."""
+    said = []
+    if report.buckling is not None:
+        factors = ", ".join(f"{value:.4g}" for value in report.buckling.values)
+        said.append(
+            f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
+        )
+    if report.vibration is not None:
+        said.append("natural frequencies: " + ", ".join(f"{value:.4g}" for value in report.vibration.values) + " Hz")
+    return said
+
+
+STRUCTURE_HEAD = (
+    "load case", "applied z [kN]", "reaction z [kN]", "moves [mm]", "force min [kN]", "force max [kN]", "utilization",
+)  # fmt: skip

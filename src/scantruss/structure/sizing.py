@@ -1,0 +1,143 @@
+"""Sizing: sections of the catalogue for all members, few different ones, so that all checks pass."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from .catalogue import Section, bundled_sections
+from .checks import MemberChecks, section_class, strengths, utilizations
+from .modes import worst_buckling
+from .statics import CaseResult, Solution, factor_stiffness, solve
+from .truss import Truss
+
+ROUNDS = 60  #: of solving and choosing
+GROWTH_A_ROUND = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
+
+
+def candidates(truss: Truss) -> list[Section]:
+    """Return the sections that may replace the first of a structure, lightest first.
+
+    They are those of the catalogue with its shape and finish, of class 1 to 3, whose second moment of area is greater than that of
+    all lighter ones: a heavier one resists more in every way.
+
+    Raises
+    ------
+    InputError
+        The material is not steel, or the catalogue has no sections of this kind.
+    """
+    like, material = truss.sections[0], truss.material
+    if material.kind != "steel":
+        raise InputError(f"sizing follows checks of steel, and {material.name} is {material.kind}; leave --size out")
+    kind = [s for s in bundled_sections() if (s.shape, s.finish) == (like.shape, like.finish)]
+    chain: list[Section] = []
+    for section in sorted(kind, key=lambda s: (s.area, -s.inertia_y)):
+        better = not chain or (section.inertia_y > chain[-1].inertia_y and section.plastic_y > chain[-1].plastic_y)
+        if better and section_class(section, material) < 4:
+            chain.append(section)
+    if not chain:
+        raise InputError(f"the catalogue has no sections like {like.name} to choose from; name a CHS or SHS")
+    return chain
+
+
+def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -> Truss:
+    """Return the structure with sections that pass all checks under all ULS combinations (all load cases where there are none).
+
+    All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
+    that resists its forces, never a lighter one than before; then the sections are made few, at the least mass, by heavier
+    ones. Once all pass, the lightest sections grow until the structure buckles at no less than the factor of the checks (EN 1993-1-1
+    5.2.1(3)).
+
+    Parameters
+    ----------
+    truss : Truss
+        Its first section tells the kind.
+    count : int
+        Different sections at most.
+    checks : MemberChecks, optional
+        Buckling length, partial factors.
+
+    Raises
+    ------
+    InputError
+        The heaviest section does not pass, or there is nothing to choose from.
+    """
+    if count < 1:
+        raise InputError(f"the number of different sections must be 1 or more, got {count}")
+    chain = candidates(truss)
+    chosen = np.zeros(len(truss.members), np.int64)
+    checks = checks or MemberChecks()
+    for _ in range(ROUNDS):
+        chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
+        truss = truss.replace(sections=tuple(chain), section_of=chosen)
+        factored = factor_stiffness(truss)
+        solution = solve(truss, factored)
+        needed = _needed(solution, chosen, checks)
+        if (needed <= chosen).all():
+            least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
+            if least < checks.buckling_factor:
+                needed = _stiffer(chosen, chain, checks.buckling_factor / least)
+        if (needed <= chosen).all():
+            kept, numbers = np.unique(chosen, return_inverse=True)
+            return truss.replace(sections=tuple(chain[k] for k in kept), section_of=numbers.ravel().astype(np.int64))
+        if needed.max() == len(chain):
+            mark = truss.member_marks[int(needed.argmax())]
+            raise InputError(
+                f"no section up to {chain[-1].name} is enough at {mark}; use more supports or shorter members"
+            )
+        chosen = np.maximum(chosen, needed)
+    raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")
+
+
+def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndarray:
+    """Return sections of which the lightest has grown in bending, as much as buckling lacks and at most half as much again."""
+    inertia = np.array([section.inertia_y for section in chain])
+    least = int(chosen.min())
+    grown = max(least + 1, int(np.searchsorted(inertia, inertia[least] * min(factor, GROWTH_A_ROUND))))
+    return np.maximum(chosen, grown)
+
+
+def _needed(solution: Solution, chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
+    """Return for each member the first section of the structure, from the chosen one on, that resists its forces of every combination."""
+    truss = solution.truss
+    judged = [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
+    needed = chosen.copy()
+    for result in judged:
+        for _ in range(len(truss.sections)):
+            now = np.minimum(needed, len(truss.sections) - 1)
+            over = _use(truss.replace(section_of=now), result, checks) > 1
+            if not (over & (needed < len(truss.sections))).any():
+                break
+            needed = np.where(over, now + 1, needed)
+    return needed
+
+
+def _use(truss: Truss, result: CaseResult, checks: MemberChecks) -> np.ndarray:
+    """Return the (M,) greatest utilization of members under the forces of a result."""
+    used: np.ndarray = utilizations(strengths(truss, checks), result).max(axis=1)
+    return used
+
+
+def _few(chosen: np.ndarray, lengths: np.ndarray, areas: np.ndarray, count: int) -> np.ndarray:
+    """Return sections, none lighter than before and at most `count` different ones, of the least volume: dynamic programming."""
+    kinds = np.unique(chosen)
+    if len(kinds) <= count:
+        return chosen
+    length = np.array([lengths[chosen == kind].sum() for kind in kinds])
+    total = np.concatenate([[0.0], np.cumsum(length)])
+    best = np.full((count + 1, len(kinds) + 1), np.inf)
+    best[:, 0] = 0.0
+    start = np.zeros((count + 1, len(kinds) + 1), np.int64)
+    for groups in range(1, count + 1):
+        for end in range(1, len(kinds) + 1):  # the last group is kinds[first:end], all as the heaviest of them
+            volume = best[groups - 1, :end] + (total[end] - total[:end]) * areas[kinds[end - 1]]
+            start[groups, end] = int(volume.argmin())
+            best[groups, end] = volume.min()
+    made, end = chosen.copy(), len(kinds)
+    for groups in range(count, 0, -1):
+        first = int(start[groups, end])
+        made[np.isin(chosen, kinds[first:end])] = kinds[end - 1]
+        end = first
+        if end == 0:
+            break
+    return made

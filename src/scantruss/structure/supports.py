@@ -1,0 +1,119 @@
+"""Supports: which nodes are held, and how."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.geometry.components import component_labels
+from .quantities import FORCE_PER_LENGTH, LENGTH, quantity
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from .truss import Truss
+
+SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
+SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME"
+HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
+
+
+def node_sets(grid: Grid) -> dict[str, np.ndarray]:
+    """Return what the grid names: "fixed", "boundary" (the longest loop of each piece), "loop:1", ..., "corners", "line:NAME"."""
+    sets = {"fixed": np.flatnonzero(grid.fixed)}
+    loops = sorted(grid.boundary_loops, key=lambda loop: -_length(grid.nodes[loop]))
+    piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    longest = {int(piece[loop[0]]): loop for loop in reversed(loops)}
+    if loops:
+        sets["boundary"] = np.unique(np.concatenate(list(longest.values())))
+        corners = [_corners(grid.nodes, loop) for loop in longest.values()]
+        sets["corners"] = np.unique(np.concatenate(corners))
+    sets |= {f"loop:{number}": loop for number, loop in enumerate(loops, 1)}
+    sets |= {f"line:{line.name}": line.nodes for line in grid.line_sets}
+    return {name: np.asarray(nodes, np.int64) for name, nodes in sets.items()}
+
+
+def support_nodes(truss: Truss, where: str | np.ndarray) -> np.ndarray:
+    """Return the ids of the nodes that are named: ways joined by "+", marks such as N001, or ids.
+
+    Raises
+    ------
+    InputError
+        A name is not known, or no node is found.
+    """
+    if not isinstance(where, str):
+        ids = np.asarray(where, np.int64).ravel()
+        if len(ids) == 0 or ids.min() < 0 or ids.max() >= len(truss.nodes):
+            raise InputError(f"supports must be ids of nodes, 0 to {len(truss.nodes) - 1}, and at least one")
+        return np.unique(ids)
+    if not where.strip():
+        raise InputError(
+            f"no supports; name some with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
+        )
+    found = [_nodes_of(truss, word.strip()) for word in where.split("+")]
+    return np.unique(np.concatenate(found))
+
+
+def support_stiffness(count: int, nodes: np.ndarray, kind: str) -> np.ndarray:
+    """Return the (V, 6) stiffness of supports of one type: pinned, fixed, roller or springs:K."""
+    name, _, value = kind.partition(":")
+    if name == "springs":
+        if not value:
+            raise InputError("support type springs needs a stiffness, such as springs:5MN/m")
+        stiffness: tuple[float, ...] = (quantity(value, FORCE_PER_LENGTH, "stiffness of a spring"),) * 3 + (0.0,) * 3
+        if stiffness[0] <= 0:
+            raise InputError(f"the stiffness of a spring must be positive, got {value}")
+    elif kind in HELD:
+        stiffness = HELD[kind]
+    else:
+        raise InputError(f"support type must be pinned, fixed, roller or springs:K, got {kind!r}")
+    supports = np.zeros((count, 6))
+    supports[nodes] = stiffness
+    return supports
+
+
+def _nodes_of(truss: Truss, word: str) -> np.ndarray:
+    """Return the nodes that one word names."""
+    if word.startswith("lowest:"):
+        height = quantity(word.removeprefix("lowest:"), LENGTH, "height above the lowest node", plain=True)
+        z = truss.nodes[:, 2]
+        used = np.zeros(len(z), bool)
+        used[truss.members] = True
+        return np.flatnonzero(used & (z <= z[used].min() + height))
+    if word in truss.node_marks:
+        return np.array([truss.node_marks.index(word)])
+    with suppress(KeyError):
+        if len(nodes := truss.node_sets[word]):
+            return nodes
+        raise InputError(f"no supports: the grid has no {'fixed nodes' if word == 'fixed' else word}")
+    names = [name for name in truss.node_sets if name.startswith(("line:", "loop:"))]
+    if word in ("corners", "boundary"):
+        raise InputError(f"no supports: the grid is closed and has no {word}; use lowest:H or fixed nodes")
+    if word.startswith(("line:", "loop:")) and names:
+        near = get_close_matches(word, names, 3, 0.0)
+        raise InputError(f"no supports: the grid has no {word}; nearest are {' '.join(near)}")
+    if word.startswith("line:"):
+        raise InputError(f"no supports: the grid has no lines, so no {word}")
+    raise InputError(
+        f"no supports {word!r}; name some with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
+    )
+
+
+def _length(points: np.ndarray) -> float:
+    """Return the length of a closed polyline."""
+    return float(np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1).sum())
+
+
+def _corners(nodes: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Return the nodes at which a loop turns most, each the greatest turn within two members."""
+    points = nodes[loop]
+    before, after = points - np.roll(points, 2, axis=0), np.roll(points, -2, axis=0) - points
+    product = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    cosine = (before * after).sum(axis=1) / np.maximum(product, 1e-300)
+    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    around = np.max([np.roll(turn, step) for step in (-2, -1, 1, 2)], axis=0)
+    return loop[(turn > SUPPORT_TURN) & (turn >= around - 1e-6)]
