@@ -338,9 +338,9 @@ def test_progress_is_reported_and_may_stop_the_search() -> None:
 def test_a_disc_that_is_caught_on_its_way_rolls_the_other_way_round(seed: int) -> None:
     """The rim of what is seen from one side is over a hundred members long; rolled one way only, the disc never comes round.
 
-    There is one hole, and a bay whose mouth is about as wide as the disc: it may be closed, a second hole.
+    There is one hole, and a bay whose mouth is about as wide as the disc: with seed 2 it is closed, a second hole.
     """
     shape = make("view", seed=seed)
     boundary, _ = found(shape.points, shape.length)
-    assert len(boundary.loops) in (2, 3) and boundary.loops[0].external
+    assert len(boundary.loops) in ((3,) if seed == 2 else (2, 3)) and boundary.loops[0].external
     assert boundary.loops[0].length > 100 * shape.length

@@ -80,7 +80,7 @@ def test_a_scan_without_strays_is_not_searched(monkeypatch: pytest.MonkeyPatch) 
     def never(*_: Any) -> Never:
         raise AssertionError("looked for strays")
 
-    monkeypatch.setattr("scantruss.surface.samples.judge_points", never)
+    monkeypatch.setattr("scantruss.surface.chosen_samples.judge_points", never)
     shape = make("scallop", 20_000)
     assert sample_surface(st.PointCloud.from_array(shape.points), st.Settings(length=shape.length)).outliers == 0
 

@@ -106,11 +106,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
+    if rough > VERY_ROUGH_SCAN:
+        yield from _smoothed(cloud, settings)
     if not settings.sharp_edges and settings.method == "default" and _has_sharp_edges(cloud, settings):
         settings = settings.replace(sharp_edges=True)
         yield from _same_scan(settings)
-    if rough > VERY_ROUGH_SCAN:
-        yield from _smoothed(cloud, settings)
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
@@ -212,7 +212,7 @@ class Hope:
             self._settings, self._far = attempt.settings, 0
         self._looks_one_sided |= isinstance(fault, OneSidedError)
         self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
-        self._given_up += self._far == MOST_FAR
+        self._given_up += self._far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
 
 
 def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:

@@ -23,7 +23,6 @@ from .linked_samples import (
     refined,
     settle_to_sheet,
     thin_dense,
-    without_bends,
 )
 from .mean_surface import mean_surface
 from .sharp_edges import BESIDE_EDGE, beside_edges, coarse_samples, on_sharp_edges
@@ -144,8 +143,6 @@ def usual_samples(
     still = np.zeros(len(found.mean), np.bool_)
     if asked.sharp_edges:
         still = beside_edges(found, on_sharp_edges(found, found.normals.copy(), length), BESIDE_EDGE * length)
-    if is_rough(found, ROUGH * length, MANY_ROUGH):
-        found = found._replace(thickness=without_bends(found, ROUGH * length))
     if is_rough(found, ROUGH * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing, still)
     if asked.sharp_edges:

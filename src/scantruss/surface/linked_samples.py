@@ -138,14 +138,6 @@ def settle_to_sheet(
     return Linked(owner, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors), facing)
 
 
-def without_bends(found: Linked, rough: float) -> np.ndarray:
-    """Return the roughness of the samples (S,): the thickness, but for what of it above `rough` is a bend [scan unit]."""
-    roughness = np.empty_like(found.thickness)
-    linked = found.mean, found.normals, found.neighbors, found.thickness
-    run_in_parts(len(roughness), NORMALS_PER_THREAD, normal_kernels.rough_of_bent, *linked, rough, roughness)
-    return roughness
-
-
 def is_rough(found: Linked, rough: float, some: float = SOME_ROUGH) -> bool:
     """Whether the samples form a thick layer and no sheet: a larger share of them than `some` is thicker than `rough`."""
     return bool((found.thickness > rough).mean() > some)

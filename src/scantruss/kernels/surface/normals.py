@@ -8,8 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, search
-from ..geometry.quadric import COLUMNS, RESIDUAL, TERMS_OF_QUADRIC, WEIGHT, fit_heights, project
-from ..geometry.vectors import Vector, across, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
+from ..geometry.vectors import Vector, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
 
 ASIDE_OF_EDGE = 0.25  # least distance of the middle of what is around a sharp edge from it [reach]
 BEHIND = 0.35  # samples nearer than this tell nothing of the two sides of the edge [reach]
@@ -53,49 +52,6 @@ def sample_normals(
     for s in range(begin, end):
         v, thickness[s] = _plane_at(mean, neighbors, s)
         normals[s, 0], normals[s, 1], normals[s, 2] = v
-
-
-@kernel
-def rough_of_bent(
-    mean: np.ndarray,
-    normals: np.ndarray,
-    neighbors: np.ndarray,
-    thickness: np.ndarray,
-    rough: float,
-    roughness: np.ndarray,
-    begin: int,
-    end: int,
-) -> None:
-    """Fill in the roughness (S,) of the samples from `begin` to `end` - 1: what of a thickness above `rough` no bend explains.
-
-    It is the standard error of a quadric through the sample and its neighbours.
-    """
-    most = neighbors.shape[1] + 1
-    buffer, heights, matrix = np.zeros((most, COLUMNS)), np.empty(TERMS_OF_QUADRIC), np.empty((6, 7))
-    for s in range(begin, end):
-        roughness[s] = thickness[s]
-        if thickness[s] <= rough:
-            continue
-        taken, radius = 1, 0.0
-        buffer[0, :3], buffer[0, WEIGHT] = 0.0, 1.0
-        for k in range(neighbors.shape[1]):
-            n = neighbors[s, k]
-            if n < 0:
-                continue
-            d = subtract(row(mean, n), row(mean, s))
-            buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-            buffer[taken, WEIGHT] = 1.0
-            taken, radius = taken + 1, max(radius, norm(d))
-        spare = taken - TERMS_OF_QUADRIC
-        if spare < 3:
-            continue
-        normal = row(normals, s)
-        project(buffer, taken, radius, normal, across(normal))
-        fit_heights(buffer, taken, radius, TERMS_OF_QUADRIC, heights, matrix)
-        squares = 0.0
-        for i in range(taken):
-            squares += buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
-        roughness[s] = min(thickness[s], math.sqrt(squares / spare))
 
 
 @kernel

@@ -7,26 +7,13 @@ that no later search strays to another sheet close by.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put, search, slot_of
-from ..geometry.quadric import (
-    COLUMNS,
-    RESIDUAL,
-    TERMS_OF_QUADRIC,
-    WEIGHT,
-    fit_heights,
-    project,
-    second_moments,
-)
-from ..geometry.vectors import Vector, across, along, dot, norm, put_vector, row, smallest_eigenvector, subtract, unit
+from ..geometry.vectors import Vector, dot, norm, row, smallest_eigenvector, subtract, unit
 
 TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances count as equal
-SETTLING_TURNS = 3  # fits of a sheet, those after the first with points far off it weighing less
-BENT_SHARE = 0.5  # share of the spread about a plane below which that about a quadric says that the sheet is bent
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
 LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
@@ -321,14 +308,15 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
 def settle_samples(
     mean: np.ndarray, neighbors: np.ndarray, thickness: np.ndarray, rough: float, radius: float, settled: np.ndarray
 ) -> None:
-    """Move each rough sample (thickness above `rough`) onto the sheet of the samples linked to it within a radius.
+    """Move each rough sample (thickness above `rough`) onto the plane of the samples linked to it within a radius.
 
     Noise, plants and doubled layers thicker than a sample leave a cloud of samples; this turns it back into a sheet. Samples far off
-    weigh less.
+    the plane weigh less.
     """
     count = len(mean)
     stamp = np.full(count, -1, np.int64)
     queue = np.empty(count, np.int64)
+    weight = np.empty(count)
     for s in range(count):
         place = row(mean, s)
         settled[s, 0], settled[s, 1], settled[s, 2] = place
@@ -348,54 +336,38 @@ def settle_samples(
                     if dot(d, d) < radius * radius:
                         queue[found] = n
                         found += 1
-        buffer = np.empty((found, COLUMNS))
         for i in range(found):
-            buffer[i, 0], buffer[i, 1], buffer[i, 2] = subtract(row(mean, queue[i]), place)
-        put_vector(settled[s], 0, _settled_place(buffer, found, place, radius))
-
-
-@kernel
-def _settled_place(buffer: np.ndarray, taken: int, place: Vector, radius: float) -> Vector:
-    """A place moved onto the sheet through the points of a buffer (relative to it): a plane, or a quadric where that fits much better."""
-    heights, matrix = np.empty(TERMS_OF_QUADRIC), np.empty((6, 7))
-    normal, off, spread = (0.0, 0.0, 1.0), 0.0, math.inf
-    for _ in range(SETTLING_TURNS):
-        _weigh(buffer, taken, radius, 1.5 * spread)
-        normal = smallest_eigenvector(*second_moments(buffer, taken))
-        off = total = 0.0
-        for i in range(taken):
-            buffer[i, RESIDUAL] = dot((buffer[i, 0], buffer[i, 1], buffer[i, 2]), normal)
-            off, total = off + buffer[i, WEIGHT] * buffer[i, RESIDUAL], total + buffer[i, WEIGHT]
-        off /= max(total, 1e-300)
-        for i in range(taken):
-            buffer[i, RESIDUAL] -= off
-        spread = _spread(buffer, taken)
-    project(buffer, taken, radius, normal, across(normal))
-    bent = math.inf
-    for _ in range(SETTLING_TURNS):
-        _weigh(buffer, taken, radius, 1.5 * bent)
-        fit_heights(buffer, taken, radius, TERMS_OF_QUADRIC, heights, matrix)
-        bent = _spread(buffer, taken)
-    return along(place, heights[0] if bent < BENT_SHARE * spread else off, normal)
-
-
-@kernel
-def _spread(buffer: np.ndarray, taken: int) -> float:
-    """Mean distance of the points of a fit from what was fitted, by their weights; never 0."""
-    spread = total = 0.0
-    for i in range(taken):
-        spread += buffer[i, WEIGHT] * abs(buffer[i, RESIDUAL])
-        total += buffer[i, WEIGHT]
-    return max(spread / max(total, 1e-300), 1e-300)
-
-
-@kernel
-def _weigh(buffer: np.ndarray, taken: int, radius: float, far: float) -> None:
-    """Weigh the points of a fit by their distance from the middle and, in terms of `far` where that is finite, from what was fitted."""
-    for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-        w, r = 1.0 - dot(d, d) / (radius * radius), buffer[i, RESIDUAL] / far if far < math.inf else 0.0
-        buffer[i, WEIGHT] = w * w / (1.0 + r * r)
+            d = subtract(row(mean, queue[i]), place)
+            w = 1.0 - dot(d, d) / (radius * radius)
+            weight[i] = w * w
+        for turn in range(3):
+            total = cx = cy = cz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                total, cx, cy, cz = total + w, cx + w * d[0], cy + w * d[1], cz + w * d[2]
+            cx, cy, cz = cx / total, cy / total, cz / total
+            xx = xy = xz = yy = yz = zz = 0.0
+            for i in range(found):
+                d = subtract(row(mean, queue[i]), place)
+                w = weight[i]
+                x, y, z = d[0] - cx, d[1] - cy, d[2] - cz
+                xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+                yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+            v = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+            off = cx * v[0] + cy * v[1] + cz * v[2]
+            if turn < 2:
+                spread = 0.0
+                for i in range(found):
+                    spread += weight[i] * abs(dot(subtract(row(mean, queue[i]), place), v) - off)
+                spread = max(spread / total, 1e-300)
+                for i in range(found):
+                    d = subtract(row(mean, queue[i]), place)
+                    w = 1.0 - dot(d, d) / (radius * radius)
+                    r = (dot(d, v) - off) / (1.5 * spread)
+                    weight[i] = w * w / (1.0 + r * r)
+        for c in range(3):
+            settled[s, c] = place[c] + off * v[c]
 
 
 @kernel
