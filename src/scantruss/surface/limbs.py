@@ -77,8 +77,8 @@ def cut_limbs(
     reach = 2.0 * max(surface.radius, spacing)
     nearest_places(points, boxes, surface.mean, reach, owner, 0, len(points))
     which = np.flatnonzero((owner >= 0) & suspect[owner])
-    rim = suspect & (~suspect[surface.neighbors] & (surface.neighbors >= 0)).any(axis=1)
-    parts = _Parts.of(points[which], owner[which], spacing, girth, surface, rim, given)
+    boundary = suspect & (~suspect[surface.neighbors] & (surface.neighbors >= 0)).any(axis=1)
+    parts = _Parts.of(points[which], owner[which], spacing, girth, surface, boundary, given)
     if parts is None:
         return none
     gone, rings = parts.cut()
@@ -122,7 +122,7 @@ class _Parts:
         spacing: float,
         limit: float,
         scan: Surface,
-        rim: np.ndarray,
+        boundary: np.ndarray,
         given: GivenNormals | None,
     ) -> _Parts | None:
         """Return the parts of points (N, 3) of samples of the scan (N,); None where none is thin."""
@@ -148,8 +148,8 @@ class _Parts:
         area = sample_areas(surface) / (length * surface.field) ** 2
         label = _labels(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
-        at_rim = np.bincount(label, rim[of_scan], len(label)) > 0
-        small = ~thin & ~at_rim[label] & (total[label] < BLUNT_END)
+        at_boundary = np.bincount(label, boundary[of_scan], len(label)) > 0
+        small = ~thin & ~at_boundary[label] & (total[label] < BLUNT_END)
         thin = thin | small
         label = _labels(thin, surface.neighbors)
         few = thin & (np.bincount(label, minlength=len(label))[label] < FEWEST_OF_LIMB)
@@ -157,8 +157,8 @@ class _Parts:
             thin = thin & ~few
             label = _labels(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
-        at_rim = np.bincount(label, rim[of_scan], len(label)) > 0
-        solid = ~thin & (at_rim | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
+        at_boundary = np.bincount(label, boundary[of_scan], len(label)) > 0
+        solid = ~thin & (at_boundary | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
         return cls(points, found.owner, surface, axis, girth, limit, label, thin, solid)
 
     def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
