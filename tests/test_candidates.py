@@ -15,8 +15,9 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
-from scantruss.candidates import LENGTHS, MOST_RUNS, SMOOTHED, Attempt, attempts
+from scantruss.candidates import LENGTHS, SMOOTHED, Attempt, attempts
 from scantruss.errors import CertificateError, FrontError
+from scantruss.hope import MOST_RUNS
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
 

@@ -20,7 +20,7 @@ LAYERS = (  # lowest first; a module imports from its own row and from rows abov
     ("grid",),  # the record, which front, improve and check share
     ("front",),
     ("improve", "check"),
-    ("pipeline", "candidates"),
+    ("pipeline", "candidates", "hope"),
     ("structure", "layouts", "schedules", "export", "sweep"),
     ("report", "studio", "cli", "__main__"),
 )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
 from .constraints.ridges import find_ridges
-from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from .errors import CertificateError, FrontError, ScanTrussError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.equalize import energy_of_node
@@ -53,10 +53,6 @@ ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
-FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
-FAR_MISSING = 2.0  # share of the scan that a grid misses above which the same holds, in shares that may be missing
-MOST_RUNS = 24  # grids that are made at most, before a scan is refused
-MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 
 
@@ -177,54 +173,6 @@ def _same_scan(settings: Settings) -> Iterator[Attempt]:
         yield Attempt(settings)
     for share in LENGTHS:
         yield Attempt(settings, (FieldStart(scale=share, laid=False),))
-
-
-class Hope:
-    """Which attempts are still worth making.
-
-    After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
-    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
-    counted in grids that are made, not in seconds: the same scan gets the same result.
-    """
-
-    def __init__(self) -> None:
-        self._settings: Settings | None = None
-        self._far = self._given_up = 0
-        self._runs, self._looks_one_sided = 0, False
-
-    def is_left(self) -> bool:
-        """Whether any attempt is worth making."""
-        return self._given_up < MOST_GIVEN_UP and self._runs < MOST_RUNS
-
-    def begin(self) -> None:
-        """Note that a grid is made."""
-        self._runs += 1
-
-    def allows(self, attempt: Attempt) -> bool:
-        """Whether an attempt is worth making."""
-        if self._looks_one_sided and not attempt.settings.smooth_scale:
-            return False
-        return attempt.settings is not self._settings or self._far < MOST_FAR
-
-    def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
-        """Note what has come of an attempt."""
-        if attempt.settings is not self._settings:
-            self._settings, self._far = attempt.settings, 0
-        self._looks_one_sided |= isinstance(fault, OneSidedError)
-        self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
-        self._given_up += self._far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
-
-
-def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
-    """Whether a grid misses many boundary loops or much of the scan, or many of its triangles cut each other."""
-    if isinstance(fault, OneSidedError):
-        return True
-    if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
-        return False
-    found = fault.grid.certificate
-    if found.missing > FAR_MISSING * attempt.settings.allow_missing:
-        return True
-    return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
 
 
 @dataclass(eq=False)

@@ -9,12 +9,13 @@ from time import perf_counter
 import numpy as np
 
 from .boundary.find import find_boundary
-from .candidates import Attempt, Hope, advance_fronts, attempts, best_that_passes, improve_fronts
+from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
+from .hope import Hope
 from .runtime.progress import Progress
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
