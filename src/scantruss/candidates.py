@@ -102,6 +102,8 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
+    if settings.method == "default" and not settings.plain_body and _is_body(cloud, settings):
+        yield from _same_scan(settings.replace(plain_body=True))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
     if not settings.sharp_edges and settings.method == "default" and _has_sharp_edges(cloud, settings):
@@ -144,6 +146,12 @@ def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
     """Whether so many samples lie on sharp edges that these are to be looked at."""
     on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
     return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
+
+
+def _is_body(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan encloses a body with limbs to take off or slits to fill."""
+    samples = sample_surface(cloud, settings.replace(plain_body=True))
+    return samples.measured < len(samples.surface.mean)
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:

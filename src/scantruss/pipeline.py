@@ -88,7 +88,7 @@ def grid_from_cloud(
     -------
     Grid
         Where no grid passes the checks, one with a look at sharp edges, without the ridges of the scan, of its mean surface, with
-        other samples or by the paper's method, if that passes; its settings say so: `sharp_edges`, `ridge_angle` 0, a
+        other samples or by the paper's method, if that passes; its settings say so: `plain_body`, `sharp_edges`, `ridge_angle` 0, a
         `smooth_scale`, another `box_size`, `method` "paper".
     """
     watch = Stopwatch(progress, read_seconds)

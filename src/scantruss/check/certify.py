@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from ..surface.chosen_samples import KEPT, LIMB
+from ..surface.chosen_samples import KEPT, LIMB, SLIT
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances
@@ -143,7 +143,7 @@ def _apart(
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
-    beyond = ((samples.judged == KEPT) | (samples.judged == LIMB)) & (found.scan > COVER_REACH * members)
+    beyond = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & (found.scan > COVER_REACH * members)
     left_out = parts_left_out(samples, boundary, gaps, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
-from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SPARSE_POINT
+from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SLIT, SPARSE_POINT
 from ..surface.owners import owners_of
 from .gaps import by_x, is_empty_within
 
@@ -60,11 +60,10 @@ def points_left_out(
     for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
         if len(which := np.flatnonzero(samples.judged == judged)):
             parts.append(_part(kind, which, samples, distance))
-    limb = np.flatnonzero((samples.judged == LIMB) & (distance > reach))
-    if len(limb):
-        parts += _places(
-            "limbs", limb, _near_each_other(samples.scan[limb], LIMBS_APART * members[limb]), samples, distance
-        )
+    for kind, judged in (("limbs", LIMB), ("slits", SLIT)):
+        if len(which := np.flatnonzero((samples.judged == judged) & (distance > reach))):
+            group = _near_each_other(samples.scan[which], LIMBS_APART * members[which])
+            parts += _places(kind, which, group, samples, distance)
     away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
     owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
@@ -144,10 +143,19 @@ def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
     filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
+    filled = [places for places in filled if not _closes_body(places, samples)]
     holes = [_hole(places, samples, asked=True) for places in filled]
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
     return sorted(holes, key=lambda hole: -(hole.size or 0.0))
+
+
+def _closes_body(places: np.ndarray, samples: SurfaceSamples) -> bool:
+    """Whether made-up places (K, 3) close a body where a limb was taken off, or a slit filled."""
+    gone = samples.scan[np.isin(samples.judged, (LIMB, SLIT))]
+    middle = places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()]
+    near = np.linalg.norm(gone - middle, axis=1) < samples.surface.length
+    return bool(near.any())
 
 
 def _first_and_more(parts: list[LeftOut]) -> list[LeftOut]:

@@ -68,6 +68,7 @@ KINDS_LEFT_OUT = {
     "outliers": "outliers, which lie on no surface",
     "rods": "columns, scaffold or cables, thinner than a member",
     "limbs": "on a limb, handle or neck too thin for the members, cut off at a ring",
+    "slits": "in a slit too narrow for the members, filled",
     "floor": "in a floor under the others",
     "sparse": "too far apart for this length",
     "not chosen": "in pieces that were not asked for",

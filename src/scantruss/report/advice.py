@@ -104,7 +104,10 @@ class Advice:
             trial = LengthTrial(length, grid)
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(
-                keep_rods=made.keep_rods, judge_outliers=made.judge_outliers, sharp_edges=made.sharp_edges
+                keep_rods=made.keep_rods,
+                judge_outliers=made.judge_outliers,
+                sharp_edges=made.sharp_edges,
+                plain_body=made.plain_body,
             )
         except FrontError as error:
             trial = LengthTrial(length, None, error) if known is None else known

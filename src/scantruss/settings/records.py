@@ -193,6 +193,11 @@ class SurfaceSettings(_Checked):
         "look for edges at which two sides of a body meet at less than some 60 degrees; tried by itself if no grid passes"
         " (default method only)",
     )
+    plain_body: bool = _setting(
+        False,
+        "take limbs thinner than 0.9 members off the body that the scan encloses, and fill slits narrower than 0.6 members;"
+        " tried by itself if no grid passes",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,15 @@ from .size_field import Wish, wish_of
 
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB = 0, 1, 2, 3, 4, 5  # what a point of the scan was judged to be
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB, SLIT = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+)  # what a point of the scan was judged to be
 # thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
 ROUGH_THICKNESS = 0.08
 
@@ -51,6 +59,7 @@ class Asked(NamedTuple):
     judge_always: bool  #: whether outliers are looked for even if no sample stands alone
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
+    plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> Asked:
@@ -75,6 +84,7 @@ class Asked(NamedTuple):
             always,
             scale,
             settings.sharp_edges,
+            settings.plain_body,
         )
 
 
@@ -104,7 +114,9 @@ def _smooth_samples(
 ) -> ChosenSamples | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    exact = asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges
+    exact = (
+        asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges or asked.plain_body
+    )
     if exact or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points

@@ -16,12 +16,14 @@ from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
+from .body import opened_body
 from .chosen_samples import (
     DUPLICATE,
     KEPT,
     LIMB,
     OUTLIER,
     ROD,
+    SLIT,
     Asked,
     ChosenSamples,
     choose_samples_of,
@@ -64,7 +66,7 @@ class SurfaceSamples:
     not_chosen: tuple[int, ...] = ()  #: numbers of the pieces that are large enough but left out by the settings
     floor: int | None = None  #: number of the piece that was taken for a floor and left out
     unread: tuple[tuple[str, int], ...] = ()  #: reasons why points of the file were not read, and how many
-    measured: int = 0  #: number of samples with measured points; those after them fill holes
+    measured: int = 0  #: number of samples with measured points; those after them fill holes, or close a body
     whole: np.ndarray | None = None  #: (N, 3) all points if `surface` has only some of them
     sample_spacing: float = 0.0  #: spacing of the points of `surface` then [scan unit]
     smooth: bool = False  #: whether the scan bends evenly everywhere, without ridges
@@ -159,7 +161,9 @@ def samples_with(
     samples: SurfaceSamples, added: np.ndarray, settings: Settings, kept: np.ndarray | None = None
 ) -> SurfaceSamples:
     """Return the samples of the same points, or of those of `surface.points` that are kept (P,) bool, and of added ones (F, 3)."""
-    points = samples.surface.points if kept is None else samples.surface.points[kept]
+    points, measured = samples.surface.points, int(samples.surface.start[samples.measured])
+    if kept is not None:
+        points, measured = points[kept], int(kept[:measured].sum())
     both = np.concatenate([points, added])
     asked = Asked.of(settings, samples.origin, samples.floor is not None)._replace(
         outlier_distance=0.0, drop_duplicates=False, smooth_scale=0.0
@@ -168,7 +172,7 @@ def samples_with(
         asked = asked._replace(piece="all")
     if not samples.smooth:  # then it is not with more points either
         asked = asked._replace(box_size=asked.box_size or SAMPLE_SPACING)
-    prepared = _prepare(both, bounds_of(both), samples.spacing, asked, samples.given, len(points))
+    prepared = _prepare(both, bounds_of(both), samples.spacing, asked, samples.given, measured)
     return replace(
         prepared,
         scan=samples.scan,
@@ -263,17 +267,27 @@ def _prepare(
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
+    added, again = np.zeros((0, 3)), asked._replace(outlier_distance=0.0)
+    if asked.plain_body and thinned:
+        kept = np.flatnonzero(judged == KEPT)
+        opened = opened_body(scan[kept], length, spacing, given)
+        if opened is not None:
+            judged[kept[opened.limb]], judged[kept[opened.slit]], added = LIMB, SLIT, opened.added
+            left = np.concatenate([scan[judged == KEPT], added])
+            chosen = usual_samples(left, bounds_of(left), spacing, again, given, thinned=not len(added))
     surface, piece, on_edge = _faced(chosen, spacing, asked)
     rings: tuple[LimbRing, ...] = ()
     if asked.limb_girth and thinned:
-        limb, rings = cut_limbs(scan[judged == KEPT], spacing, asked.limb_girth, surface, chosen.found.boxes, given)
+        kept = np.flatnonzero(judged == KEPT)
+        left = np.concatenate([scan[kept], added]) if len(added) else scan[kept]
+        limb, rings = cut_limbs(left, spacing, asked.limb_girth, surface, chosen.found.boxes, given)
         if rings:
-            judged[np.flatnonzero(judged == KEPT)[limb]] = LIMB
-            left = np.ascontiguousarray(scan[judged == KEPT])
-            chosen = choose_samples_of(
-                left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned
-            )
+            judged[kept[limb[: len(kept)]]], added = LIMB, added[~limb[len(kept) :]]
+            left = np.ascontiguousarray(left[~limb])
+            chosen = choose_samples_of(left, bounds_of(left), spacing, again, given, thinned=not len(added))
             surface, piece, on_edge = _faced(chosen, spacing, asked)
+    if len(added):
+        measured = int((judged == KEPT).sum())
     found = chosen.found
     piece = number_pieces(piece)
     area = sample_areas(surface)

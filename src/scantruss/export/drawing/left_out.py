@@ -26,6 +26,7 @@ COLOURS = {
     "not chosen": VIOLET,
     "rods": VIOLET,
     "limbs": VIOLET,
+    "slits": VIOLET,
     "floor": VIOLET,
     "outliers": AMBER,
     "sparse": AMBER,

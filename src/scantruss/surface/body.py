@@ -1,0 +1,271 @@
+"""The body that a scan encloses, without limbs thinner than a member and without slits: morphological opening and closing.
+
+Serra, Image Analysis and Mathematical Morphology, 1982. What is opened away ends where a ball as wide as the thinnest limb just fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain, pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.geometry.components import component_labels
+from .given_normals import GivenNormals
+from .linked_samples import Linked, link_samples
+
+Voxels = NDArray[np.bool_]
+Field = NDArray[np.float64]  # a value for each voxel
+
+VOXEL = 1.0 / 6.0  # size of a voxel [member lengths]
+COARSEST_VOXEL = 0.25  # the same of a large scan [member lengths]
+MOST_VOXELS = 8_000_000
+LIMB_RADIUS = (
+    0.45  # of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
+)
+SLIT_RADIUS = 0.3  # of the ball that does not fit into a slit [member lengths]
+DEEP = 0.2  # how far a limb stands out, or a slit goes in, beyond what every edge and corner loses [member lengths]
+OFF_BODY = (
+    1.3  # distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
+)
+FINE_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
+NEIGHBORS = 12  # samples around one that tell whether it lies at a boundary
+WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
+DISC_RADIUS, DISC_CORNERS = 1.25, 12  # of a disc, in distances of the sixth neighbour
+STEP = 0.9  # distance of places on a wall [voxels]
+OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
+BOUNDARY_GAP = 130.0  # angle around a sample without others from which on it lies at a boundary [degree]
+NEAR_GAP = 0.7  # distance of samples of one boundary [member lengths]
+FEWEST_OF_BOUNDARY = 8  # samples of a boundary that is walled off
+MOST_LOST = 0.4  # share of the points that may be taken off; of more, the scan encloses no body
+
+
+@dataclass(frozen=True, eq=False)
+class OpenedBody:
+    """What a scan becomes if limbs are taken off its body, and slits in it are filled."""
+
+    limb: NDArray[np.bool_]  #: (N,) whether each point lies on what was taken off
+    slit: NDArray[np.bool_]  #: (N,) whether it lies in what was filled
+    added: np.ndarray  #: (M, 3) points on the surface where there are none: over limbs and slits
+
+
+class _Lattice(NamedTuple):
+    """Where the voxels are."""
+
+    low: np.ndarray  #: (3,) middle of the first [scan unit]
+    size: float  #: [scan unit]
+    shape: tuple[int, int, int]
+
+    def of(self, places: np.ndarray) -> np.ndarray:
+        """Return places (N, 3) in voxels."""
+        voxels: np.ndarray = (places - self.low) / self.size
+        return voxels
+
+
+def opened_body(
+    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None
+) -> OpenedBody | None:
+    """Return the body that points (N, 3) enclose, opened and closed; None where they enclose none, or there is nothing to take off or fill.
+
+    Parameters
+    ----------
+    length : float
+        Desired member length [scan unit].
+    spacing : float
+        Typical distance between neighbouring points [scan unit].
+    given : GivenNormals, optional
+        Normals that came with the scan.
+    """
+    found = link_samples(points, max(FINE_SAMPLES * length, 0.25 * spacing), length, spacing, given)
+    if len(found.mean) <= NEIGHBORS:
+        return None
+    lattice = _lattice(points, length)
+    if lattice is None:
+        return None
+    wall = np.zeros(lattice.shape, np.bool_)
+    at_gaps = _at_gaps(found)
+    for sides in (chain(_fans(found, length), _discs(found, at_gaps, length)), _caps(found, at_gaps, length)):
+        before = int(wall.sum())
+        for triangles in sides:
+            _mark(wall, triangles, lattice)
+        if int(wall.sum()) > before:
+            opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+            if opened is not None:
+                return opened
+    return None
+
+
+def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
+    """Return voxels around points (N, 3); None where they would be too many."""
+    margin = (LIMB_RADIUS + WIDEST_LINK + 1.0) * length
+    low, extent = points.min(axis=0) - margin, np.ptp(points, axis=0) + 2.0 * margin
+    size = max(VOXEL * length, float(np.cbrt(extent.prod() / MOST_VOXELS)))
+    if size > COARSEST_VOXEL * length:
+        return None
+    x, y, z = (np.ceil(extent / size).astype(int) + 1).tolist()
+    return _Lattice(low, size, (x, y, z))
+
+
+def _fans(found: Linked, length: float) -> Iterator[np.ndarray]:
+    """Yield triangles (K, 3, 3) between each sample and two of those linked to it that follow one another around it."""
+    beside, own = found.neighbors, np.arange(len(found.mean))
+    turn, beside = _around(found, np.where(beside >= 0, beside, own[:, None]))
+    last = beside.shape[1] - 1
+    for k in range(last + 1):
+        gap = turn[:, k + 1] - turn[:, k] if k < last else turn[:, 0] + 2.0 * np.pi - turn[:, -1]
+        one, other = beside[:, k], beside[:, (k + 1) % (last + 1)]
+        closed = (gap < np.radians(OPEN_GAP)) & (one != own) & (other != own) & (one != other)
+        corners = found.mean[np.stack([own, one, other], axis=1)[closed]]
+        wide = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).max(axis=1)
+        yield corners[wide < WIDEST_LINK * length]
+
+
+def _tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two unit vectors (S, 3) at right angles to each normal and to each other."""
+    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return first, np.cross(normals, first)
+
+
+def _around(found: Linked, beside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the angles (S, K) at which the samples `beside` each one (S, K) lie around it, in order, and which sample each is."""
+    first, second = _tangents(found.normals)
+    away = found.mean[beside] - found.mean[:, None]
+    turn = np.arctan2(np.einsum("ski,si->sk", away, second), np.einsum("ski,si->sk", away, first))
+    order = turn.argsort(axis=1, kind="stable")
+    return np.take_along_axis(turn, order, axis=1), np.take_along_axis(beside, order, axis=1)
+
+
+def _at_gaps(found: Linked) -> NDArray[np.bool_]:
+    """Return which samples (S,) lie at a boundary, or at a place where others happen to be missing."""
+    from scipy.spatial import cKDTree
+
+    turn, _ = _around(found, cKDTree(found.mean).query(found.mean, k=NEIGHBORS + 1)[1][:, 1:])
+    gap = np.maximum(np.diff(turn, axis=1).max(axis=1), turn[:, 0] + 2.0 * np.pi - turn[:, -1])
+    at_gaps: NDArray[np.bool_] = gap > np.radians(BOUNDARY_GAP)
+    return at_gaps
+
+
+def _discs(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator[np.ndarray]:
+    """Yield triangles (K, 3, 3) of a disc around each sample at a gap, so wide that those of neighbours overlap."""
+    from scipy.spatial import cKDTree
+
+    middle, (first, second) = found.mean[at_gaps], _tangents(found.normals[at_gaps])
+    if not len(middle):
+        return
+    sixth = cKDTree(found.mean).query(middle, k=7)[0][:, 6]
+    radius = np.minimum(DISC_RADIUS * sixth, WIDEST_LINK * length)[:, None]
+    turn = np.arange(DISC_CORNERS + 1) * (2.0 * np.pi / DISC_CORNERS)
+    rim = [middle + radius * (np.cos(each) * first + np.sin(each) * second) for each in turn]
+    for one, other in pairwise(rim):
+        yield np.stack([middle, one, other], axis=1)
+
+
+def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator[np.ndarray]:
+    """Yield triangles (K, 3, 3) over each boundary of the scan: from neighbours along it to its middle."""
+    from scipy.spatial import cKDTree
+
+    at = found.mean[at_gaps]
+    if len(at) < FEWEST_OF_BOUNDARY:
+        return
+    pairs = cKDTree(at).query_pairs(NEAR_GAP * length, output_type="ndarray").astype(np.int64)
+    label = component_labels(len(at), *np.ascontiguousarray(pairs.T))
+    for each in np.unique(label):
+        boundary = np.flatnonzero(label == each)
+        middle = at[boundary].mean(axis=0)
+        wide = float(np.linalg.norm(at[boundary] - middle, axis=1).max())
+        if len(boundary) >= FEWEST_OF_BOUNDARY and wide > LIMB_RADIUS * length:
+            sides = at[pairs[label[pairs[:, 0]] == each]]
+            yield np.concatenate([sides, np.broadcast_to(middle, (len(sides), 1, 3))], axis=1)
+
+
+def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
+    """Mark the voxels in which triangles (K, 3, 3) lie."""
+    if not len(triangles):
+        return
+    corners = lattice.of(triangles)
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    parts = np.maximum(np.ceil(edge / STEP).astype(int), 1)
+    for count in np.unique(parts):  # places a step apart, by their shares of the corners
+        some = corners[parts == count]
+        for i in range(count + 1):
+            for j in range(count + 1 - i):
+                share = np.array([count - i - j, i, j]) / count
+                wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
+
+
+def _enclosed(wall: Voxels, lattice: _Lattice) -> Voxels:
+    """Return the voxels that cannot be reached from outside through a wall, those of the wall included."""
+    from scipy import ndimage
+
+    label = ndimage.label(_distance(wall, lattice) > lattice.size)[0]
+    outside = label == label[0, 0, 0]
+    enclosed: Voxels = _distance(outside, lattice) > 1.5 * lattice.size  # a voxel's half, and the thickness of a wall
+    return enclosed
+
+
+def _distance(voxels: Voxels, lattice: _Lattice) -> Field:
+    """Return the distance of each voxel from the nearest of some (X, Y, Z) [scan unit]; inf where there is none."""
+    from scipy import ndimage
+
+    if not voxels.any():
+        return np.full(lattice.shape, np.inf)
+    distance: Field = ndimage.distance_transform_edt(~voxels)
+    distance *= lattice.size
+    return distance
+
+
+def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) -> Voxels:
+    """Return the voxels that a ball within them does not reach, where they lie deeper than corners and edges, and what is around those."""
+    reached = _distance(_distance(~voxels, lattice) >= radius, lattice) - radius
+    beyond = voxels & (reached > 0.0)
+    far = beyond & (reached > deep)
+    if not far.any():
+        return far
+    near: Voxels = beyond & (_distance(far, lattice) < deep + 2.0 * lattice.size)
+    return near
+
+
+def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length: float) -> OpenedBody | None:
+    """Return what becomes of points (N, 3) around a body; None where it loses too much or nothing changes."""
+    from scipy import ndimage
+    from scipy.spatial import cKDTree
+
+    if not body.any():
+        return None
+    limbs = _beyond_ball(body, LIMB_RADIUS * length, DEEP * length, lattice)
+    body = body & ~limbs
+    slits = _beyond_ball(~body, SLIT_RADIUS * length, DEEP * length, lattice)
+    body = body | slits
+    changed = _distance(limbs | slits, lattice)
+    depth = _distance(~body, lattice) - _distance(body, lattice)  # positive inside
+    depth -= 0.5 * lattice.size * np.sign(depth)
+    at = lattice.of(points).T
+    own = ndimage.map_coordinates(depth, at, order=1)
+    near = ndimage.map_coordinates(np.minimum(changed, length), at, order=1) < 2.0 * lattice.size
+    limb, slit = (near & (way * own > OFF_BODY * lattice.size) for way in (-1.0, 1.0))
+    left = ~limb & ~slit
+    if left.all() or left.mean() < 1.0 - MOST_LOST:
+        return None
+    surface = _crossings(ndimage.gaussian_filter(depth, 1.0), changed < 2.5 * lattice.size, lattice)
+    bare = cKDTree(points[left]).query(surface)[0] > 0.8 * lattice.size if len(surface) else np.zeros(0, np.bool_)
+    return OpenedBody(limb, slit, surface[bare])
+
+
+def _crossings(field: Field, where: Voxels, lattice: _Lattice) -> np.ndarray:
+    """Return the places (M, 3) between neighbouring voxels at which a field is 0, beside some voxels."""
+    places = []
+    for axis in range(3):
+        here, there = (
+            tuple(slice(begin, end) if each == axis else slice(None) for each in range(3))
+            for begin, end in ((0, -1), (1, None))
+        )
+        one, other = field[here], field[there]
+        crosses = ((one > 0.0) != (other > 0.0)) & where[here]
+        voxel = np.argwhere(crosses).astype(float)
+        voxel[:, axis] += one[crosses] / (one[crosses] - other[crosses])
+        places.append(voxel * lattice.size + lattice.low)
+    return np.concatenate(places)
