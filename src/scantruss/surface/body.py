@@ -18,7 +18,7 @@ from .given_normals import GivenNormals
 from .linked_samples import Linked, link_samples
 
 Voxels = NDArray[np.bool_]
-Field = NDArray[np.float64]  # a value for each voxel
+DistanceField = NDArray[np.float64]  # a value for each voxel
 
 VOXEL = 1.0 / 6.0  # size of a voxel [member lengths]
 COARSEST_VOXEL = 0.25  # the same of a large scan [member lengths]
@@ -31,16 +31,17 @@ DEEP = 0.2  # how far a limb stands out, or a slit goes in, beyond what every ed
 OFF_BODY = (
     1.3  # distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
 )
-FINE_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
+WALL_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
 NEIGHBORS = 12  # samples around one that tell whether it lies at a boundary
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # of a disc, in distances of the sixth neighbour
-STEP = 0.9  # distance of places on a wall [voxels]
+WALL_STEP = 0.9  # distance of places on a wall [voxels]
 OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
 BOUNDARY_GAP = 130.0  # angle around a sample without others from which on it lies at a boundary [degree]
 NEAR_GAP = 0.7  # distance of samples of one boundary [member lengths]
+MOST_OPEN = 0.12  # area within the boundaries of a scan that still encloses a body [area of the scan]
 FEWEST_OF_BOUNDARY = 8  # samples of a boundary that is walled off
-MOST_LOST = 0.4  # share of the points that may be taken off; of more, the scan encloses no body
+MOST_TAKEN_OFF = 0.4  # share of the points that may be taken off; of more, the scan encloses no body
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +80,21 @@ def opened_body(
     given : GivenNormals, optional
         Normals that came with the scan.
     """
-    found = link_samples(points, max(FINE_SAMPLES * length, 0.25 * spacing), length, spacing, given)
+    found = link_samples(points, max(WALL_SAMPLES * length, 0.25 * spacing), length, spacing, given)
     if len(found.mean) <= NEIGHBORS:
         return None
     lattice = _lattice(points, length)
     if lattice is None:
         return None
-    wall = np.zeros(lattice.shape, np.bool_)
-    at_gaps = _at_gaps(found)
-    for sides in (chain(_fans(found, length), _discs(found, at_gaps, length)), _caps(found, at_gaps, length)):
-        before = int(wall.sum())
-        for triangles in sides:
+    wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
+    for triangles in chain(_fans(found, length), _discs(found, at_gaps, length)):
+        _mark(wall, triangles, lattice)
+    opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+    if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
+        for triangles in caps:
             _mark(wall, triangles, lattice)
-        if int(wall.sum()) > before:
-            opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
-            if opened is not None:
-                return opened
-    return None
+        opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+    return opened
 
 
 def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
@@ -164,13 +163,13 @@ def _discs(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator
         yield np.stack([middle, one, other], axis=1)
 
 
-def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator[np.ndarray]:
-    """Yield triangles (K, 3, 3) over each boundary of the scan: from neighbours along it to its middle."""
+def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float, area: float) -> list[np.ndarray]:
+    """Return triangles (K, 3, 3) over each boundary of the scan, from neighbours along it to its middle; none if much of its area lacks."""
     from scipy.spatial import cKDTree
 
-    at = found.mean[at_gaps]
+    at, caps, missing = found.mean[at_gaps], [], 0.0
     if len(at) < FEWEST_OF_BOUNDARY:
-        return
+        return []
     pairs = cKDTree(at).query_pairs(NEAR_GAP * length, output_type="ndarray").astype(np.int64)
     label = component_labels(len(at), *np.ascontiguousarray(pairs.T))
     for each in np.unique(label):
@@ -179,7 +178,9 @@ def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator[
         wide = float(np.linalg.norm(at[boundary] - middle, axis=1).max())
         if len(boundary) >= FEWEST_OF_BOUNDARY and wide > LIMB_RADIUS * length:
             sides = at[pairs[label[pairs[:, 0]] == each]]
-            yield np.concatenate([sides, np.broadcast_to(middle, (len(sides), 1, 3))], axis=1)
+            caps.append(np.concatenate([sides, np.broadcast_to(middle, (len(sides), 1, 3))], axis=1))
+            missing += np.pi * wide**2
+    return caps if missing < MOST_OPEN * area else []
 
 
 def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
@@ -188,7 +189,7 @@ def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
         return
     corners = lattice.of(triangles)
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(edge / STEP).astype(int), 1)
+    parts = np.maximum(np.ceil(edge / WALL_STEP).astype(int), 1)
     for count in np.unique(parts):  # places a step apart, by their shares of the corners
         some = corners[parts == count]
         for i in range(count + 1):
@@ -207,13 +208,13 @@ def _enclosed(wall: Voxels, lattice: _Lattice) -> Voxels:
     return enclosed
 
 
-def _distance(voxels: Voxels, lattice: _Lattice) -> Field:
+def _distance(voxels: Voxels, lattice: _Lattice) -> DistanceField:
     """Return the distance of each voxel from the nearest of some (X, Y, Z) [scan unit]; inf where there is none."""
     from scipy import ndimage
 
     if not voxels.any():
         return np.full(lattice.shape, np.inf)
-    distance: Field = ndimage.distance_transform_edt(~voxels)
+    distance: DistanceField = ndimage.distance_transform_edt(~voxels)
     distance *= lattice.size
     return distance
 
@@ -240,22 +241,24 @@ def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length:
     body = body & ~limbs
     slits = _beyond_ball(~body, SLIT_RADIUS * length, DEEP * length, lattice)
     body = body | slits
-    changed = _distance(limbs | slits, lattice)
     depth = _distance(~body, lattice) - _distance(body, lattice)  # positive inside
     depth -= 0.5 * lattice.size * np.sign(depth)
     at = lattice.of(points).T
     own = ndimage.map_coordinates(depth, at, order=1)
+    slit = own > OFF_BODY * lattice.size
+    slits[tuple(np.rint(at[:, slit]).astype(int))] = True  # those so narrow that the walls filled them
+    changed = _distance(limbs | slits, lattice)
     near = ndimage.map_coordinates(np.minimum(changed, length), at, order=1) < 2.0 * lattice.size
-    limb, slit = (near & (way * own > OFF_BODY * lattice.size) for way in (-1.0, 1.0))
+    limb = near & (own < -OFF_BODY * lattice.size)
     left = ~limb & ~slit
-    if left.all() or left.mean() < 1.0 - MOST_LOST:
+    if left.all() or left.mean() < 1.0 - MOST_TAKEN_OFF:
         return None
     surface = _crossings(ndimage.gaussian_filter(depth, 1.0), changed < 2.5 * lattice.size, lattice)
     bare = cKDTree(points[left]).query(surface)[0] > 0.8 * lattice.size if len(surface) else np.zeros(0, np.bool_)
     return OpenedBody(limb, slit, surface[bare])
 
 
-def _crossings(field: Field, where: Voxels, lattice: _Lattice) -> np.ndarray:
+def _crossings(field: DistanceField, where: Voxels, lattice: _Lattice) -> np.ndarray:
     """Return the places (M, 3) between neighbouring voxels at which a field is 0, beside some voxels."""
     places = []
     for axis in range(3):

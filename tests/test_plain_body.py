@@ -1,0 +1,126 @@
+"""The body that a scan encloses: thin limbs are taken off, slits filled, and all else stays as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from numpy.typing import NDArray
+
+import scantruss as st
+from scantruss.surface.body import LIMB_RADIUS, SLIT_RADIUS, opened_body
+from scantruss.surface.samples import sample_surface
+
+LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
+Points = NDArray[np.float64]
+
+
+def ball(count: int = 20_000, seed: int = 0) -> Points:
+    """Points on a ball about the origin."""
+    directions = np.random.default_rng(seed).normal(size=(count, 3))
+    return np.asarray(RADIUS * directions / np.linalg.norm(directions, axis=1)[:, None])
+
+
+def rod(radius: float, along: Points, seed: int = 1) -> Points:
+    """Points on a tube of a radius around a curve (K, 3), and on the half ball at its end."""
+    rng = np.random.default_rng(seed)
+    steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
+    count = int(2 * np.pi * radius * steps.sum() / SPACING**2) + 12
+    at = rng.integers(len(along) - 1, size=count)
+    middle = along[at] + rng.random((count, 1)) * np.diff(along, axis=0)[at]
+    out = rng.normal(size=(count, 3))
+    ahead = np.diff(along, axis=0)[at] / steps[at, None]
+    out -= (out * ahead).sum(axis=1, keepdims=True) * ahead
+    tip = rng.normal(size=(60, 3))
+    tip *= np.where(tip @ ahead[-1] < 0.0, -1.0, 1.0)[:, None]
+    tube = middle + radius * out / np.linalg.norm(out, axis=1)[:, None]
+    return np.concatenate([tube, along[-1] + radius * tip / np.linalg.norm(tip, axis=1)[:, None]])
+
+
+def straight(far: float) -> Points:
+    """A curve from inside the ball to a distance beyond it."""
+    return np.linspace([RADIUS - 0.2, 0.0, 0.0], [RADIUS + far, 0.0, 0.0], 20)
+
+
+def outside(points: Points) -> Points:
+    """The points of a rod that do not lie in the ball."""
+    return points[np.linalg.norm(points, axis=1) > RADIUS]
+
+
+@pytest.mark.parametrize("radius", [0.2, 0.3, 0.35])
+def test_a_thin_limb_is_taken_off_where_it_begins_and_nothing_else(radius: float) -> None:
+    limb = outside(rod(radius, straight(3.0)))
+    scan = np.concatenate([ball(), limb])
+    opened = opened_body(scan, LENGTH, SPACING)
+    assert opened is not None and not opened.slit.any()
+    far = np.linalg.norm(scan, axis=1) - RADIUS
+    assert opened.limb[far > 0.8].all()
+    assert not opened.limb[np.linalg.norm(scan - [RADIUS, 0.0, 0.0], axis=1) > 4.0].any()
+    assert not opened.limb[: len(ball())][np.linalg.norm(scan[: len(ball())] - [RADIUS, 0.0, 0.0], axis=1) > 0.8].any()
+    assert len(opened.added) and (np.linalg.norm(opened.added - [RADIUS, 0.0, 0.0], axis=1) < 1.0).all()
+    assert (np.abs(np.linalg.norm(opened.added, axis=1) - RADIUS) < 0.5).all()
+
+
+@pytest.mark.parametrize("radius", [0.7, 1.0])
+def test_a_limb_that_has_room_for_the_ball_stays(radius: float) -> None:
+    assert radius > LIMB_RADIUS
+    bare = ball()[np.linalg.norm(ball()[:, 1:], axis=1) + RADIUS * (ball()[:, 0] < 0.0) > radius]
+    assert opened_body(np.concatenate([bare, outside(rod(radius, straight(3.0)))]), LENGTH, SPACING) is None
+
+
+def test_a_ball_a_dome_and_a_sheet_stay_as_they_are() -> None:
+    plan = 8.0 * np.random.default_rng(2).random((8_000, 2))
+    half = ball()[ball()[:, 2] > 0.0]
+    for scan in (ball(), half, np.column_stack([plan, 0.1 * plan[:, 0] ** 2])):
+        assert opened_body(scan, LENGTH, SPACING) is None
+
+
+def test_an_open_body_is_closed_at_its_boundary_first() -> None:
+    scan = np.concatenate([ball()[ball()[:, 2] > -3.2], outside(rod(0.25, straight(3.0)))])
+    opened = opened_body(scan, LENGTH, SPACING)
+    assert opened is not None
+    assert opened.limb[np.linalg.norm(scan, axis=1) > RADIUS + 0.8].all()
+    assert opened.limb[scan[:, 0] < 0.0].sum() == 0
+
+
+def test_a_slit_is_filled() -> None:
+    """Two boxes side by side on a common base, less than a ball of the slit apart."""
+    assert 2 * SLIT_RADIUS > 0.4
+    rng = np.random.default_rng(3)
+
+    def inside(p: Points) -> NDArray[np.bool_]:
+        slit = (np.abs(p[:, 0]) < 0.2) & (p[:, 2] > 0.0)
+        return np.asarray((np.abs(p) < [4.0, 3.0, 3.0]).all(axis=1) & ~slit)
+
+    faces = []
+    for axis, places in ((0, (-4.0, -0.2, 0.2, 4.0)), (1, (-3.0, 3.0)), (2, (-3.0, 0.0, 3.0))):
+        for place in places:
+            p = rng.uniform([-4.0, -3.0, -3.0], [4.0, 3.0, 3.0], (9_000, 3))
+            p[:, axis] = place
+            step = 1e-6 * np.eye(3)[axis]
+            faces.append(p[inside(p + step) != inside(p - step)])
+    scan = np.concatenate(faces)
+    opened = opened_body(scan, LENGTH, SPACING)
+    assert opened is not None
+    deep = (np.abs(scan[:, 0]) < 0.3) & (scan[:, 2] > 0.3) & (scan[:, 2] < 2.5) & (np.abs(scan[:, 1]) < 2.5)
+    assert opened.slit[deep].mean() > 0.95
+    assert not opened.slit[np.abs(scan[:, 0]) > 0.5].any()
+
+
+def tailed() -> Points:
+    """A ball with a tail that lies a third of a member off it: no front can tell the two apart."""
+    turn = np.linspace(0.0, 2.0, 120)
+    off = RADIUS + np.minimum(0.55, 3.0 * turn) - 0.02
+    tail = np.column_stack([off * np.cos(turn), off * np.sin(turn), np.zeros_like(turn)])
+    return np.concatenate([ball(), outside(rod(0.22, tail))])
+
+
+@compiled_only
+def test_a_body_with_a_thin_tail_beside_it_gets_a_grid_without_the_tail() -> None:
+    settings = st.Settings(length=LENGTH, effort="quick")
+    grid = st.grid_from_points(tailed(), settings)
+    found = grid.certificate
+    assert found is not None and found.passed
+    assert (grid.topology.boundary_loops, grid.topology.euler) == (0, 2)
+    samples = sample_surface(st.PointCloud.from_array(tailed()), settings.replace(plain_body=True))
+    assert samples.measured < len(samples.surface.mean)
