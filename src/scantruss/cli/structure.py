@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import SUPPRESS, Namespace
 from dataclasses import fields
 from pathlib import Path
@@ -15,9 +16,11 @@ if TYPE_CHECKING:
 
     from ..grid.grid import Grid
     from ..structure.options import StructureSettings
+    from ..structure.report import StructureReport
+    from ..structure.statics import Solution
     from .options import Parser
 
-STRUCTURE_SUFFIXES = (".json",)
+STRUCTURE_SUFFIXES = (".json", ".html", ".pdf", ".png")
 NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
@@ -45,11 +48,11 @@ def structure_parser() -> Parser:
 
     parser = Parser(
         "structure",
-        "GRID OUT.json --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
+        "GRID OUT ... --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    add_outs(parser, "structure with its results, .json", "*")
+    add_outs(parser, "structure with its results .json, report to read .html .pdf, picture .png", "*")
     parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
     parser.add_argument(
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
@@ -78,10 +81,9 @@ def structure(values: Namespace) -> None:
         claim(report_place, "report", taken, force=values.force)
     from ..export.json import read_grid
     from ..grid.certificate import check_passed
-    from ..structure.json import encode_structure
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
-    from ..structure.sizing import size_members
+    from ..structure.sizing import SizingRound, size_members, weight_curve
     from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
 
@@ -90,8 +92,12 @@ def structure(values: Namespace) -> None:
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
+        rounds: list[SizingRound] = []
+        weights = None
         if settings.size:
-            truss = size_members(truss, settings.size, settings.checks)
+            plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds)
+            if report_place or any(out.suffix.lower() in (".html", ".pdf") for out in outs):
+                weights = weight_curve(plain, truss, settings.size, settings.checks)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         bars("modes", 0.4)
@@ -99,9 +105,11 @@ def structure(values: Namespace) -> None:
         buckling = worst_buckling(factored, solution, modes) if modes else None
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
         bars("checks", 0.8)
-        report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
+        found: dict[str, Any] = {"buckling": buckling, "vibration": vibration, "rounds": rounds, "weights": weights}
+        report = report_structure(solution, settings.checks, _notes(settings), **found)
+        bars("report", 0.0)
         for out in outs:
-            save.beside(out).write_bytes(encode_structure(truss, solution, report))
+            save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
         if report_place is not None:
             save.json(report_place, report.to_dict())
     print_table(STRUCTURE_HEAD, structure_lines(report))
@@ -120,6 +128,36 @@ def structure(values: Namespace) -> None:
             f"wrote {' '.join(map(str, wrote))}",
         ]
     )
+
+
+def _encoded(
+    out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
+) -> bytes:
+    """Return what a file of the structure holds."""
+    if out.suffix.lower() == ".json":
+        from ..structure.json import encode_structure
+
+        return encode_structure(solution.truss, solution, report)
+    from ..report.structural.contents import ReportSource, overview_picture, report_parts
+
+    if out.suffix.lower() == ".png":
+        from ..export.drawing.structure import encode_structure_picture
+
+        return encode_structure_picture(solution.truss, overview_picture(solution, report))
+    from ..report.structural.html import encode_html
+    from ..report.structural.pdf import encode_pdf
+
+    parts = report_parts(ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report))
+    return (encode_html if out.suffix.lower() == ".html" else encode_pdf)(parts)
+
+
+def _command_line(values: Namespace) -> str:
+    """Return the command line with these values."""
+    words = ["scantruss", "structure", values.grid, *map(str, outs_of(values))]
+    for name in ("settings", "report", *(name for name, _, _ in OWN_OPTIONS)):
+        if vars(values).get(name) is not None:
+            words += [f"--{name.replace('_', '-')}", f"{vars(values)[name]}"]
+    return shlex.join([*words, *["--keep-failed"] * values.keep_failed])
 
 
 def structure_settings(values: Namespace) -> StructureSettings:

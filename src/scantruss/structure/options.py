@@ -85,6 +85,29 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
     return StructureSettings(**given, checks=MemberChecks(**checks))
 
 
+def settings_text(settings: StructureSettings) -> str:
+    """Return the TOML text that `read_structure_settings` turns into these settings."""
+    lines = []
+    for spec in fields(settings):
+        value = getattr(settings, spec.name)
+        if spec.name not in ("combinations", "checks") and value is not None:
+            lines.append(f"{spec.name} = {_toml(value)}")
+    lines += [f"{name} = {_toml(value)}" for name, value in vars(settings.checks).items()]
+    for each in settings.combinations or ():
+        lines += ["", "[[combinations]]", f"name = {_toml(each.name)}", f"state = {_toml(each.state)}"]
+        lines.append(f"factors = {_toml(dict(each.factors))}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML; strings as JSON writes them, which TOML reads."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{json.dumps(str(name))} = {_toml(each)}" for name, each in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
 def loads_of_words(words: str) -> tuple[Any, ...]:
     """Return loads of the command line: words with commas between them, files among them with all that they hold."""
     found: list[Any] = []

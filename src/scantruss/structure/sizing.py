@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..errors import InputError
@@ -13,6 +15,16 @@ from .truss import Truss
 
 ROUNDS = 60  #: of solving and choosing
 GROWTH_A_ROUND = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
+
+
+@dataclass(frozen=True)
+class SizingRound:
+    """A round of sizing, before its sections grow."""
+
+    mass: float  #: of all members [kg]
+    sections: int  #: different ones
+    utilization: float  #: the greatest of all members and combinations
+    buckling: float | None  #: least factor of linear buckling; None while members do not pass
 
 
 def candidates(truss: Truss) -> list[Section]:
@@ -40,7 +52,9 @@ def candidates(truss: Truss) -> list[Section]:
     return chain
 
 
-def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -> Truss:
+def size_members(
+    truss: Truss, count: int, checks: MemberChecks | None = None, rounds: list[SizingRound] | None = None
+) -> Truss:
     """Return the structure with sections that pass all checks under all ULS combinations (all load cases where there are none).
 
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
@@ -56,6 +70,8 @@ def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -
         Different sections at most.
     checks : MemberChecks, optional
         Buckling length, partial factors.
+    rounds : list of SizingRound, optional
+        Each round is added to it.
 
     Raises
     ------
@@ -72,11 +88,16 @@ def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
-        needed = _needed(solution, chosen, checks)
+        judged = _judged(solution)
+        needed = _needed(truss, judged, chosen, checks)
+        least = None
         if (needed <= chosen).all():
             least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
             if least < checks.buckling_factor:
                 needed = _stiffer(chosen, chain, checks.buckling_factor / least)
+        if rounds is not None:
+            used = max(float(_use(truss, result, checks).max()) for result in judged)
+            rounds.append(SizingRound(truss.mass, len(np.unique(chosen)), used, least))
         if (needed <= chosen).all():
             kept, numbers = np.unique(chosen, return_inverse=True)
             return truss.replace(sections=tuple(chain[k] for k in kept), section_of=numbers.ravel().astype(np.int64))
@@ -97,10 +118,18 @@ def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndar
     return np.maximum(chosen, grown)
 
 
-def _needed(solution: Solution, chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
+def weight_curve(truss: Truss, sized: Truss, count: int, checks: MemberChecks | None = None) -> dict[int, float]:
+    """Return the mass [kg] of a structure sized with at most 1, 2, ..., `count` different sections; `sized` is the last of them."""
+    return {number: size_members(truss, number, checks).mass for number in range(1, count)} | {count: sized.mass}
+
+
+def _judged(solution: Solution) -> list[CaseResult]:
+    """Return the results of the ULS combinations, or of all load cases where there are none."""
+    return [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
+
+
+def _needed(truss: Truss, judged: list[CaseResult], chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
     """Return for each member the first section of the structure, from the chosen one on, that resists its forces of every combination."""
-    truss = solution.truss
-    judged = [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
     needed = chosen.copy()
     for result in judged:
         for _ in range(len(truss.sections)):
