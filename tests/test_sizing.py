@@ -51,7 +51,7 @@ def test_one_section_lighter_would_not_do() -> None:
 
 
 def test_candidates_resist_more_the_heavier_they_are() -> None:
-    for name in ("CHS114.3x5", "CFCHS114.3x5", "SHS100x5"):
+    for name in ("CHS114.3x5", "CFCHS114.3x5", "SHS100x5", "HEA200"):
         chain = candidates(shell(section=name))
         for light, heavy in itertools.pairwise(chain):
             assert light.area < heavy.area and light.inertia_y < heavy.inertia_y and light.plastic_y < heavy.plastic_y

@@ -30,8 +30,8 @@ class SizingRound:
 def candidates(truss: Truss) -> list[Section]:
     """Return the sections that may replace the first of a structure, lightest first.
 
-    They are those of the catalogue with its shape and finish, of class 1 to 3, whose second moment of area is greater than that of
-    all lighter ones: a heavier one resists more in every way.
+    They are those of the catalogue with its shape, series (IPE, HEA, HEB) and finish, of class 1 to 3, whose second moment of area is
+    greater than that of all lighter ones: a heavier one resists more in every way.
 
     Raises
     ------
@@ -41,15 +41,20 @@ def candidates(truss: Truss) -> list[Section]:
     like, material = truss.sections[0], truss.material
     if material.kind != "steel":
         raise InputError(f"sizing follows checks of steel, and {material.name} is {material.kind}; leave --size out")
-    kind = [s for s in bundled_sections() if (s.shape, s.finish) == (like.shape, like.finish)]
+    kind = [s for s in bundled_sections() if _kind(s) == _kind(like)]
     chain: list[Section] = []
     for section in sorted(kind, key=lambda s: (s.area, -s.inertia_y)):
         better = not chain or (section.inertia_y > chain[-1].inertia_y and section.plastic_y > chain[-1].plastic_y)
         if better and section_class(section, material) < 4:
             chain.append(section)
     if not chain:
-        raise InputError(f"the catalogue has no sections like {like.name} to choose from; name a CHS or SHS")
+        raise InputError(f"the catalogue has no sections like {like.name} to choose from; name a CHS, SHS or I section")
     return chain
+
+
+def _kind(section: Section) -> tuple[str, str, str]:
+    """Return what stays when a section is replaced."""
+    return section.shape, section.finish, section.name.rstrip("0123456789.") if section.shape == "I" else ""
 
 
 def size_members(

@@ -25,6 +25,7 @@ MODES_SHOWN = 4  #: of buckling, and of vibration
 CLAUSE_TABLE = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
     ("EN 1993-1-1 5.2.1(3)", "least factor of linear buckling for analysis of first order"),
+    ("EN 1993-1-1 6.3.2.2", "lateral torsional buckling of I sections, within 6.3.3"),
     *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES),
     ("EN 1990 6.10, table A1.2(B)", "combinations of ULS, psi 0 of table A1.1"),
     ("EN 1990 6.14b", "characteristic combination of SLS"),
