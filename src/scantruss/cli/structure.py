@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from .options import Parser
 
 STRUCTURE_SUFFIXES = (".json", ".html", ".pdf", ".png")
-NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
@@ -182,7 +181,9 @@ def _inputs(values: Namespace) -> Taken:
 
 def _arguments(grid: Grid, settings: StructureSettings) -> dict[str, Any]:
     """Return the settings as `Truss.from_grid` takes them."""
-    given = {spec.name: getattr(settings, spec.name) for spec in fields(settings) if spec.name not in NOT_OF_GRID}
+    from ..structure.variants import truss_arguments
+
+    given = truss_arguments(settings)
     if Path(settings.supports).is_file():
         given["supports"] = _nodes_near(grid, settings.supports)
     return given

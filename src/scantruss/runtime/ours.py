@@ -16,6 +16,7 @@ LARGEST_PDF = 50_000_000  # bytes of a PDF file in which the mark is sought
 # tables have no place for a mark: those of members, of nodes, of a sweep, of schedules
 TABLE_HEADS = re.compile(
     rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b|node,node type,ring,"
+    rb"|[^\n]*\brise[ ,|]+mass \[kg\]"
     rb"|node,hole,member,|member,start,end,group,|panel,node 1,|(node|panel|length) type,count,|item,group,count,|warning,at,with,"
 )
 
