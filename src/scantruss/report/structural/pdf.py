@@ -18,6 +18,7 @@ WIDTH = A4[0] - 2 * MARGIN
 TEXT_SIZE, SMALL, CODE = 9.0, 7.2, 7.0  #: sizes of letters [pt]
 LEAST_TABLE = 4.5  #: size of the letters of a table so wide that it does not fit otherwise [pt]
 SPACING = 1.42  #: from line to line, in sizes of letters
+HEAD = 30.0  #: height of the head of a section [pt]
 GAP = 9.0  #: between columns [pt]
 GREY, RULE, WARNING_COLOUR = "#5b6675", "#8b95a1", "#a85a00"
 
@@ -40,6 +41,11 @@ class PdfPages:
         top = self.y
         self.y -= height
         return top
+
+    def keep(self, height: float) -> None:
+        """Begin a new page unless this one has room for some height."""
+        if self.y - height < FOOT:
+            self.y = 0.0
 
     def text(self, x: float, y: float, words: str, size: float = TEXT_SIZE, **style: Any) -> None:
         """Set a line of text with its base at y."""
@@ -67,7 +73,9 @@ def encode_pdf(parts: Sequence[ReportPart]) -> bytes:
     title = next((part.words for part in parts if isinstance(part, Headline)), "Structure")
     with drawing_defaults():
         pages = PdfPages(title)
-        for part in parts:
+        for part, after in zip(parts, [*parts[1:], None], strict=True):
+            if isinstance(part, SectionHead):  # it stays with what follows
+                pages.keep(HEAD + (WIDTH * after.tall + 40 if isinstance(after, Illustration) else 60))
             _SETTERS[type(part)](pages, part)
         stream = io.BytesIO()
         kept = {"Title": title, "Creator": MARK, "Producer": MARK, "CreationDate": None}
@@ -89,10 +97,7 @@ def _headline(pages: PdfPages, part: Headline) -> None:
 
 
 def _section_head(pages: PdfPages, part: SectionHead) -> None:
-    top = pages.room(30)
-    if pages.y - 60 < FOOT:  # no head at the foot of a page
-        pages.y = 0.0
-        top = pages.room(30)
+    top = pages.room(HEAD)
     pages.text(MARGIN, top - 20, part.words, 12, weight="bold")
     pages.rule(top - 25, colour="#58869e", bold=1.2)
 
@@ -126,7 +131,7 @@ def _data_table(pages: PdfPages, part: DataTable) -> None:
     def row(cells: Sequence[str], **style: Any) -> None:
         wrapped = [_wrapped(cell, size, width + 0.5) or [""] for cell, width in zip(cells, widths, strict=True)]
         height = SPACING * size * max(map(len, wrapped)) + 1.6
-        if not pages.figures or pages.y - height < FOOT:
+        if pages.y - height < FOOT:
             pages.y = 0.0
             head()
         top = pages.room(height)
@@ -151,8 +156,7 @@ def _data_table(pages: PdfPages, part: DataTable) -> None:
         pages.rule(pages.y + 2.5, rights[-1] - MARGIN)
 
     pages.room(4)
-    if pages.y - 5 * SPACING * size < FOOT:
-        pages.y = 0.0
+    pages.keep(5 * SPACING * size)
     head()
     for cells in part.rows:
         row(cells)
