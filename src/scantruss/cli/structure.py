@@ -36,6 +36,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      " loads (default self)"),
     ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
     ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
+    ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
 )  # fmt: skip
@@ -94,9 +95,9 @@ def structure(values: Namespace) -> None:
         rounds: list[SizingRound] = []
         weights = None
         if settings.size:
-            plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds)
+            plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds, by=settings.size_by)
             if report_place or any(out.suffix.lower() in (".html", ".pdf") for out in outs):
-                weights = weight_curve(plain, truss, settings.size, settings.checks)
+                weights = weight_curve(plain, truss, settings.size, settings.checks, settings.size_by)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         bars("modes", 0.4)

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import FormatError, InputError
 from .checks import MemberChecks
+from .groups import WAYS_TO_GROUP
 from .truss import Combination
 
 MOST_MODES = 50  #: of buckling or vibration
@@ -31,6 +32,7 @@ class StructureSettings:
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
     size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
+    size_by: str = WAYS_TO_GROUP[0]  #: what has a section of its own in sizing, of `WAYS_TO_GROUP`
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
@@ -40,6 +42,8 @@ class StructureSettings:
         """Refuse numbers of modes that are none."""
         if self.size < 0:
             raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
+        if self.size_by not in WAYS_TO_GROUP:
+            raise InputError(f"size_by must be one of {' '.join(WAYS_TO_GROUP)}, got {self.size_by!r}")
         if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
             raise InputError(
                 f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .groups import member_groups_of
 from .modes import Modes
 from .sizing import SizingRound
 from .statics import CaseResult, Solution
@@ -69,6 +70,7 @@ class StructureReport:
             "force_max": max(case.force_max for case in self.cases),
             "utilization_max": max(used) if used else None,
             "sections": {section.name: count for section, count in zip(self.truss.sections, counts, strict=True)},
+            "groups": self._groups(),
             "warnings": list(self.warnings),
         }
         if self.buckling is not None:
@@ -81,6 +83,20 @@ class StructureReport:
         if self.weights is not None:
             values["mass_by_sections"] = {str(count): mass for count, mass in self.weights.items()}
         return values
+
+    def _groups(self) -> dict[str, Any]:
+        """Return count, mass [kg], sections and greatest utilization of every group of members."""
+        names, group_of = member_groups_of(self.truss)
+        found = {}
+        for number, name in enumerate(names):
+            mine = group_of == number
+            found[name] = {
+                "members": int(mine.sum()),
+                "mass": float(self.truss.member_mass[mine].sum()),
+                "sections": [self.truss.sections[k].name for k in np.unique(self.truss.section_of[mine])],
+                "utilization_max": None if self.utilization is None else float(self.utilization[mine].max()),
+            }
+        return found
 
 
 def report_structure(

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from .catalogue import Section, bundled_sections
 from .checks import MemberChecks, section_class, strengths, utilizations
+from .groups import WAYS_TO_GROUP, member_groups_of
 from .modes import worst_buckling
 from .statics import CaseResult, Solution, factor_stiffness, solve
 from .truss import Truss
@@ -58,7 +59,12 @@ def _kind(section: Section) -> tuple[str, str, str]:
 
 
 def size_members(
-    truss: Truss, count: int, checks: MemberChecks | None = None, rounds: list[SizingRound] | None = None
+    truss: Truss,
+    count: int,
+    checks: MemberChecks | None = None,
+    rounds: list[SizingRound] | None = None,
+    *,
+    by: str = "members",
 ) -> Truss:
     """Return the structure with sections that pass all checks under all ULS combinations (all load cases where there are none).
 
@@ -77,6 +83,8 @@ def size_members(
         Buckling length, partial factors.
     rounds : list of SizingRound, optional
         Each round is added to it.
+    by : str
+        "groups" or "rings": all members of one have the same section, see `member_groups_of`; "members": each has its own.
 
     Raises
     ------
@@ -88,13 +96,14 @@ def size_members(
     chain = candidates(truss)
     chosen = np.zeros(len(truss.members), np.int64)
     checks = checks or MemberChecks()
+    group_of = np.arange(len(chosen)) if by == WAYS_TO_GROUP[0] else member_groups_of(truss, by)[1]
     for _ in range(ROUNDS):
         chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         judged = _judged(solution)
-        needed = _needed(truss, judged, chosen, checks)
+        needed = _same_in_groups(_needed(truss, judged, chosen, checks), group_of)
         least = None
         if (needed <= chosen).all():
             least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
@@ -115,6 +124,13 @@ def size_members(
     raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")
 
 
+def _same_in_groups(needed: np.ndarray, group_of: np.ndarray) -> np.ndarray:
+    """Return for each member the greatest of its group."""
+    most = np.zeros(int(group_of.max()) + 1, np.int64)
+    np.maximum.at(most, group_of, needed)
+    return most[group_of]
+
+
 def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndarray:
     """Return sections of which the lightest has grown in bending, as much as buckling lacks and at most half as much again."""
     inertia = np.array([section.inertia_y for section in chain])
@@ -123,9 +139,11 @@ def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndar
     return np.maximum(chosen, grown)
 
 
-def weight_curve(truss: Truss, sized: Truss, count: int, checks: MemberChecks | None = None) -> dict[int, float]:
+def weight_curve(
+    truss: Truss, sized: Truss, count: int, checks: MemberChecks | None = None, by: str = "members"
+) -> dict[int, float]:
     """Return the mass [kg] of a structure sized with at most 1, 2, ..., `count` different sections; `sized` is the last of them."""
-    return {number: size_members(truss, number, checks).mass for number in range(1, count)} | {count: sized.mass}
+    return {number: size_members(truss, number, checks, by=by).mass for number in range(1, count)} | {count: sized.mass}
 
 
 def _judged(solution: Solution) -> list[CaseResult]:

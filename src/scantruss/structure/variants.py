@@ -16,7 +16,13 @@ from .truss import Truss
 if TYPE_CHECKING:
     from ..grid.grid import Grid
 
-OF_ANALYSIS = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
+OF_ANALYSIS = (
+    "checks",
+    "size",
+    "size_by",
+    "buckling",
+    "frequencies",
+)  #: settings that the structure itself does not depend on
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ def _solved(grid: Grid, settings: StructureSettings, supports: str, rise: float)
     try:
         truss = Truss.from_grid(raised, **(truss_arguments(settings) | {"supports": supports}))
         if settings.size:
-            truss = size_members(truss, settings.size, settings.checks)
+            truss = size_members(truss, settings.size, settings.checks, by=settings.size_by)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         buckling = worst_buckling(factored, solution, 1)

@@ -210,6 +210,12 @@ def _tables(source: ReportSource) -> Iterator[ReportPart]:
         yield _members(solution, report)
     yield SectionHead("Sections and masses")
     yield _sections(truss, report)
+    rows = [
+        (name, f"{each['members']:,}", f"{each['mass']:,.0f}", " ".join(each["sections"]),
+         "-" if each["utilization_max"] is None else f"{each['utilization_max']:.2f}")
+        for name, each in report.to_dict()["groups"].items()
+    ]  # fmt: skip
+    yield DataTable(("group", "members", "mass [kg]", "sections", "utilization"), tuple(rows), words=(0, 3))
 
 
 def _reactions(solution: Solution) -> DataTable:
