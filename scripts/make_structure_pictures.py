@@ -40,7 +40,7 @@ def main() -> None:
     PLACE.mkdir(exist_ok=True)
     for name, shown in pictures.items():
         with Image.open(io.BytesIO(encode_structure_picture(truss, shown, SIZE))) as image:
-            small = image.convert("RGB").quantize(64, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+            small = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
             small.save(PLACE / f"{name}.png", optimize=True)
     print(
         {

@@ -22,14 +22,14 @@ from .parts import DataTable, Frame, Headline, Illustration, Listing, PointList,
 LISTED_MEMBERS = 20  #: of the table of the members that are used most
 LISTED_SUPPORTS = 60  #: of the table of reactions
 MODES_SHOWN = 4  #: of buckling, and of vibration
-CLAUSE_TABLE = (
+CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
-    ("EN 1993-1-1 5.2.1(3)", "least factor of linear buckling for analysis of first order"),
-    ("EN 1993-1-1 6.3.2.2", "lateral torsional buckling of I sections, within 6.3.3"),
+    ("EN 1993-1-1 5.2.1(3)", "least factor of linear buckling"),
     *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES),
-    ("EN 1990 6.10, table A1.2(B)", "combinations of ULS, psi 0 of table A1.1"),
-    ("EN 1990 6.14b", "characteristic combination of SLS"),
+    ("EN 1990 6.10, table A1.2(B)", "ULS, psi 0 of table A1.1"),
+    ("EN 1990 6.14b", "SLS, characteristic"),
 )
+OF_I_SECTIONS = ("EN 1993-1-1 6.3.2.2", "lateral torsional buckling")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,11 @@ def _first_page(source: ReportSource) -> Iterator[ReportPart]:
     yield PointList(tuple(_assumptions(truss, settings)))
     if report.utilization is not None:
         yield SectionHead("Clauses")
-        yield DataTable(("clause", "what for"), CLAUSE_TABLE, words=(0, 1))
+        used_clauses = [*CLAUSES_USED, *[OF_I_SECTIONS] * any(section.shape == "I" for section in truss.sections)]
+        half = -(-len(used_clauses) // 2)
+        pairs = zip(used_clauses[:half], [*used_clauses[half:], ("", "")][:half], strict=True)
+        head = ("clause", "what for", "clause", "what for")
+        yield DataTable(head, tuple((*left, *right) for left, right in pairs), words=(0, 1, 2, 3))
     yield SectionHead("To make it again")
     yield Sentence("The command, and the file structure.toml with all settings:")
     yield Listing(f"{source.command}\n\n# structure.toml\n{settings_text(settings)}")

@@ -17,6 +17,7 @@ MARGIN, TOP_MARGIN, FOOT = 48.0, 50.0, 52.0  #: margins, the right one as the le
 WIDTH = A4[0] - 2 * MARGIN
 TEXT_SIZE, SMALL, CODE = 9.0, 7.2, 7.0  #: sizes of letters [pt]
 LEAST_TABLE = 4.5  #: size of the letters of a table so wide that it does not fit otherwise [pt]
+MEASURED = 100.0  #: size of the letters that are measured [pt]
 SPACING = 1.42  #: from line to line, in sizes of letters
 HEAD = 30.0  #: height of the head of a section [pt]
 GAP = 9.0  #: between columns [pt]
@@ -59,10 +60,12 @@ class PdfPages:
         ends = [MARGIN / A4[0], (MARGIN + width) / A4[0]]
         self.figures[-1].add_artist(Line2D(ends, [y / A4[1]] * 2, color=colour, linewidth=bold))
 
-    def lines(self, lines: Sequence[str], size: float = TEXT_SIZE, indent: float = 0.0, **style: Any) -> None:
+    def lines(
+        self, lines: Sequence[str], size: float = TEXT_SIZE, indent: float = 0.0, spacing: float = SPACING, **style: Any
+    ) -> None:
         """Set lines of text."""
         for line in lines:
-            top = self.room(SPACING * size)
+            top = self.room(spacing * size)
             self.text(MARGIN + indent, top - 1.05 * size, line, size, **style)
 
 
@@ -119,7 +122,7 @@ def _listing(pages: PdfPages, part: Listing) -> None:
     pages.room(4)
     family = "DejaVu Sans Mono"
     for line in part.text.splitlines():
-        pages.lines(_wrapped(line, CODE, WIDTH - 8, family) or [""], CODE, indent=8, family=family)
+        pages.lines(_wrapped(line, CODE, WIDTH - 8, family) or [""], CODE, indent=8, spacing=1.28, family=family)
 
 
 def _data_table(pages: PdfPages, part: DataTable) -> None:
@@ -231,9 +234,9 @@ def _pieces(words: str, size: float, width: float, family: str) -> Iterator[str]
 def _width(words: str, size: float, family: str = "DejaVu Sans") -> float:
     """Return the width of a line of text [pt]."""
     font = _font(family)
-    font.set_size(size, 72)
+    font.set_size(MEASURED, 72)  # large, as small letters are rounded to whole pixels
     font.set_text(words)
-    return float(font.get_width_height()[0]) / 64
+    return float(font.get_width_height()[0]) / 64 * size / MEASURED
 
 
 @cache
