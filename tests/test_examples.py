@@ -124,6 +124,7 @@ def test_great_court(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_timber_limpet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     report = run("09_timber_limpet", tmp_path, monkeypatch)
     assert report.utilization is None and "GL24h R120x240 is not steel" in report.warnings[0]
+    assert "not steel" in (tmp_path / "limpet.html").read_text(encoding="utf-8")
     assert report.buckling.values[0] > 1 and max(case.equilibrium_error for case in report.cases) < 1e-9
     assert report.truss.lengths.mean() == pytest.approx(200 * 7.8e-3, rel=0.05)
 

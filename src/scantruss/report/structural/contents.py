@@ -37,7 +37,7 @@ class ReportSource:
     """What a report is made from."""
 
     name: str  #: of the grid's file
-    command: str  #: that makes it again
+    command: str  #: that makes it again, "" where none does
     settings: StructureSettings
     solution: Solution
     report: StructureReport
@@ -92,8 +92,8 @@ def _first_page(source: ReportSource) -> Iterator[ReportPart]:
         head = ("clause", "what for", "clause", "what for")
         yield DataTable(head, tuple((*left, *right) for left, right in pairs), words=(0, 1, 2, 3))
     yield SectionHead("To make it again")
-    yield Sentence("The command, and the file structure.toml with all settings:")
-    yield Listing(f"{source.command}\n\n# structure.toml\n{settings_text(settings)}")
+    yield Sentence(f"{'The command, and the' if source.command else 'The'} file structure.toml with all settings:")
+    yield Listing(f"{source.command}\n\n# structure.toml\n{settings_text(settings)}".lstrip())
 
 
 def _range_of_forces(values: dict[str, Any]) -> str:
