@@ -152,6 +152,16 @@ def test_lines_of_a_pdf_fit_and_lose_nothing() -> None:
         assert "".join(lines).replace(" ", "") == words.replace(" ", "")
 
 
+def test_what_is_left_out_of_a_table_is_said(place: Path) -> None:
+    """Moments of held feet have a column; long lists of modes and combinations say how many there are."""
+    st.write(dome(20, 40.0), "grid.json")
+    loads = f"{LOADS},half-snow:1kN/m2,wind:1kN/m2:-0.5,temperature:20K"
+    assert run(f"a.html --loads {loads} --support-type fixed --frequencies 6") == 0
+    text = " ".join(read("a.html").text)
+    assert "most moment [kNm]" in text and "The 60 greatest of 76" in text and "All values: " in text
+    assert "Those that use the members or move the nodes most" in text
+
+
 def test_a_picture_shows_the_members(place: Path) -> None:
     assert run(f"a.png --loads {LOADS}") == 0
     with Image.open("a.png") as image:

@@ -78,9 +78,8 @@ def buckling_curve(section: Section, material: Material, axis: str = "y") -> str
     return "c"
 
 
-def reduction(slenderness: np.ndarray, curve: str) -> np.ndarray:
-    """Return chi for relative slendernesses (EN 1993-1-1 6.3.1.2, equation 6.49)."""
-    alpha = IMPERFECTION[curve]
+def reduction(slenderness: np.ndarray, alpha: np.ndarray | float) -> np.ndarray:
+    """Return chi for relative slendernesses and imperfection factors (EN 1993-1-1 6.3.1.2, equation 6.49)."""
     phi = 0.5 * (1 + alpha * (slenderness - NO_BUCKLING) + slenderness**2)
     chi = 1 / (phi + np.sqrt(np.maximum(phi**2 - slenderness**2, 0.0)))
     return np.where(slenderness <= NO_BUCKLING, 1.0, np.minimum(chi, 1.0))
@@ -121,11 +120,8 @@ def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
     if open_.any():
         twisting = _twisting_load(truss, length)
         relative[:, 1] = np.maximum(relative[:, 1], np.where(open_, np.sqrt(area * strength / twisting), 0.0))
-    chi = np.empty_like(relative)
-    for number, section in enumerate(truss.sections):
-        mine = truss.section_of == number
-        for column, axis in enumerate("yz"):
-            chi[mine, column] = reduction(relative[mine, column], buckling_curve(section, material, axis))
+    curves = [[IMPERFECTION[buckling_curve(section, material, axis)] for axis in "yz"] for section in truss.sections]
+    chi = reduction(relative, np.array(curves)[truss.section_of])
     modulus = np.stack([np.where(plastic, of(f"plastic_{axis}"), of(f"elastic_{axis}")) for axis in "yz"], axis=1)
     lateral = np.ones(len(length))
     if open_.any():
@@ -134,9 +130,8 @@ def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
         )  # critical, all along the member
         slender = np.sqrt(modulus[:, 0] * strength / moment)
         tall = np.array([section.depth > 2 * section.width for section in truss.sections])[truss.section_of]
-        lateral = np.where(
-            open_, np.where(tall, reduction(slender, "b"), reduction(slender, "a")), 1.0
-        )  # tables 6.3, 6.4
+        alpha = np.where(tall, IMPERFECTION["b"], IMPERFECTION["a"])  # tables 6.3, 6.4
+        lateral = np.where(open_, reduction(slender, alpha), 1.0)
     return Strength(
         truss=truss,
         settings=settings,

@@ -21,6 +21,7 @@ from .parts import DataTable, Frame, Headline, Illustration, Listing, PointList,
 
 LISTED_MEMBERS = 20  #: of the table of the members that are used most
 LISTED_SUPPORTS = 60  #: of the table of reactions
+LISTED_CASES = 60  #: about, of the table of load cases
 MODES_SHOWN = 4  #: of buckling, and of vibration
 CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
@@ -194,8 +195,10 @@ def _image(truss: Truss, shown: MemberPicture) -> Illustration:
     return Illustration(shown.title + more, lambda figure, place: draw_members(figure, place, truss, shown))
 
 
-def _modes(truss: Truss, modes: Modes, words: str) -> Iterator[Illustration]:
-    """Yield pictures of the first modes."""
+def _modes(truss: Truss, modes: Modes, words: str) -> Iterator[Illustration | Sentence]:
+    """Yield pictures of the first modes, and the values of all."""
+    if len(modes.values) > MODES_SHOWN:
+        yield Sentence(f"All values: {', '.join(f'{value:.4g}' for value in modes.values)}.")
     for number, (value, shape) in enumerate(zip(modes.values[:MODES_SHOWN], modes.shapes, strict=False), 1):
         yield _image(truss, mode_picture(truss, words.format(number, value), shape))
 
@@ -204,7 +207,9 @@ def _tables(source: ReportSource) -> Iterator[ReportPart]:
     """Yield tables of load cases, reactions, governing members and sections."""
     solution, report, truss = source.solution, source.report, source.solution.truss
     yield SectionHead("Load cases and combinations")
-    yield DataTable(STRUCTURE_HEAD, tuple(structure_lines(report, most=60)))
+    lines = structure_lines(report, most=LISTED_CASES)
+    note = f"Those that use the members or move the nodes most, {len(lines)} of {len(report.cases)}."
+    yield DataTable(STRUCTURE_HEAD, tuple(lines), note=note if len(lines) < len(report.cases) else "")
     errors = max(case.equilibrium_error for case in report.cases)
     yield Sentence(f"Equilibrium of forces and moments holds to {errors:.1e} in every one.")
     yield SectionHead("Reactions")
@@ -227,24 +232,26 @@ def _reactions(solution: Solution) -> DataTable:
     truss = solution.truss
     held = np.flatnonzero(truss.supports.any(axis=1))
     judged = [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
-    forces = np.stack([result.reactions[held, :3] for result in judged]) / 1e3
-    across = np.linalg.norm(forces[:, :, :2], axis=2)
-    up = forces[:, :, 2]
+    made = np.stack([result.reactions[held] for result in judged]) / 1e3
+    up, size = made[:, :, 2], np.linalg.norm(made[:, :, :3], axis=2)
+    columns = {
+        "least up [kN]": up.min(axis=0),
+        "most up [kN]": up.max(axis=0),
+        "most across [kN]": np.linalg.norm(made[:, :, :2], axis=2).max(axis=0),
+    }
+    if (moments := np.linalg.norm(made[:, :, 3:], axis=2).max(axis=0)).any():
+        columns["most moment [kNm]"] = moments
     places = truss.nodes[held] + truss.origin
-    rows = [
-        (truss.node_marks[node], *(f"{c:.3f}" for c in place), f"{up[:, k].min():.1f}", f"{up[:, k].max():.1f}",
-         f"{across[:, k].max():.1f}", judged[int(np.linalg.norm(forces[:, k], axis=1).argmax())].name)
-        for k, (node, place) in enumerate(zip(held, places, strict=True))
-    ]  # fmt: skip
-    order = np.argsort(-np.linalg.norm(forces, axis=2).max(axis=0), kind="stable")
+    order = np.argsort(-size.max(axis=0), kind="stable")
     kept = order if len(order) <= LISTED_SUPPORTS else np.sort(order[:LISTED_SUPPORTS])
-    note = (
-        ""
-        if len(order) <= LISTED_SUPPORTS
-        else f"The {LISTED_SUPPORTS} greatest of {len(order):,}; all stand in the .json of the structure."
-    )
-    head = ("support", "x [m]", "y [m]", "z [m]", "least up [kN]", "most up [kN]", "most across [kN]", "greatest under")
-    return DataTable(head, tuple(rows[k] for k in kept), words=(0, 7), note=note)
+    rows = [
+        (truss.node_marks[held[k]], *(f"{c:.3f}" for c in places[k]), *(f"{values[k]:.1f}" for values in columns.values()),
+         judged[int(size[:, k].argmax())].name)
+        for k in kept
+    ]  # fmt: skip
+    head = ("support", "x [m]", "y [m]", "z [m]", *columns, "greatest under")
+    note = f"The {len(kept)} greatest of {len(order):,}; the .json of the structure has all, of every load case."
+    return DataTable(head, tuple(rows), words=(0, len(head) - 1), note=note if len(kept) < len(order) else "")
 
 
 def _members(solution: Solution, report: StructureReport) -> DataTable:
