@@ -24,6 +24,7 @@ COLOUR_SCALES = {
 }
 OVERUSED = "#d81e2c"  #: colour of a utilization over 1
 MEMBER_PICTURE = (1500, 940)  #: size of a picture of members [pixel]
+MOST_VECTORS = 8000  #: lines and triangles of a picture in a PDF; more are drawn as pixels
 NOTES = 18  #: height of the notes below a picture [pixel]
 STILL = np.array([0.72, 0.73, 0.74, 1.0])  #: colour of members where they were before they moved
 SHELL_SHADES = np.array([0.80, 0.985])  #: grey of triangles in the shade and in the light
@@ -150,7 +151,7 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     shape, fill, line, widths = (cast(Any, np.concatenate([part[k] for part in parts])[order]) for k in range(1, 5))
     axes.add_collection(
         PolyCollection(shape, closed=False, facecolors=fill, edgecolors=line, linewidths=0.72 * widths,
-                       capstyle="round", joinstyle="round", antialiaseds=True), autolim=False,
+                       capstyle="round", joinstyle="round", antialiaseds=True, rasterized=len(shape) > MOST_VECTORS), autolim=False,
     )  # fmt: skip
     held = np.flatnonzero(truss.supports.any(axis=1))
     axes.plot(

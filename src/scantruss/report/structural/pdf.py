@@ -17,6 +17,7 @@ MARGIN, TOP_MARGIN, FOOT = 48.0, 50.0, 52.0  #: margins, the right one as the le
 WIDTH = A4[0] - 2 * MARGIN
 TEXT_SIZE, SMALL, CODE = 9.0, 7.2, 7.0  #: sizes of letters [pt]
 LEAST_TABLE = 4.5  #: size of the letters of a table so wide that it does not fit otherwise [pt]
+PIXELS = 220  #: to an inch, of pictures of very many members
 MEASURED = 100.0  #: size of the letters that are measured [pt]
 SPACING = 1.42  #: from line to line, in sizes of letters
 HEAD = 30.0  #: height of the head of a section [pt]
@@ -89,7 +90,7 @@ def encode_pdf(parts: Sequence[ReportPart]) -> bytes:
                     (A4[0] - MARGIN, f"{number} / {len(pages.figures)}", "right"),
                 ):
                     figure.text(x / A4[0], 30 / A4[1], words, fontsize=7, color=GREY, ha=side, parse_math=False)
-                file.savefig(figure)
+                file.savefig(figure, dpi=PIXELS)
     return stream.getvalue()
 
 
