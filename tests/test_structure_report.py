@@ -47,7 +47,7 @@ class Reader(HTMLParser):
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the grid of a dome, 1:50 in mm."""
     monkeypatch.chdir(tmp_path)
-    st.write(dome(6, 40.0), "grid.json")
+    st.write(dome(5, 40.0), "grid.json")
     return tmp_path
 
 
@@ -121,10 +121,10 @@ def test_the_same_structure_gives_the_same_bytes(place: Path, monkeypatch: pytes
 
     for folder, size in (("one", 10.0), ("two", 17.0)):  # whatever the user's own defaults are
         Path(folder).mkdir()
-        st.write(dome(6, 40.0), f"{folder}/grid.json")
+        st.write(dome(4, 40.0), f"{folder}/grid.json")
         monkeypatch.chdir(place / folder)
         with matplotlib.rc_context({"font.size": size, "axes.grid": size > 10}):
-            assert run(f"a.html a.pdf a.png --loads {LOADS} --buckling 1") == 0
+            assert run("a.html a.pdf a.png") == 0
         monkeypatch.chdir(place)
     for name in ("a.html", "a.pdf", "a.png"):
         assert Path("one", name).read_bytes() == Path("two", name).read_bytes()

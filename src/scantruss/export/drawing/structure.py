@@ -153,9 +153,10 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
         PolyCollection(shape, closed=False, facecolors=fill, edgecolors=line, linewidths=0.72 * widths,
                        capstyle="round", joinstyle="round", antialiaseds=True, rasterized=len(shape) > MOST_VECTORS), autolim=False,
     )  # fmt: skip
+    mark = float(np.clip(0.2 * camera.zoom * np.median(truss.lengths), 1.5, 4.5))
     held = np.flatnonzero(truss.supports.any(axis=1))
     axes.plot(
-        *flat[held].T, "^", markersize=4.5, markerfacecolor="white", markeredgecolor=tuple(INK), markeredgewidth=0.9
+        *flat[held].T, "^", markersize=mark, markerfacecolor="white", markeredgecolor=tuple(INK), markeredgewidth=0.9
     )
     bar = figure.add_axes((left + width * 0.9, bottom + height * 0.14, width * 0.018, height * 0.72))
     made = figure.colorbar(
