@@ -150,14 +150,14 @@ def cloth() -> Shell:
     return Shell(np.concatenate([low, right, -low, -right]), height, corners=corners)
 
 
-COURT = (36.625, 46.025, 51.125, 22.245)  # half width, to the south, to the north, radius of the reading room [m]
+COURT = (36.625, 46.025, 51.125, 22.245)  # half width, extent along -y and +y, radius of the reading room [m]
 
 
 def court() -> Shell:
     """Return a court of 73 x 97 m around a round reading room, in metres.
 
     The rectangle, the circle and the function between them are those of Williams, The analytic and numerical definition of the
-    geometry of the British Museum Great Court Roof, 2001; the bulge on it is simpler than his.
+    geometry of the British Museum Great Court Roof, 2001, with y the other way; the bulge on it is simpler than his.
     """
     half, south, north, radius = COURT
 
