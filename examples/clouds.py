@@ -1,4 +1,7 @@
-"""Scans for the examples, generated: shells like those of the paper, given by a polygon in plan and a height above it [mm]."""
+"""Scans for the examples, generated: shells like those of the paper, given by a polygon in plan and a height above it [mm].
+
+The last two are roofs in metres.
+"""
 
 from __future__ import annotations
 
@@ -147,7 +150,53 @@ def cloth() -> Shell:
     return Shell(np.concatenate([low, right, -low, -right]), height, corners=corners)
 
 
+COURT = (36.625, 46.025, 51.125, 22.245)  # half width, extent along -y and +y, radius of the reading room [m]
+
+
+def court() -> Shell:
+    """Return a court of 73 x 97 m around a round reading room, in metres.
+
+    The rectangle, the circle and the function between them are those of Williams, The analytic and numerical definition of the
+    geometry of the British Museum Great Court Roof, 2001, with y the other way; the bulge on it is simpler than his.
+    """
+    half, south, north, radius = COURT
+
+    def height(x: Array, y: Array) -> Array:
+        away = np.maximum(np.hypot(x, y), radius)
+        near_x, near_y = radius * x / away, radius * y / away
+        edge = (1 - x / half) * (1 + x / half) * (1 - y / north) * (1 + y / south)
+        inner = (1 - near_x / half) * (1 + near_x / half) * (1 - near_y / north) * (1 + near_y / south)
+        share = edge / inner  # 0 on the rectangle, 1 on the circle
+        return np.asarray(1.25 * share + 14.0 * share * (1 - radius / away))
+
+    corners = _lifted(height, [(-half, -south), (half, -south), (half, north), (-half, north)])
+    return Shell(corners[:, :2], height, ((0.0, 0.0, radius, radius, 0.0),), corners)
+
+
+def canopy() -> Shell:
+    """Return a canopy of 40 x 28 m that follows the hills below it, with the places of its feet, in metres."""
+
+    def height(x: Array, y: Array) -> Array:
+        return np.asarray(4 + 2.2 * np.sin(x / 7.5) * np.cos(y / 8.0) - 0.012 * x**2 - 0.006 * y**2)
+
+    outline = np.array([(-20.0, -14.0), (20, -14), (20, 14), (-20, 14)])
+    feet = [
+        (-17.0, -11.0),
+        (-5.0, -10.0),
+        (7.0, -11.0),
+        (17.0, -10.0),
+        (-17.0, 10.0),
+        (-6.0, 11.0),
+        (6.0, 10.0),
+        (17.0, 11.0),
+        (0.0, 0.0),
+    ]
+    return Shell(outline, height, corners=_lifted(height, outline), fixed=_lifted(height, feet))
+
+
 SHELLS = {
+    "court": court,
+    "canopy": canopy,
     "scallop": scallop,
     "clam": clam,
     "limpet": limpet,

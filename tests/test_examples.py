@@ -1,8 +1,9 @@
-"""The paper's examples run, and their grids are what the shapes allow."""
+"""The paper's examples run, and their grids are what the shapes allow; those of structures stand, and are as the docs say."""
 
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 from typing import Any
 
@@ -93,3 +94,46 @@ def test_fixed_nodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for position in grid.settings.fixed:
         assert np.linalg.norm(grid.nodes + grid.origin - position, axis=1).min() < 1e-9
     assert grid.quality.shape_min > 0.5
+
+
+def test_great_court(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All checks pass, the plan is that of the court, and the table in the docs has these figures."""
+    figures = run("08_great_court", tmp_path, monkeypatch)
+    assert figures["utilization_max"] <= 1 and figures["buckling_factors"][0] >= 10 and len(figures["sections"]) <= 2
+    assert figures["warnings"] == [] and (tmp_path / "roof.html").stat().st_size > 100_000
+    plan = 73.25 * 97.15 - np.pi * 22.245**2
+    assert -figures["cases"]["snow"]["applied"][2] == pytest.approx(600 * plan, rel=0.01)
+    assert figures["cases"]["self"]["applied"][2] == pytest.approx(-1.1 * 9.80665 * figures["mass"])
+    text = (FOLDER.parent / "docs" / "structure.md").read_text(encoding="utf-8")
+    table = text.partition("| of the court |")[2].partition("\n\n")[0]
+    rows = dict(re.findall(r"^\| ([a-z ]+) \| ([\d.,]+) \|", table, re.MULTILINE))
+    ours = {
+        "nodes": figures["nodes"],
+        "members": figures["members"],
+        "mass": figures["mass"] / 1e3,
+        "greatest utilization": figures["utilization_max"],
+        "greatest displacement": 1e3
+        * max(case["displacement_max"] for case in figures["cases"].values() if case["state"] == "SLS"),
+        "greatest compression": -figures["force_min"] / 1e3,
+        "buckling factor": figures["buckling_factors"][0],
+        "lowest frequency": figures["frequencies"][0],
+    }
+    assert {name: float(value.replace(",", "")) for name, value in rows.items()} == pytest.approx(ours, rel=0.03)
+
+
+def test_timber_limpet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    report = run("09_timber_limpet", tmp_path, monkeypatch)
+    assert report.utilization is None and "GL24h R120x240 is not steel" in report.warnings[0]
+    assert "not steel" in (tmp_path / "limpet.html").read_text(encoding="utf-8")
+    assert report.buckling.values[0] > 1 and max(case.equilibrium_error for case in report.cases) < 1e-9
+    assert report.truss.lengths.mean() == pytest.approx(200 * 7.8e-3, rel=0.05)
+
+
+def test_canopy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stands on its nine feet, passes, and wind lifts it."""
+    report = run("10_canopy", tmp_path, monkeypatch)
+    held = report.truss.supports.any(axis=1)
+    assert held.sum() == 9 and report.utilization.max() <= 1 and report.buckling.values[0] >= 10
+    cases = {case.name: case for case in report.cases}
+    assert cases["wind"].applied[2] > 0 > cases["snow"].applied[2]
+    assert (tmp_path / "canopy.json").exists()

@@ -8,7 +8,9 @@ import pytest
 from small_grids import dome
 
 import scantruss as st
+from scantruss.grid.line_sets import FIXED_LINE, LineSet
 from scantruss.structure.checks import MemberChecks
+from scantruss.structure.groups import member_groups_of
 from scantruss.structure.modes import worst_buckling
 from scantruss.structure.report import report_structure
 from scantruss.structure.sizing import _few, candidates, size_members
@@ -51,7 +53,7 @@ def test_one_section_lighter_would_not_do() -> None:
 
 
 def test_candidates_resist_more_the_heavier_they_are() -> None:
-    for name in ("CHS114.3x5", "CFCHS114.3x5", "SHS100x5"):
+    for name in ("CHS114.3x5", "CFCHS114.3x5", "SHS100x5", "HEA200"):
         chain = candidates(shell(section=name))
         for light, heavy in itertools.pairwise(chain):
             assert light.area < heavy.area and light.inertia_y < heavy.inertia_y and light.plastic_y < heavy.plastic_y
@@ -72,6 +74,37 @@ def test_few_sections_have_the_least_volume(seed: int) -> None:
             up = np.array(way)[np.searchsorted(way, chosen)]
             volumes.append((lengths * areas[up]).sum())
     assert (lengths * areas[made]).sum() == pytest.approx(min(volumes))
+
+
+@pytest.mark.parametrize("by", ["groups", "rings"])
+def test_the_members_of_a_group_have_one_section(by: str) -> None:
+    sized = size_members(shell(), 4, by=by)
+    names, group_of = member_groups_of(sized, by)
+    for number in range(len(names)):
+        assert len(np.unique(sized.section_of[group_of == number])) == 1
+    report = report_structure(st.solve(sized)).to_dict()
+    assert report["utilization_max"] <= 1 and sized.mass >= size_members(shell(), 4).mass * 0.999
+
+
+def test_groups_are_boundary_lines_and_the_rest_of_each_piece() -> None:
+    grid = dome(8, 40.0)
+    names, group_of = member_groups_of(Truss.from_grid(grid, supports="boundary", scale=50))
+    assert names == ("boundary", "inner") and (group_of == 0).sum() == (grid.edge_triangles[:, 1] < 0).sum()
+    names, ring = member_groups_of(Truss.from_grid(grid, supports="boundary", scale=50), "rings")
+    assert names[:2] == ("ring 0", "ring 1") and set(ring[group_of == 0]) == {0}
+    line = grid.replace(line_sets=(LineSet("rib", FIXED_LINE, np.arange(27, 30)),))
+    names, group_of = member_groups_of(Truss.from_grid(line, supports="boundary", scale=50))
+    assert names == ("boundary", "inner", "line:rib") and (group_of == 2).sum() == 2
+    count = len(grid.nodes)
+    two = grid.replace(
+        nodes=np.concatenate([grid.nodes, grid.nodes + [500, 0, 0]]),
+        triangles=np.concatenate([grid.triangles, grid.triangles + count]),
+        fixed=np.tile(grid.fixed, 2),
+    )
+    names, _ = member_groups_of(Truss.from_grid(two, supports="boundary", scale=50))
+    assert names == ("piece 1 boundary", "piece 1 inner", "piece 2 boundary", "piece 2 inner")
+    with pytest.raises(st.InputError, match="grouped by groups or rings"):
+        member_groups_of(shell(), "colour")
 
 
 def test_what_cannot_be_sized_is_refused() -> None:

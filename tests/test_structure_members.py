@@ -182,3 +182,84 @@ def test_the_span_is_twice_the_way_to_the_nearest_support() -> None:
 def test_limits_must_be_positive(value: float) -> None:
     with pytest.raises(st.InputError, match="gamma_m0 must be a positive number"):
         MemberChecks(gamma_m0=value)
+
+
+@pytest.mark.parametrize(
+    ("name", "figures"),
+    [  # A cm2, I y, I z cm4, W pl y, W pl z cm3, I t cm4 as the tables of rolled sections print them
+        ("IPE80", (7.64, 80.1, 8.49, 23.2, 5.8, 0.70)),
+        ("IPE200", (28.5, 1943, 142, 221, 44.6, 6.98)),
+        ("IPE300", (53.8, 8356, 604, 628, 125, 20.1)),
+        ("IPE600", (156, 92080, 3387, 3512, 486, 165)),
+        ("HEA100", (21.2, 349, 134, 83.0, 41.1, 5.24)),
+        ("HEA200", (53.8, 3692, 1336, 429, 204, 21.0)),
+        ("HEA300", (112.5, 18260, 6310, 1383, 641, 85.2)),
+        ("HEB200", (78.1, 5696, 2003, 643, 306, 59.3)),
+        ("HEB300", (149.1, 25170, 8563, 1869, 870, 185)),
+    ],
+)
+def test_rolled_sections_have_the_properties_of_the_tables(name: str, figures: tuple[float, ...]) -> None:
+    section = find_section(name)
+    found = (
+        section.area * 1e4, section.inertia_y * 1e8, section.inertia_z * 1e8, section.plastic_y * 1e6, section.plastic_z * 1e6,
+        section.torsion * 1e8,
+    )  # fmt: skip
+    assert found == pytest.approx(figures, rel=6e-3)
+
+
+AREAS = {  # cm2, from the tables: one for every size that is bundled
+    "IPE": (7.64, 10.3, 13.2, 16.4, 20.1, 23.9, 28.5, 33.4, 39.1, 45.9, 53.8, 62.6, 72.7, 84.5, 98.8, 115.5, 134.4, 156.0),
+    "HEA": (21.2, 25.3, 31.4, 38.8, 45.3, 53.8, 64.3, 76.8, 86.8, 97.3, 112.5, 124.4, 133.5, 142.8, 159.0, 178.0, 197.5),
+    "HEB": (26.0, 34.0, 43.0, 54.3, 65.3, 78.1, 91.0, 106.0, 118.4, 131.4, 149.1, 161.3, 170.9, 180.6, 197.8, 218.0, 238.6),
+}  # fmt: skip
+INERTIAS = {  # I y, cm4
+    "IPE": (80.1, 171, 318, 541, 869, 1317, 1943, 2772, 3892, 5790, 8356, 11770, 16270, 23130, 33740, 48200, 67120, 92080),
+    "HEA": (349, 606, 1033, 1673, 2510, 3692, 5410, 7763, 10450, 13670, 18260, 22930, 27690, 33090, 45070, 63720, 86970),
+    "HEB": (450, 864, 1509, 2492, 3831, 5696, 8091, 11260, 14920, 19270, 25170, 30820, 36660, 43190, 57680, 79890, 107200),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("series", AREAS)
+def test_every_rolled_size_has_the_area_and_stiffness_of_the_tables(series: str) -> None:
+    found = [section for section in bundled_sections() if section.name.startswith(series)]
+    assert [section.area * 1e4 for section in found] == pytest.approx(AREAS[series], rel=4e-3)
+    assert [section.inertia_y * 1e8 for section in found] == pytest.approx(INERTIAS[series], rel=2e-3)
+
+
+def test_rolled_sections_have_the_classes_and_curves_of_the_tables() -> None:
+    """Table 5.2: web 28.4 and flange 4.14 of IPE200; table 6.2 with h / b of 2 and of 1."""
+    slim, wide = find_section("IPE200"), find_section("HEB200")
+    assert [section_class(slim, find_material(name)) for name in ("S235", "S355", "S460")] == [1, 2, 3]
+    assert section_class(wide, STEEL) == 1 and section_class(find_section("IPE400"), STEEL) == 4  # 38.5 > 42 x 0.814
+    assert [buckling_curve(slim, STEEL, axis) for axis in "yz"] == ["a", "b"]
+    assert [buckling_curve(wide, STEEL, axis) for axis in "yz"] == ["b", "c"]
+    assert buckling_curve(slim, find_material("S460"), "z") == "a0"
+
+
+def test_an_i_beam_buckles_sideways_at_the_moment_worked_out_by_hand() -> None:
+    """IPE300 in S235, 3 m between forks.
+
+    pi2 E I z / L2 = 1390 kN, I w = 126e3 cm6, so M,cr = 1390 sqrt(126e3 / 603.8 / 1e4 + 81e3 x 20.1e-8 / 1.390) = 251 kNm,
+    slenderness sqrt(628.4 x 0.235 / 251) = 0.767, phi 0.854, chi 0.814 on curve a; shear area 53.8 - 32.1 + 4.0 = 25.7 cm2.
+    """
+    truss = make_truss([(0, 0, 0), (3.0, 0, 0)], [(0, 1)], {0: HELD, 1: HELD}, forces(2, {1: (0, 0, 0)}),
+                       sections=(find_section("IPE300"),), material=find_material("S235"))  # fmt: skip
+    strength = strengths(truss)
+    assert find_section("IPE300").warping == pytest.approx(126e-9, rel=5e-3)
+    assert strength.lateral[0] == pytest.approx(0.814, abs=2e-3)
+    assert strength.shear[0, 1] == pytest.approx(25.7e-4 * 235e6 / np.sqrt(3), rel=2e-3)
+
+
+def test_tubes_do_not_buckle_sideways() -> None:
+    truss = Truss.from_grid(dome(6, 40.0), scale=50, supports="boundary")
+    assert (strengths(truss).lateral == 1).all()
+
+
+def test_own_i_sections_come_from_csv(tmp_path: Path) -> None:
+    table = tmp_path / "own.csv"
+    head = "name,shape,depth [mm],width [mm],thickness [mm],flange [mm],fillet [mm]\n"
+    table.write_text(head + "B1,I,200,100,5.6,8.5,12\n")
+    assert find_section(str(table)).inertia_y == find_section("IPE200").inertia_y
+    table.write_text(head + "B1,I,20,100,5.6,8.5,12\n")
+    with pytest.raises(st.FormatError, match="do not fit into depth"):
+        find_section(str(table))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import FrontError, InputError
 from .pipeline import grid_from_cloud
 from .runtime.progress import Progress
+from .structure.variants import VariantFigures, Variants, solve_variants
 
 if TYPE_CHECKING:
     from .runtime.cluster import Workers
@@ -35,6 +36,7 @@ class Outcome:
     grid: bytes = b""  #: JSON file
     picture: bytes = b""  #: PNG file
     figures: tuple[str, ...] = ()  #: as in `FIGURES`
+    structures: tuple[VariantFigures, ...] = ()  #: of the grid, where they are asked for
 
 
 FIGURES = (
@@ -80,27 +82,40 @@ def _file_name(word: str) -> str:
 
 
 def sweep(
-    cloud: PointCloud, trials: Sequence[Trial], workers: Workers, progress: Progress | None = None
+    cloud: PointCloud,
+    trials: Sequence[Trial],
+    workers: Workers,
+    progress: Progress | None = None,
+    variants: Variants | None = None,
 ) -> list[Outcome]:
-    """Return what comes out of each trial, in their order; the same to the byte for any number of workers."""
+    """Return what comes out of each trial, in their order; the same to the byte for any number of workers.
+
+    With `variants` each grid also becomes structures with each of their supports and rises.
+    """
     outcomes: dict[int, Outcome] = {}
-    for number, outcome in workers.run(try_settings, [trial.settings for trial in trials], cloud):
+    for number, outcome in workers.run(try_settings, [(trial.settings, variants) for trial in trials], cloud):
         outcomes[number] = outcome
         if progress:
             progress("grids", len(outcomes) / len(trials))
     return [outcomes[number] for number in range(len(trials))]
 
 
-def try_settings(settings: Settings, cloud: PointCloud) -> Outcome:
-    """Return the grid of a cloud by some settings, or why there is none: the work of a worker."""
+def try_settings(job: tuple[Settings, Variants | None], cloud: PointCloud) -> Outcome:
+    """Return the grid of a cloud by some settings with its structures, or why there is none: the work of a worker."""
     from .export.drawing.picture import encode_picture
     from .export.json import encode_json
 
+    settings, variants = job
     try:
         grid = grid_from_cloud(cloud, settings)
     except (FrontError, InputError) as error:
         return Outcome(fault=" ".join(str(error).split()))
-    return Outcome(grid=encode_json(grid), picture=encode_picture(grid, cloud), figures=_figures(grid))
+    return Outcome(
+        grid=encode_json(grid),
+        picture=encode_picture(grid, cloud),
+        figures=_figures(grid),
+        structures=solve_variants(grid, variants) if variants else (),
+    )
 
 
 def _figures(grid: Any) -> tuple[str, ...]:

@@ -19,7 +19,12 @@ def inputs_of(values: Namespace) -> Taken:
 
     given = vars(values)
     named = [(str(file), "scan") for file in files_of(given.get("scans") or given["scan"])]
-    single = (("settings", "settings"), ("poses", "poses"), ("fixed_file", "list of fixed nodes"))
+    single = (
+        ("settings", "settings"),
+        ("poses", "poses"),
+        ("structure", "settings of the structure"),
+        ("fixed_file", "list of fixed nodes"),
+    )
     named += [(given.get(name) or "", what) for name, what in single]
     named += [(name, "file of lengths") for name in _lengths(given.get("length")) if not name.startswith(CURVATURE)]
     named += [(name, "fixed line") for name in given.get("fixed_lines", ())]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import SUPPRESS, Namespace
 from dataclasses import fields
 from pathlib import Path
@@ -15,14 +16,15 @@ if TYPE_CHECKING:
 
     from ..grid.grid import Grid
     from ..structure.options import StructureSettings
+    from ..structure.report import StructureReport
+    from ..structure.statics import Solution
     from .options import Parser
 
-STRUCTURE_SUFFIXES = (".json",)
-NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
+STRUCTURE_SUFFIXES = (".json", ".html", ".pdf", ".png")
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
-    ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, R100x200 or FILE.csv[:NAME]"),
+    ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, IPE200, HEA200, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
     ("supports", "WHERE|FILE",
      "corners, boundary, lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
@@ -34,6 +36,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      " loads (default self)"),
     ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
     ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
+    ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
 )  # fmt: skip
@@ -45,11 +48,11 @@ def structure_parser() -> Parser:
 
     parser = Parser(
         "structure",
-        "GRID OUT.json --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
+        "GRID OUT ... --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    add_outs(parser, "structure with its results, .json", "*")
+    add_outs(parser, "structure with its results .json, report to read .html .pdf, picture .png", "*")
     parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
     parser.add_argument(
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
@@ -78,10 +81,9 @@ def structure(values: Namespace) -> None:
         claim(report_place, "report", taken, force=values.force)
     from ..export.json import read_grid
     from ..grid.certificate import check_passed
-    from ..structure.json import encode_structure
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
-    from ..structure.sizing import size_members
+    from ..structure.sizing import SizingRound, size_members, weight_curve
     from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
 
@@ -90,8 +92,12 @@ def structure(values: Namespace) -> None:
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
+        rounds: list[SizingRound] = []
+        weights = None
         if settings.size:
-            truss = size_members(truss, settings.size, settings.checks)
+            plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds, by=settings.size_by)
+            if report_place or any(out.suffix.lower() in (".html", ".pdf") for out in outs):
+                weights = weight_curve(plain, truss, settings.size, settings.checks, settings.size_by)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
         bars("modes", 0.4)
@@ -99,9 +105,11 @@ def structure(values: Namespace) -> None:
         buckling = worst_buckling(factored, solution, modes) if modes else None
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
         bars("checks", 0.8)
-        report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
+        found: dict[str, Any] = {"buckling": buckling, "vibration": vibration, "rounds": rounds, "weights": weights}
+        report = report_structure(solution, settings.checks, _notes(settings), **found)
+        bars("report", 0.0)
         for out in outs:
-            save.beside(out).write_bytes(encode_structure(truss, solution, report))
+            save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
         if report_place is not None:
             save.json(report_place, report.to_dict())
     print_table(STRUCTURE_HEAD, structure_lines(report))
@@ -120,6 +128,36 @@ def structure(values: Namespace) -> None:
             f"wrote {' '.join(map(str, wrote))}",
         ]
     )
+
+
+def _encoded(
+    out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
+) -> bytes:
+    """Return what a file of the structure holds."""
+    if out.suffix.lower() == ".json":
+        from ..structure.json import encode_structure
+
+        return encode_structure(solution.truss, solution, report)
+    from ..report.structural.contents import ReportSource, overview_picture, report_parts
+
+    if out.suffix.lower() == ".png":
+        from ..export.drawing.structure import encode_structure_picture
+
+        return encode_structure_picture(solution.truss, overview_picture(solution, report))
+    from ..report.structural.html import encode_html
+    from ..report.structural.pdf import encode_pdf
+
+    parts = report_parts(ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report))
+    return (encode_html if out.suffix.lower() == ".html" else encode_pdf)(parts)
+
+
+def _command_line(values: Namespace) -> str:
+    """Return the command line with these values."""
+    words = ["scantruss", "structure", values.grid, *map(str, outs_of(values))]
+    for name in ("settings", "report", *(name for name, _, _ in OWN_OPTIONS)):
+        if vars(values).get(name) is not None:
+            words += [f"--{name.replace('_', '-')}", f"{vars(values)[name]}"]
+    return shlex.join([*words, *["--keep-failed"] * values.keep_failed])
 
 
 def structure_settings(values: Namespace) -> StructureSettings:
@@ -144,7 +182,9 @@ def _inputs(values: Namespace) -> Taken:
 
 def _arguments(grid: Grid, settings: StructureSettings) -> dict[str, Any]:
     """Return the settings as `Truss.from_grid` takes them."""
-    given = {spec.name: getattr(settings, spec.name) for spec in fields(settings) if spec.name not in NOT_OF_GRID}
+    from ..structure.variants import truss_arguments
+
+    given = truss_arguments(settings)
     if Path(settings.supports).is_file():
         given["supports"] = _nodes_near(grid, settings.supports)
     return given

@@ -16,10 +16,12 @@ from .thin import add_workers, workers_of
 
 if TYPE_CHECKING:
     from ..settings import Settings
-    from ..sweep import Trial
+    from ..structure.variants import Variants
+    from ..sweep import Outcome, Trial
     from .options import Parser
 
 SWEEP_FILES = ("table.csv", "table.md", "index.html", "overview.png")  # of a sweep
+SWEEP_STRUCTURES = ("structures.csv", "structures.md")  # of a sweep with structures
 
 
 def sweep_parser() -> Parser:
@@ -43,9 +45,16 @@ def sweep_parser() -> Parser:
     for action in parser._actions:
         if action.dest not in ("help", "scan", "out", "settings", *ONE_AT_LEAST) and action.type is not None:
             action.type = _several(action.type)
+    group = parser.add_argument_group("STRUCTURE: which length, supports and rise give the lightest one")
+    group.add_argument(
+        "--structure", metavar="FILE", help="settings of scantruss structure (.toml or .json) for every grid"
+    )
+    group.add_argument("--supports", metavar="WHERE,...", help="supports to try (default those of the file)")
+    group.add_argument("--rise", metavar="NUMBER,...", help="heights to try, over the height of the grid (default 1)")
     return parser
 
 
+MOST_RISE = 10.0  #: greatest height over that of the grid
 # one value only
 ONE_AT_LEAST = ("memory", "workers", "fixed", "fixed_lines", "unit", "z_unit", "returns", "confidence", "thin_spacing")
 
@@ -64,37 +73,86 @@ def _several(kind: Any) -> Callable[[str], list[Any]]:
 
 def sweep(values: Namespace) -> None:
     """Make many grids and report them."""
-    from ..report.choosing import head_of, rows_of
+    from ..report.choosing import head_of, rows_of, structure_table
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
 
     folder = result_folder(values.out)
     trials, varied = trials_of_words(values)
-    claim_results(folder, trials, inputs_of(values), values.force)
+    variants = variants_of(values)
+    claim_results(folder, trials, inputs_of(values), values.force, SWEEP_STRUCTURES if variants else ())
     shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
     with Bars() as bars:
         fitting = thin_to_fit(values.scan, shortest, values.memory)
         cloud = read_scan(values.scan, fitting, bars)
+        if variants:
+            from ..structure.build import scale_of
+
+            scale_of(cloud.unit or variants.settings.unit, variants.settings.scale)  # before the long work
         if fitting.thin_spacing:
             thin = {"thin_spacing": fitting.thin_spacing}
             trials = [replace(trial, settings=trial.settings.replace(**thin)) for trial in trials]
         said = note_compiling(bars)
         with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
-            outcomes = make_grids(cloud, trials, workers, bars)
+            outcomes = make_grids(cloud, trials, workers, bars, variants)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):
             raise InputError(f"no grid came out of {len(trials)} trials; the first: {outcomes[0].fault}")
-        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, head, rows, values.force)
-    print_table(head, rows)
-    print_lines([f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}"])
+        tables = [(head, rows), *([structure_table(varied, trials, outcomes)] if variants else [])]
+        _save(folder, f"Grids of {Path(values.scan).name}", trials, outcomes, tables, values.force)
+    for table in tables:
+        print_table(*table)
+    print_lines(
+        [
+            *(_lightest_line(trials, outcomes) if variants else []),
+            f"wrote {sum(bool(o.grid) for o in outcomes)} grids, table and pictures to {folder}",
+        ]
+    )
 
 
-def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool) -> None:
+def variants_of(values: Namespace) -> Variants | None:
+    """Return the structures that are to be made of every grid, None where there is no ``--structure``."""
+    from ..structure.options import read_structure_settings
+    from ..structure.variants import Variants
+    from .options import UsageError, number
+
+    if not values.structure:
+        if values.supports or values.rise:
+            raise UsageError("--supports and --rise need --structure FILE, the settings of the structure")
+        return None
+    settings = read_structure_settings(values.structure)
+    supports = tuple(word.strip() for word in (values.supports or settings.supports).split(",") if word.strip())
+    if not supports:
+        raise InputError(f"no supports: name some in {values.structure} or with --supports")
+    try:
+        rises = tuple(number(word) for word in (values.rise or "1").split(","))
+    except argparse.ArgumentTypeError as error:
+        raise UsageError(f"--rise {error}") from None
+    if not all(0 < rise < MOST_RISE for rise in rises):
+        raise UsageError(f"--rise needs numbers above 0 and below {MOST_RISE:g}, got {values.rise}")
+    return Variants(settings, supports, rises)
+
+
+def _lightest_line(trials: list[Trial], outcomes: list[Outcome]) -> list[str]:
+    """Return which structure is the lightest of those that pass, in a line."""
+    from ..structure.variants import lightest
+
+    found = [(trial, lightest(list(outcome.structures))) for trial, outcome in zip(trials, outcomes, strict=True)]
+    passed = [(each.mass, trial.title, each) for trial, each in found if each]
+    if not passed:
+        return ["no structure passes without a warning"]
+    _, title, best = min(passed, key=lambda one: one[0])
+    return [
+        f"lightest: {title}, supports {best.supports}, rise {best.rise:g}: {best.mass:,.0f} kg of {' '.join(best.sections)}"
+    ]
+
+
+def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool, more: tuple[str, ...] = ()) -> None:
     """Refuse a folder where a result cannot be written, or would replace something else."""
     from ..runtime.files import check_place
     from ..runtime.ours import check_ours
 
-    names = (*SWEEP_FILES, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
+    names = (*SWEEP_FILES, *more, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
     for name in names:
         claim(folder / name, "result", taken, force=True)
         if folder.exists():
@@ -142,14 +200,14 @@ def _save(
     title: str,
     trials: list[Trial],
     outcomes: list[Any],
-    head: tuple[str, ...],
-    rows: list[Any],
+    tables: list[tuple[tuple[str, ...], list[Any]]],
     force: bool,
 ) -> None:
     """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
     from ..export.drawing.sheet import encode_sheet
     from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
     from ..runtime.files import SaveTogether
+    from ..runtime.ours import kind_of_ours
 
     with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
@@ -159,11 +217,16 @@ def _save(
                 save.beside(folder / f"{trial.name}.png").write_bytes(outcome.picture)
         both = zip(trials, outcomes, strict=True)
         pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
-        page = encode_page(title, head, rows, trials, outcomes)
-        tables = (encode_table_csv(head, rows), encode_table_markdown(head, rows), page, encode_sheet(pictures))
-        for name, content in zip(SWEEP_FILES, tables, strict=True):
+        grids, *structures = [(encode_table_csv(*table), encode_table_markdown(*table)) for table in tables]
+        contents = [*grids, encode_page(title, tables, trials, outcomes), encode_sheet(pictures)]
+        for name, content in zip(SWEEP_FILES, contents, strict=True):
+            save.beside(folder / name).write_bytes(content)
+        for name, content in zip(SWEEP_STRUCTURES, *structures, strict=True) if structures else ():
             save.beside(folder / name).write_bytes(content)
     for trial, outcome in zip(trials, outcomes, strict=True):
         if not outcome.grid:  # left by an earlier sweep; this table says there is no grid
             for end in (".json", ".png"):
                 (folder / f"{trial.name}{end}").unlink(missing_ok=True)
+    for name in () if structures else SWEEP_STRUCTURES:
+        if kind_of_ours(folder / name):
+            (folder / name).unlink()

@@ -14,6 +14,10 @@ from ..sweep import FIGURES
 if TYPE_CHECKING:
     from ..sweep import Outcome, Trial
 
+STRUCTURE_COLUMNS = (
+    "supports", "rise", "mass [kg]", "sections", "utilization", "buckling factor", "displacement [mm]", "structure",
+)  # fmt: skip
+
 STYLE = """\
 body { font: 15px system-ui, sans-serif; margin: 2em; color: #222; background: #fff }
 table { border-collapse: collapse; margin: 1em 0 } th, td { padding: .3em .7em; text-align: right }
@@ -37,6 +41,25 @@ def rows_of(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[
     ]
 
 
+def structure_table(
+    varied: Sequence[str], trials: Sequence[Trial], outcomes: Sequence[Outcome]
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return head and rows of the table of structures: every grid with each of its supports and rises."""
+    rows = []
+    for trial, outcome in zip(trials, outcomes, strict=True):
+        for each in outcome.structures:
+            figures = (
+                f"{each.mass:.0f}",
+                " ".join(each.sections),
+                "" if each.utilization is None else f"{each.utilization:.2f}",
+                "" if each.buckling is None else f"{each.buckling:.3g}",
+                f"{1e3 * each.displacement:.3g}",
+            )
+            said = each.fault or "; ".join(each.warnings) or "passed"
+            rows.append((*trial.varied, each.supports, f"{each.rise:g}", *(("",) * 5 if each.fault else figures), said))
+    return (*varied, *STRUCTURE_COLUMNS), rows
+
+
 def encode_table_csv(head: Sequence[str], rows: Sequence[Sequence[str]]) -> bytes:
     """Return the table as CSV."""
     text = io.StringIO()
@@ -51,15 +74,22 @@ def encode_table_markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) ->
     return text.encode("utf-8")
 
 
-def encode_page(
-    title: str, head: Sequence[str], rows: Sequence[Sequence[str]], trials: Sequence[Trial], outcomes: Sequence[Outcome]
-) -> bytes:
-    """Return a page with the table and the pictures, which lie beside it."""
-    cells = "".join(f"<th>{escape(name)}</th>" for name in head)
+SweepTable = tuple[Sequence[str], Sequence[Sequence[str]]]  # its head and rows
+
+
+def _html_table(table: SweepTable) -> str:
+    cells = "".join(f"<th>{escape(name)}</th>" for name in table[0])
     lines = [f"<tr>{cells}</tr>"]
-    for row in rows:
+    for row in table[1]:
         figures = "".join(f"<td>{escape(cell)}</td>" for cell in row[:-1])
         lines.append(f'<tr>{figures}<td class="words">{escape(row[-1])}</td></tr>')
+    return "<table>\n" + "\n".join(lines) + "\n</table>\n"
+
+
+def encode_page(
+    title: str, tables: Sequence[SweepTable], trials: Sequence[Trial], outcomes: Sequence[Outcome]
+) -> bytes:
+    """Return a page with tables and the pictures, which lie beside it."""
     pictures = [
         f'<figure><a href="{escape(trial.name)}.png"><img src="{escape(trial.name)}.png" alt="{escape(trial.title)}"></a>'
         f'<figcaption>{escape(trial.title)} (<a href="{escape(trial.name)}.json">grid</a>)</figcaption></figure>'
@@ -69,9 +99,8 @@ def encode_page(
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         f'<meta name="generator" content="{MARK}"><title>{escape(title)}</title>\n'
-        f"<style>\n{STYLE}\n</style></head><body>\n<h1>{escape(title)}</h1>\n<table>\n"
-        + "\n".join(lines)
-        + "\n</table>\n"
+        f"<style>\n{STYLE}\n</style></head><body>\n<h1>{escape(title)}</h1>\n"
+        + "".join(map(_html_table, tables))
         + "\n".join(pictures)
         + "\n</body></html>\n"
     ).encode()

@@ -12,9 +12,11 @@ from ..errors import FormatError
 MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
 CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
+LARGEST_PDF = 50_000_000  # bytes of a PDF file in which the mark is sought
 # tables have no place for a mark: those of members, of nodes, of a sweep, of schedules
 TABLE_HEADS = re.compile(
     rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b|node,node type,ring,"
+    rb"|[^\n]*\brise[ ,|]+mass \[kg\]"
     rb"|node,hole,member,|member,start,end,group,|panel,node 1,|(node|panel|length) type,count,|item,group,count,|warning,at,with,"
 )
 
@@ -24,6 +26,9 @@ def kind_of_ours(path: Path) -> str:
     try:
         with path.open("rb") as file:
             head = file.read(BYTES_WITH_MARK)
+            if head.startswith(b"%PDF"):  # what made it stands at its end
+                file.seek(0)
+                head = b"".join(re.findall(rb"/Creator \(ScanTruss \d", file.read(LARGEST_PDF)))
         if head.startswith(b"PK") and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as content:
                 name = next(

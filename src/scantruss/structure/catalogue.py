@@ -15,7 +15,7 @@ from typing import TypeVar
 from ..errors import FormatError, InputError
 
 CATALOGUES = Path(__file__).parent / "data"
-SHAPES = ("CHS", "SHS", "R")  #: circular and square hollow sections, solid rectangles
+SHAPES = ("CHS", "SHS", "R", "I")  #: circular and square hollow sections, solid rectangles, rolled I sections
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class Section:
     """A cross-section; y is its axis along the surface, z that along the normal [m]."""
 
     name: str
-    shape: str  #: CHS, SHS or R
+    shape: str  #: CHS, SHS, R or I
     width: float  #: along y; the diameter of a CHS [m]
     depth: float  #: along z [m]
-    thickness: float  #: of the wall; 0 of a solid one [m]
+    thickness: float  #: of the wall, of the web of an I; 0 of a solid one [m]
     finish: str  #: hot, cold, or "" of a solid one
     area: float  #: [m2]
     inertia_y: float  #: about y, that is for loads along the normal [m4]
@@ -37,6 +37,13 @@ class Section:
     plastic_y: float  #: plastic section modulus about y [m3]
     plastic_z: float  #: [m3]
     source: str = ""
+    flange: float = 0.0  #: thickness of the flanges of an I [m]
+    fillet: float = 0.0  #: radius between web and flanges of an I [m]
+
+    @property
+    def warping(self) -> float:
+        """The warping constant of an I section, 0 of others [m6]."""
+        return self.inertia_z * (self.depth - self.flange) ** 2 / 4 if self.shape == "I" else 0.0
 
     @property
     def radius(self) -> float:
@@ -72,15 +79,8 @@ def circular_hollow(name: str, diameter: float, thickness: float, finish: str = 
 def square_hollow(name: str, width: float, thickness: float, finish: str = "hot", source: str = "") -> Section:
     """Return a hot finished square hollow section [m], corners with radii of 1.5 and 1.0 thicknesses (EN 10210-2, annex)."""
     outer, inner, clear = 1.5 * thickness, thickness, width - 2 * thickness
-
-    def corner(radius: float, side: float) -> tuple[float, float, float]:
-        """Return area, second moment and lever of what a rounded corner lacks."""
-        lever = side / 2 - (10 - 3 * math.pi) / (12 - 3 * math.pi) * radius
-        second = (1 / 3 - math.pi / 16 - 1 / (3 * (12 - 3 * math.pi))) * radius**4
-        return (1 - math.pi / 4) * radius**2, second, lever
-
-    area_out, second_out, lever_out = corner(outer, width)
-    area_in, second_in, lever_in = corner(inner, clear)
+    area_out, second_out, lever_out = _corner(outer, width / 2)
+    area_in, second_in, lever_in = _corner(inner, clear / 2)
     area = width**2 - clear**2 - 4 * (area_out - area_in)
     inertia = (width**4 - clear**4) / 12 - 4 * (second_out + area_out * lever_out**2)
     inertia += 4 * (second_in + area_in * lever_in**2)
@@ -92,6 +92,35 @@ def square_hollow(name: str, width: float, thickness: float, finish: str = "hot"
     elastic = 2 * inertia / width
     values = (area, inertia, inertia, torsion, elastic, elastic, plastic, plastic)
     return Section(name, "SHS", width, width, thickness, finish, *values, source=source)
+
+
+def _corner(radius: float, reach: float) -> tuple[float, float, float]:
+    """Return area and second moment of what a rounded corner lacks of a sharp one, and its lever if the sharp one is at `reach`."""
+    lever = reach - (10 - 3 * math.pi) / (12 - 3 * math.pi) * radius
+    second = (1 / 3 - math.pi / 16 - 1 / (3 * (12 - 3 * math.pi))) * radius**4
+    return (1 - math.pi / 4) * radius**2, second, lever
+
+
+def rolled_i(
+    name: str, depth: float, width: float, web: float, flange: float, fillet: float, source: str = ""
+) -> Section:
+    """Return a hot rolled I section [m], its web along z.
+
+    The torsion constant is that of ArcelorMittal, Sections and Merchant Bars: flanges, web and the circles inscribed where they meet.
+    """
+    clear = depth - 2 * flange
+    corner, second, lever = _corner(fillet, clear / 2)
+    across = web - (_corner(fillet, web / 2)[2])  # fillets lie outside the web
+    area = 2 * width * flange + clear * web + 4 * corner
+    inertia_y = (width * depth**3 - (width - web) * clear**3) / 12 + 4 * (second + corner * lever**2)
+    inertia_z = (2 * flange * width**3 + clear * web**3) / 12 + 4 * (second + corner * across**2)
+    plastic_y = web * depth**2 / 4 + (width - web) * (depth - flange) * flange + 4 * corner * lever
+    plastic_z = width**2 * flange / 2 + clear * web**2 / 4 + 4 * corner * across
+    circle = ((fillet + web / 2) ** 2 + (fillet + flange) ** 2 - fillet**2) / (2 * fillet + flange)
+    torsion = 2 / 3 * (width - 0.63 * flange) * flange**3 + clear * web**3 / 3
+    torsion += 2 * web / flange * (0.145 + 0.1 * fillet / flange) * circle**4
+    values = (area, inertia_y, inertia_z, torsion, 2 * inertia_y / depth, 2 * inertia_z / width, plastic_y, plastic_z)
+    return Section(name, "I", width, depth, web, "hot", *values, source=source, flange=flange, fillet=fillet)
 
 
 def rectangle(name: str, width: float, depth: float, source: str = "") -> Section:
@@ -136,7 +165,7 @@ def find_material(name: str) -> Material:
 @cache
 def bundled_sections() -> tuple[Section, ...]:
     """Return the sections of the bundled catalogue."""
-    return read_sections(CATALOGUES / "sections.csv")
+    return (*read_sections(CATALOGUES / "sections.csv"), *read_sections(CATALOGUES / "i_sections.csv"))
 
 
 @cache
@@ -148,8 +177,8 @@ def bundled_materials() -> tuple[Material, ...]:
 def read_sections(path: str | Path) -> tuple[Section, ...]:
     """Return the sections of a CSV file.
 
-    Columns `name`, `shape` (CHS, SHS or R), `width [mm]` (diameter of a CHS), and `thickness [mm]`, of rectangles `depth [mm]`;
-    `finish` (hot or cold) and `source` may be there.
+    Columns `name`, `shape` (CHS, SHS, R or I), `width [mm]` (diameter of a CHS), and `thickness [mm]`, of rectangles `depth [mm]`,
+    of I sections `depth [mm]`, `thickness [mm]` (web), `flange [mm]` and `fillet [mm]`; `finish` (hot or cold) and `source` may be there.
 
     Raises
     ------
@@ -238,6 +267,12 @@ def _section_of(row: dict[str, str]) -> Section:
     width = _positive(row, "width") / 1e3
     if shape == "R":
         return rectangle(name, width, _positive(row, "depth") / 1e3, source)
+    if shape == "I":
+        depth, web, flange = (_positive(row, column) / 1e3 for column in ("depth", "thickness", "flange"))
+        fillet = _positive(row, "fillet") / 1e3
+        if 2 * (flange + fillet) >= depth or web + 2 * fillet >= width:
+            raise ValueError("flanges, web and fillets do not fit into depth and width")
+        return rolled_i(name, depth, width, web, flange, fillet, source)
     if shape not in SHAPES:
         raise ValueError(f"shape must be one of {' '.join(SHAPES)}, got {row['shape']!r}")
     thickness, finish = _positive(row, "thickness") / 1e3, row.get("finish") or "cold"

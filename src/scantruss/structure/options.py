@@ -11,6 +11,7 @@ from typing import Any
 
 from ..errors import FormatError, InputError
 from .checks import MemberChecks
+from .groups import WAYS_TO_GROUP
 from .truss import Combination
 
 MOST_MODES = 50  #: of buckling or vibration
@@ -31,6 +32,7 @@ class StructureSettings:
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
     size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
+    size_by: str = WAYS_TO_GROUP[0]  #: what has a section of its own in sizing, of `WAYS_TO_GROUP`
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
@@ -40,6 +42,8 @@ class StructureSettings:
         """Refuse numbers of modes that are none."""
         if self.size < 0:
             raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
+        if self.size_by not in WAYS_TO_GROUP:
+            raise InputError(f"size_by must be one of {' '.join(WAYS_TO_GROUP)}, got {self.size_by!r}")
         if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
             raise InputError(
                 f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"
@@ -83,6 +87,29 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
                 f"{path} has {name!r} = {value!r}; known are {' '.join(sorted(known | check_names | {'combinations'}))}"
             )
     return StructureSettings(**given, checks=MemberChecks(**checks))
+
+
+def settings_text(settings: StructureSettings) -> str:
+    """Return the TOML text that `read_structure_settings` turns into these settings."""
+    lines = []
+    for spec in fields(settings):
+        value = getattr(settings, spec.name)
+        if spec.name not in ("combinations", "checks") and value is not None:
+            lines.append(f"{spec.name} = {_toml(value)}")
+    lines += [f"{name} = {_toml(value)}" for name, value in vars(settings.checks).items()]
+    for each in settings.combinations or ():
+        lines += ["", "[[combinations]]", f"name = {_toml(each.name)}", f"state = {_toml(each.state)}"]
+        lines.append(f"factors = {_toml(dict(each.factors))}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML; strings as JSON writes them, which TOML reads."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{json.dumps(str(name))} = {_toml(each)}" for name, each in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def loads_of_words(words: str) -> tuple[Any, ...]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .groups import member_groups_of
 from .modes import Modes
+from .sizing import SizingRound
 from .statics import CaseResult, Solution
 from .truss import Truss
 
@@ -42,6 +44,10 @@ class StructureReport:
     warnings: tuple[str, ...]
     buckling: Modes | None = None  #: of the combination that buckles first, where it was asked for
     vibration: Modes | None = None  #: where it was asked for
+    rounds: tuple[SizingRound, ...] = ()  #: of sizing
+    weights: dict[int, float] | None = (
+        None  #: mass sized with at most so many different sections, see `weight_curve` [kg]
+    )
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -64,6 +70,7 @@ class StructureReport:
             "force_max": max(case.force_max for case in self.cases),
             "utilization_max": max(used) if used else None,
             "sections": {section.name: count for section, count in zip(self.truss.sections, counts, strict=True)},
+            "groups": self._groups(),
             "warnings": list(self.warnings),
         }
         if self.buckling is not None:
@@ -71,7 +78,25 @@ class StructureReport:
             values["buckling_case"] = self.buckling.of
         if self.vibration is not None:
             values["frequencies"] = self.vibration.values.tolist()
+        if self.rounds:
+            values["sizing_rounds"] = [asdict(each) for each in self.rounds]
+        if self.weights is not None:
+            values["mass_by_sections"] = {str(count): mass for count, mass in self.weights.items()}
         return values
+
+    def _groups(self) -> dict[str, Any]:
+        """Return count, mass [kg], sections and greatest utilization of every group of members."""
+        names, group_of = member_groups_of(self.truss)
+        found = {}
+        for number, name in enumerate(names):
+            mine = group_of == number
+            found[name] = {
+                "members": int(mine.sum()),
+                "mass": float(self.truss.member_mass[mine].sum()),
+                "sections": [self.truss.sections[k].name for k in np.unique(self.truss.section_of[mine])],
+                "utilization_max": None if self.utilization is None else float(self.utilization[mine].max()),
+            }
+        return found
 
 
 def report_structure(
@@ -81,6 +106,8 @@ def report_structure(
     *,
     buckling: Modes | None = None,
     vibration: Modes | None = None,
+    rounds: Sequence[SizingRound] = (),
+    weights: dict[int, float] | None = None,
 ) -> StructureReport:
     """Return the figures of all load cases and combinations, the checks of the members, and warnings.
 
@@ -94,6 +121,10 @@ def report_structure(
         Warnings of whoever made the structure.
     buckling, vibration : Modes, optional
         Of `worst_buckling` and `vibration_modes`.
+    rounds : sequence of SizingRound
+        Of `size_members`.
+    weights : dict of int to float, optional
+        Of `weight_curve`.
     """
     truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)
@@ -133,6 +164,8 @@ def report_structure(
         warnings=tuple(said),
         buckling=buckling,
         vibration=vibration,
+        rounds=tuple(rounds),
+        weights=weights,
     )
 
 
@@ -181,7 +214,9 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     others = [case for case in report.cases if case.state != "case"]
     others.sort(key=lambda case: (case.state != "ULS", -(case.utilization_max or 0.0), -case.displacement_max))
     chosen = [case for case in others if case.state == "ULS"][: most // 2]
-    chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[:1]
+    chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[
+        : max(most // 12, 1)
+    ]
     return [
         (
             case.name,

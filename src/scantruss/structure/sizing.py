@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..errors import InputError
 from .catalogue import Section, bundled_sections
 from .checks import MemberChecks, section_class, strengths, utilizations
+from .groups import WAYS_TO_GROUP, member_groups_of
 from .modes import worst_buckling
 from .statics import CaseResult, Solution, factor_stiffness, solve
 from .truss import Truss
@@ -15,11 +18,21 @@ ROUNDS = 60  #: of solving and choosing
 GROWTH_A_ROUND = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
 
 
+@dataclass(frozen=True)
+class SizingRound:
+    """A round of sizing, before its sections grow."""
+
+    mass: float  #: of all members [kg]
+    sections: int  #: different ones
+    utilization: float  #: the greatest of all members and combinations
+    buckling: float | None  #: least factor of linear buckling; None while members do not pass
+
+
 def candidates(truss: Truss) -> list[Section]:
     """Return the sections that may replace the first of a structure, lightest first.
 
-    They are those of the catalogue with its shape and finish, of class 1 to 3, whose second moment of area is greater than that of
-    all lighter ones: a heavier one resists more in every way.
+    They are those of the catalogue with its shape, series (IPE, HEA, HEB) and finish, of class 1 to 3, whose second moment of area is
+    greater than that of all lighter ones: a heavier one resists more in every way.
 
     Raises
     ------
@@ -29,18 +42,30 @@ def candidates(truss: Truss) -> list[Section]:
     like, material = truss.sections[0], truss.material
     if material.kind != "steel":
         raise InputError(f"sizing follows checks of steel, and {material.name} is {material.kind}; leave --size out")
-    kind = [s for s in bundled_sections() if (s.shape, s.finish) == (like.shape, like.finish)]
+    kind = [s for s in bundled_sections() if _kind(s) == _kind(like)]
     chain: list[Section] = []
     for section in sorted(kind, key=lambda s: (s.area, -s.inertia_y)):
         better = not chain or (section.inertia_y > chain[-1].inertia_y and section.plastic_y > chain[-1].plastic_y)
         if better and section_class(section, material) < 4:
             chain.append(section)
     if not chain:
-        raise InputError(f"the catalogue has no sections like {like.name} to choose from; name a CHS or SHS")
+        raise InputError(f"the catalogue has no sections like {like.name} to choose from; name a CHS, SHS or I section")
     return chain
 
 
-def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -> Truss:
+def _kind(section: Section) -> tuple[str, str, str]:
+    """Return what stays when a section is replaced."""
+    return section.shape, section.finish, section.name.rstrip("0123456789.") if section.shape == "I" else ""
+
+
+def size_members(
+    truss: Truss,
+    count: int,
+    checks: MemberChecks | None = None,
+    rounds: list[SizingRound] | None = None,
+    *,
+    by: str = "members",
+) -> Truss:
     """Return the structure with sections that pass all checks under all ULS combinations (all load cases where there are none).
 
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
@@ -56,6 +81,10 @@ def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -
         Different sections at most.
     checks : MemberChecks, optional
         Buckling length, partial factors.
+    rounds : list of SizingRound, optional
+        Each round is added to it.
+    by : str
+        "groups" or "rings": all members of one have the same section, see `member_groups_of`; "members": each has its own.
 
     Raises
     ------
@@ -67,16 +96,22 @@ def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -
     chain = candidates(truss)
     chosen = np.zeros(len(truss.members), np.int64)
     checks = checks or MemberChecks()
+    group_of = np.arange(len(chosen)) if by == WAYS_TO_GROUP[0] else member_groups_of(truss, by)[1]
     for _ in range(ROUNDS):
         chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
-        needed = _needed(solution, chosen, checks)
+        judged = _judged(solution)
+        needed = _same_in_groups(_needed(truss, judged, chosen, checks), group_of)
+        least = None
         if (needed <= chosen).all():
             least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
             if least < checks.buckling_factor:
                 needed = _stiffer(chosen, chain, checks.buckling_factor / least)
+        if rounds is not None:
+            used = max(float(_use(truss, result, checks).max()) for result in judged)
+            rounds.append(SizingRound(truss.mass, len(np.unique(chosen)), used, least))
         if (needed <= chosen).all():
             kept, numbers = np.unique(chosen, return_inverse=True)
             return truss.replace(sections=tuple(chain[k] for k in kept), section_of=numbers.ravel().astype(np.int64))
@@ -89,6 +124,13 @@ def size_members(truss: Truss, count: int, checks: MemberChecks | None = None) -
     raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")
 
 
+def _same_in_groups(needed: np.ndarray, group_of: np.ndarray) -> np.ndarray:
+    """Return for each member the greatest of its group."""
+    most = np.zeros(int(group_of.max()) + 1, np.int64)
+    np.maximum.at(most, group_of, needed)
+    return most[group_of]
+
+
 def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndarray:
     """Return sections of which the lightest has grown in bending, as much as buckling lacks and at most half as much again."""
     inertia = np.array([section.inertia_y for section in chain])
@@ -97,10 +139,20 @@ def _stiffer(chosen: np.ndarray, chain: list[Section], factor: float) -> np.ndar
     return np.maximum(chosen, grown)
 
 
-def _needed(solution: Solution, chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
+def weight_curve(
+    truss: Truss, sized: Truss, count: int, checks: MemberChecks | None = None, by: str = "members"
+) -> dict[int, float]:
+    """Return the mass [kg] of a structure sized with at most 1, 2, ..., `count` different sections; `sized` is the last of them."""
+    return {number: size_members(truss, number, checks, by=by).mass for number in range(1, count)} | {count: sized.mass}
+
+
+def _judged(solution: Solution) -> list[CaseResult]:
+    """Return the results of the ULS combinations, or of all load cases where there are none."""
+    return [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
+
+
+def _needed(truss: Truss, judged: list[CaseResult], chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:
     """Return for each member the first section of the structure, from the chosen one on, that resists its forces of every combination."""
-    truss = solution.truss
-    judged = [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
     needed = chosen.copy()
     for result in judged:
         for _ in range(len(truss.sections)):

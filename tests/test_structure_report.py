@@ -1,0 +1,184 @@
+"""The report of a structure: HTML, PDF and a picture, the same bytes for the same structure."""
+
+import json
+import re
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from small_grids import dome
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.report.structural.pdf import WIDTH, _width, _wrapped
+from scantruss.runtime.ours import kind_of_ours
+from scantruss.structure.options import StructureSettings, read_structure_settings, settings_text
+
+LOADS = "self,cladding:0.5kN/m2,snow:1kN/m2"
+
+
+class Reader(HTMLParser):
+    """The text of a page, its addresses, and whether every element ends."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.tables = 0
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+        self.tables += tag == "table"
+        self.addresses += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the grid of a dome, 1:50 in mm."""
+    monkeypatch.chdir(tmp_path)
+    st.write(dome(5, 40.0), "grid.json")
+    return tmp_path
+
+
+def run(words: str) -> int:
+    return main(f"structure grid.json {words} --scale 50 --supports boundary".split())
+
+
+def read(path: str) -> Reader:
+    reader = Reader()
+    reader.feed(Path(path).read_text(encoding="utf-8"))
+    reader.close()
+    return reader
+
+
+def test_a_page_holds_everything_and_asks_the_network_for_nothing(place: Path) -> None:
+    assert run(f"a.html --loads {LOADS} --size 2 --buckling 2 --frequencies 1 --report r.json") == 0
+    page, figures = read("a.html"), json.loads(Path("r.json").read_text())
+    assert page.open == [] and all(address.startswith("data:image/") for address in page.addresses)
+    assert len(page.addresses) == 3 + 2 + 1 + 2  # forces, utilization, displacements; modes; sizing
+    assert not re.search(r"@import|url\(", Path("a.html").read_text())
+    text = " ".join(page.text)
+    for words in (
+        "Assumptions",
+        "6.3.1",
+        "EN 1990 6.10",
+        "Reactions",
+        "Sections and masses",
+        "Members that are used most",
+    ):
+        assert words in text
+    assert f"{figures['utilization_max']:.2f}" in text and f"{figures['mass']:,.0f}" in text
+    assert f"{figures['buckling_factors'][0]:.3g}" in text and f"{figures['frequencies'][0]:.3g} Hz" in text
+    assert Path("a.html").stat().st_size < 700_000
+
+
+def test_the_settings_of_a_report_make_the_same_structure(place: Path) -> None:
+    assert run(f"a.html a.json --loads {LOADS} --section SHS100x5 --support-type fixed") == 0
+    text = next(part for part in read("a.html").text if "# structure.toml" in part)
+    command, _, settings = text.partition("# structure.toml")
+    assert command.startswith("scantruss structure grid.json a.html a.json ") and "--section SHS100x5" in command
+    assert tomllib.loads(settings)["support_type"] == "fixed"
+    Path("structure.toml").write_text(settings)
+    assert main("structure grid.json b.json --settings structure.toml".split()) == 0
+    assert Path("a.json").read_bytes() == Path("b.json").read_bytes()
+
+
+def test_settings_written_as_text_are_read_back(place: Path) -> None:
+    Path("own.toml").write_text("""
+supports = "boundary"
+joints = "5000"
+slenderness = 150
+[[loads]]
+load = "half-snow:1kN/m2@30"
+[[loads]]
+case = "a \\"lamp\\""
+force = [0, 0, "-2kN"]
+nodes = ["N025"]
+[[combinations]]
+name = "all"
+state = "ULS"
+factors = { "half-snow 30" = 1.5, "a \\"lamp\\"" = 1.35 }
+""")
+    settings = read_structure_settings("own.toml")
+    Path("again.toml").write_text(settings_text(settings))
+    assert read_structure_settings("again.toml") == settings
+    assert settings_text(StructureSettings(supports="corners")).count("\n") > 15
+
+
+def test_the_same_structure_gives_the_same_bytes(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import matplotlib
+
+    for folder, size in (("one", 10.0), ("two", 17.0)):  # whatever the user's own defaults are
+        Path(folder).mkdir()
+        st.write(dome(4, 40.0), f"{folder}/grid.json")
+        monkeypatch.chdir(place / folder)
+        with matplotlib.rc_context({"font.size": size, "axes.grid": size > 10}):
+            assert run("a.html a.pdf a.png") == 0
+        monkeypatch.chdir(place)
+    for name in ("a.html", "a.pdf", "a.png"):
+        assert Path("one", name).read_bytes() == Path("two", name).read_bytes()
+
+
+def test_a_pdf_has_pages_and_no_date(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(f"a.pdf --loads {LOADS} --buckling 1") == 0
+    content = Path("a.pdf").read_bytes()
+    assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF") and b"CreationDate" not in content
+    assert len(re.findall(rb"/Type /Page\b(?!s)", content)) >= 3
+    assert kind_of_ours(Path("a.pdf")) == "result"
+    assert run("a.pdf") == 0  # ours: it may be replaced
+    Path("a.pdf").write_bytes(b"%PDF-1.4\n1 0 obj << /Creator (Somebody) >> endobj\n%%EOF\n")
+    capsys.readouterr()
+    assert run("a.pdf") == 2
+    assert "is no result that ScanTruss wrote" in capsys.readouterr().err
+
+
+def test_lines_of_a_pdf_fit_and_lose_nothing() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        words = " ".join("m" * int(n) for n in rng.integers(1, 90, 12))
+        lines = _wrapped(words, 9.0, WIDTH)
+        assert max(_width(line, 9.0) for line in lines) <= WIDTH
+        assert "".join(lines).replace(" ", "") == words.replace(" ", "")
+
+
+def test_what_is_left_out_of_a_table_is_said(place: Path) -> None:
+    """Moments of held feet have a column; long lists of modes and combinations say how many there are."""
+    st.write(dome(20, 40.0), "grid.json")
+    loads = f"{LOADS},half-snow:1kN/m2,wind:1kN/m2:-0.5,temperature:20K"
+    assert run(f"a.html --loads {loads} --support-type fixed --frequencies 6") == 0
+    text = " ".join(read("a.html").text)
+    assert "most moment [kNm]" in text and "The 60 greatest of 76" in text and "All values: " in text
+    assert "Those that use the members or move the nodes most" in text
+
+
+def test_a_picture_shows_the_members(place: Path) -> None:
+    assert run(f"a.png --loads {LOADS}") == 0
+    with Image.open("a.png") as image:
+        assert image.size == (1500, 940) and len(image.convert("RGB").getcolors(2**24) or []) > 100
+
+
+def test_timber_is_solved_and_reported_without_checks(place: Path) -> None:
+    assert run(f"a.html a.pdf a.png --loads {LOADS} --section R100x200 --material GL24h") == 0
+    text = " ".join(read("a.html").text)
+    assert "no member is checked: GL24h R100x200 is not steel" in text and "6.3.1" not in text
+
+
+def test_the_weight_curve_is_in_the_report(place: Path) -> None:
+    assert run(f"a.json --loads {LOADS} --size 3 --report r.json") == 0
+    figures = json.loads(Path("r.json").read_text())
+    rounds, masses = figures["sizing_rounds"], figures["mass_by_sections"]
+    assert rounds[-1]["mass"] == pytest.approx(figures["mass"]) == pytest.approx(masses["3"])
+    assert rounds[-1]["utilization"] == pytest.approx(figures["utilization_max"]) and rounds[-1]["buckling"] >= 10
+    assert [each["mass"] for each in rounds] == sorted(each["mass"] for each in rounds)
+    assert list(masses) == ["1", "2", "3"]
