@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..structure.options import StructureSettings
     from .options import Parser
 
-STRUCTURE_SUFFIXES = (".json",)
 NOT_OF_GRID = ("checks", "size", "buckling", "frequencies")  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
@@ -45,11 +44,11 @@ def structure_parser() -> Parser:
 
     parser = Parser(
         "structure",
-        "GRID OUT.json --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
+        "GRID OUT [OUT ...] --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    add_outs(parser, "structure with its results, .json", "*")
+    add_outs(parser, "structure with its results; the suffix names the format", "*")
     parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
     parser.add_argument(
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
@@ -63,22 +62,22 @@ def structure_parser() -> Parser:
 
 def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
+    from ..export.formats import STRUCTURE, check_output, model_of
     from ..report.terminal import Bars, print_lines, print_table
     from ..runtime.files import SaveTogether, check_place
+    from .convert import claim_models, write_models
 
-    outs = [check_place(out, STRUCTURE_SUFFIXES) for out in outs_of(values)]
+    outs = [check_output(out, STRUCTURE) for out in outs_of(values)]
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; structure needs a grid saved as .json by scantruss grid")
     report_place = None if values.report is None else check_place(values.report, (".json",))
     settings = structure_settings(values)
     taken = _inputs(values)
-    for out in outs:
-        claim(out, "structure", taken, force=values.force)
+    claim_models(outs, taken, force=values.force, what="structure")
     if report_place is not None:
         claim(report_place, "report", taken, force=values.force)
     from ..export.json import read_grid
     from ..grid.certificate import check_passed
-    from ..structure.json import encode_structure
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
     from ..structure.sizing import size_members
@@ -100,8 +99,7 @@ def structure(values: Namespace) -> None:
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
         bars("checks", 0.8)
         report = report_structure(solution, settings.checks, _notes(settings), buckling=buckling, vibration=vibration)
-        for out in outs:
-            save.beside(out).write_bytes(encode_structure(truss, solution, report))
+        written = write_models(model_of(solution, report=report), outs, save, bars)
         if report_place is not None:
             save.json(report_place, report.to_dict())
     print_table(STRUCTURE_HEAD, structure_lines(report))
@@ -109,7 +107,7 @@ def structure(values: Namespace) -> None:
     names = (
         " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
     )
-    wrote = [*outs, *([report_place] if report_place else [])]
+    wrote = [*written, *([report_place] if report_place else [])]
     print_lines(
         [
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
