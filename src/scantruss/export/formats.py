@@ -22,6 +22,7 @@ from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .ply import encode_ply
+from .saf import encode_saf
 from .style import FileStyle
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ FORMATS: dict[str, FileFormat] = {
     ".png": FileFormat(
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
+    ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
 }  # fmt: skip
 
 SOLID_SUFFIXES = (".3mf", ".stl")
@@ -97,6 +99,10 @@ def check_output(path: str | Path, kind: str = GRID) -> Path:
         raise FormatError(
             f'no format for "{path.suffix}" of {what}; use one of {" ".join(known)}, '
             f"or write a .json and make the solid from it with: scantruss print"
+        )
+    if suffix_of(path, FORMATS) not in ("", *known) and kind == GRID:
+        raise FormatError(
+            f"{FORMATS[suffix_of(path, FORMATS)].name} holds structures; make one of the grid with: scantruss structure"
         )
     path = check_place(path, known)
     row = FORMATS[suffix_of(path, known)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
+from uuid import NAMESPACE_URL, UUID, uuid5
 
 import numpy as np
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
-    from ..structure.truss import Truss
+    from ..structure.truss import LoadCase, Truss
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,14 @@ class Model:
         if self.truss is not None:
             return np.flatnonzero(self.truss.supports.any(axis=1))
         return self.node_sets.get("fixed", np.zeros(0, np.int64))
+
+    @cached_property
+    def _namespace(self) -> UUID:
+        return uuid5(NAMESPACE_URL, f"scantruss {self.unit} {self.origin.tolist()}")
+
+    def guid(self, what: str, mark: str = "") -> UUID:
+        """Return the identifier of a part, the same for the same mark of the same kind at the same origin."""
+        return uuid5(self._namespace, f"{what} {mark}")
 
     def metres(self, what: str) -> float:
         """Return the metres of one `unit`.
@@ -150,6 +159,16 @@ def with_unit(model: Model, unit: str) -> Model:
     if model.unit not in ("", unit):
         raise FormatError(f"the unit is {model.unit}, not {unit}; leave --unit out")
     return replace(model, unit=unit, grid=None if model.grid is None else model.grid.replace(unit=unit))
+
+
+def line_loads(truss: Truss, case: LoadCase, *, weight: bool = True) -> np.ndarray:
+    """Return the (M, 3) loads along the members in global axes, with or without their weight [N/m]."""
+    from ..structure.truss import GRAVITY
+
+    line = np.zeros((len(truss.members), 3)) if case.line is None else case.line.copy()
+    if weight and case.self_weight:
+        line[:, 2] -= truss.of_section("area") * truss.material.density * GRAVITY * case.self_weight
+    return line
 
 
 def _grid_of(truss: Truss) -> Grid:
