@@ -17,9 +17,9 @@ from scantruss.runtime.ours import kind_of_ours
 UTM = np.array([389_999.25, 5_819_999.5, 34.125])
 
 
-def roof(**others: object) -> st.Truss:
+def roof(count: int = 6, **others: object) -> st.Truss:
     """A structure far from the origin of its grid, supported, loaded and not yet solved."""
-    grid = dome(6, origin=UTM, unit="m")
+    grid = dome(count, origin=UTM, unit="m")
     values: dict[str, object] = {"supports": "boundary", "loads": "self,snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K"}
     return st.Truss.from_grid(grid, **(values | others))  # type: ignore[arg-type]
 

@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 def convert_parser() -> Parser:
     """Options of ``scantruss convert``."""
+    from ..export.style import IFC_VIEWS
     from ..settings import UNITS
-    from .options import Parser, add_outs
+    from .options import Parser, add_outs, number
+    from .schedule import tube
 
     parser = Parser(
         "convert",
@@ -29,6 +31,13 @@ def convert_parser() -> Parser:
     parser.add_argument("source", metavar="FILE", help="saved as .json by scantruss grid or scantruss structure")
     add_outs(parser, "results; the suffix names the format", "*")
     parser.add_argument("--unit", metavar="|".join(filter(None, UNITS)), help="unit of a grid that has none")
+    parser.add_argument(
+        "--tube", metavar="DxT", type=tube, help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC"
+    )
+    parser.add_argument("--ball", metavar="D", type=number, help="diameter of the nodes [mm] (default: twice that of the members)")
+    parser.add_argument(
+        "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
+    )
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
     return parser
 
@@ -37,11 +46,13 @@ def convert(values: Namespace) -> None:
     """Write what a file holds in other formats."""
     from ..export.formats import GRID, STRUCTURE, check_output, read_model
     from ..export.model import with_unit
+    from ..export.style import FileStyle
     from ..grid.certificate import check_passed
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 
     outs = [check_output(out, "") for out in outs_of(values)]
+    style = FileStyle(tube=values.tube, ball=values.ball, ifc=values.ifc)
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
@@ -53,7 +64,7 @@ def convert(values: Namespace) -> None:
             check_passed(model.grid, values.keep_failed)
         for out in outs:
             check_output(out, GRID if model.truss is None else STRUCTURE)
-        written = write_models(model, outs, save, bars)
+        written = write_models(model, outs, save, bars, style)
     size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.triangles):,} triangles"
     print_lines([size, f"wrote {' '.join(map(str, written))}"])
 

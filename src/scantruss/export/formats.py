@@ -18,6 +18,8 @@ from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
+from .dxf import encode_dxf
+from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
@@ -74,6 +76,8 @@ FORMATS: dict[str, FileFormat] = {
     ".png": FileFormat(
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
+    ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".ifc": FileFormat("IFC", one(encode_ifc)),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
 }  # fmt: skip
 

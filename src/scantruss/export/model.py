@@ -171,6 +171,22 @@ def line_loads(truss: Truss, case: LoadCase, *, weight: bool = True) -> np.ndarr
     return line
 
 
+def temperatures(truss: Truss, case: LoadCase, what: str) -> np.ndarray:
+    """Return the (M,) changes of temperature, with those that lengthen members as strains without force do [K].
+
+    Raises
+    ------
+    FormatError
+        There are strains, which the format `what` holds in this way only, and the material does not expand.
+    """
+    change = np.zeros(len(truss.members)) if case.temperature is None else case.temperature
+    if case.strain is None:
+        return change
+    if truss.material.alpha == 0:
+        raise FormatError(f"{what} holds strains as changes of temperature, and {truss.material.name} does not expand")
+    return change + case.strain / truss.material.alpha
+
+
 def _grid_of(truss: Truss) -> Grid:
     """Return the grid of the triangles of a structure, in metres."""
     lines = [

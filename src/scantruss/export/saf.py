@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import FormatError
 from ..runtime.ours import MARK
-from .model import Model, line_loads
+from .model import Model, line_loads, temperatures
 from .style import FileStyle
 from .workbook import encode_workbook
 
@@ -287,7 +287,7 @@ def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
         mark = truss.member_marks[member]
         load = _directed(line[member], "Value 1 [kN/m]", "Vector 1(X;Y;Z) [kN/m]")
         yield "StructuralCurveAction", {"Name": mark, **uniform, "Member": mark, **load}
-    for member, change in enumerate(_temperatures(truss, case).tolist()):
+    for member, change in enumerate(temperatures(truss, case, "SAF").tolist()):
         if change:
             mark = truss.member_marks[member]
             warmth = {"Variation": "Constant", "deltaT [°C]": change, "Member": mark}
@@ -306,13 +306,3 @@ def _directed(force: np.ndarray, value: str, vector: str) -> Row:
     if len(axes) == 1:
         return {"Direction": "XYZ"[axes[0]], value: float(force[axes[0]])}
     return {"Direction": "Vector", vector: f"({';'.join(map(repr, force.tolist()))})"}
-
-
-def _temperatures(truss: Truss, case: LoadCase) -> np.ndarray:
-    """Return the (M,) changes of temperature, with those that lengthen members as strains without force do [K]."""
-    change = np.zeros(len(truss.members)) if case.temperature is None else case.temperature
-    if case.strain is None:
-        return change
-    if truss.material.alpha == 0:
-        raise FormatError("SAF holds strains as changes of temperature, and this material does not expand")
-    return change + case.strain / truss.material.alpha
