@@ -25,7 +25,7 @@ def sheet(unit: str = "m") -> st.Grid:
 
 def written(what: Any, path: Path, style: FileStyle | None = None) -> Any:
     st.write(what, path, style=style)
-    drawing = ezdxf.readfile(path)  # type: ignore[attr-defined]
+    drawing = ezdxf.readfile(path)
     audit = drawing.audit()
     assert [str(error.message) for error in (*audit.errors, *audit.fixes)] == []
     return drawing
@@ -45,7 +45,11 @@ def test_a_grid_is_lines_faces_and_blocks_on_layers_of_their_own(tmp_path: Path)
     for line, (start, end) in zip(lines.values(), grid.edges, strict=True):
         assert np.abs(np.array(line.dxf.start) - grid.scan_nodes[start]).max() < 1e-6
         assert np.abs(np.array(line.dxf.end) - grid.scan_nodes[end]).max() < 1e-6
-    assert {line.dxf.layer for line in lines.values()} == {"members boundary", "members inner", "members Träger 'Süd' _中文__1"}
+    assert {line.dxf.layer for line in lines.values()} == {
+        "members boundary",
+        "members inner",
+        "members Träger 'Süd' _中文__1",
+    }
     faces = {mark_of(face): face for face in space.query("3DFACE")}
     for face, corners in zip(faces.values(), grid.triangles, strict=True):
         assert np.abs(np.array(face.wcs_vertices()[:3]) - grid.scan_nodes[corners]).max() < 1e-6
@@ -67,13 +71,18 @@ def test_the_unit_is_that_of_the_grid(unit: str, code: int, tmp_path: Path) -> N
 def test_supports_of_a_structure_say_how_they_hold(tmp_path: Path) -> None:
     truss = roof(support_type="springs:5MN/m")
     truss = truss.replace(
-        sections=(*truss.sections, st.Truss.from_grid(dome(3, unit="m"), supports="boundary", section="SHS100x5").sections[0]),
+        sections=(
+            *truss.sections,
+            st.Truss.from_grid(dome(3, unit="m"), supports="boundary", section="SHS100x5").sections[0],
+        ),
         section_of=np.arange(len(truss.members)) % 2,
     )
     drawing = written(truss, tmp_path / "a.dxf", FileStyle(ball=200.0))
     supports = drawing.modelspace().query('INSERT[name=="SUPPORT"]')
     assert {each.get_attrib_text("HELD") for each in supports} == {"ux=5e+06 uy=5e+06 uz=5e+06"}
-    assert {each.get_attrib_text("MARK") for each in supports} == {truss.node_marks[k] for k in np.flatnonzero(truss.supports.any(axis=1))}
+    assert {each.get_attrib_text("MARK") for each in supports} == {
+        truss.node_marks[k] for k in np.flatnonzero(truss.supports.any(axis=1))
+    }
     assert {ball.dxf.xscale for ball in drawing.modelspace().query('INSERT[name=="NODE"]')} == {0.1}
     assert {line.dxf.layer for line in drawing.modelspace().query("LINE")} == {
         f"members {group} {section.name}" for group in ("boundary", "inner") for section in truss.sections

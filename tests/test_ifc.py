@@ -43,7 +43,7 @@ def written(what: Any, path: Path, style: FileStyle | None = None, *, rules: boo
 
 def sheet(path: Path, unit: str = "mm") -> st.Grid:
     """A small grid with names from all over, far from the origin."""
-    line = st.grid.line_sets.LineSet("Träger 'Süd' 中文 🙂", "fixed line", np.array([0, 1, 2]))  # type: ignore[attr-defined]
+    line = st.grid.line_sets.LineSet("Träger 'Süd' 中文 🙂", "fixed line", np.array([0, 1, 2]))
     return fan(4000.0, unit=unit, origin=UTM * 1000, fixed=(1,), lines=np.array([[0, 1], [1, 2]]), line_sets=(line,))
 
 
@@ -221,7 +221,7 @@ def test_supports_releases_loads_and_results_are_those_of_the_structure(pinned: 
             warm, (none if case.temperature is None else case.temperature) + strain + 0 * warm, atol=1e-12
         )
         np.testing.assert_array_equal(moved, moved * np.nan if case.settlement is None else case.settlement)
-    factors = {}
+    factors: dict[str, list[tuple[str, float]]] = {}
     for relation in file.by_type("IfcRelAssignsToGroupByFactor"):
         factors.setdefault(relation.RelatingGroup.Name, []).append((relation.RelatedObjects[0].Name, relation.Factor))
     assert factors == {each.name: list(each.factors) for each in truss.combinations}

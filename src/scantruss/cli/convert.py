@@ -32,9 +32,14 @@ def convert_parser() -> Parser:
     add_outs(parser, "results; the suffix names the format", "*")
     parser.add_argument("--unit", metavar="|".join(filter(None, UNITS)), help="unit of a grid that has none")
     parser.add_argument(
-        "--tube", metavar="DxT", type=tube, help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC"
+        "--tube",
+        metavar="DxT",
+        type=tube,
+        help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC",
     )
-    parser.add_argument("--ball", metavar="D", type=number, help="diameter of the nodes [mm] (default: twice that of the members)")
+    parser.add_argument(
+        "--ball", metavar="D", type=number, help="diameter of the nodes [mm] (default: twice that of the members)"
+    )
     parser.add_argument(
         "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
     )

@@ -20,11 +20,11 @@ from .style import FileStyle
 if TYPE_CHECKING:
     from ezdxf.layouts import BlockLayout
 
-UNIT_CODES = {"": 0, "inch": 1, "foot": 2, "mm": 4, "cm": 5, "m": 6}  #: $INSUNITS
+INSUNITS = {"": 0, "inch": 1, "foot": 2, "mm": 4, "cm": 5, "m": 6}  #: values of that header
 NOT_IN_NAMES = re.compile(r"[<>/\\\":;?*|=`,\x00-\x1f]")  #: of layers
-COLOURS = {"boundary": 5, "inner": 7}  #: of the layers of members; 3 for lines
+LAYER_COLOURS = {"boundary": 5, "inner": 7}  #: of the layers of members; 3 for lines
 APPLICATION = "SCANTRUSS"  #: of the extended data
-SYMBOL = 0.03  #: radius of a ball whose diameter is not known, in mean member lengths
+BALL_SYMBOL = 0.03  #: radius of a ball whose diameter is not known, in mean member lengths
 TEXT = 0.06  #: height of the marks, in mean member lengths
 
 
@@ -36,15 +36,15 @@ def encode_dxf(model: Model, style: FileStyle) -> bytes:
     kept = options.write_fixed_meta_data_for_testing
     options.write_fixed_meta_data_for_testing = True  # no dates, no random identifiers
     try:
-        drawing = ezdxf.new("R2010")  # type: ignore[attr-defined]
-        drawing.header["$INSUNITS"] = UNIT_CODES[model.unit]
+        drawing = ezdxf.new("R2010")
+        drawing.header["$INSUNITS"] = INSUNITS[model.unit]
         drawing.header["$MEASUREMENT"] = 0 if model.unit in ("inch", "foot") else 1
         drawing.appids.add(APPLICATION)
         for name, colour in _layers(model).items():
             drawing.layers.add(name, color=colour)
         mean = float(model.lengths.mean()) if len(model.lengths) else 1.0
         known = bodies_of(model, style, "DXF") if model.truss is not None or style.tube is not None else None
-        radius = known.ball / model.metres("DXF") if known is not None and known.ball else SYMBOL * mean
+        radius = known.ball / model.metres("DXF") if known is not None and known.ball else BALL_SYMBOL * mean
         _ball(drawing.blocks.new("NODE"))
         _support(drawing.blocks.new("SUPPORT"))
         first = int(str(drawing.entitydb.handles), 16) + 1
@@ -74,7 +74,9 @@ class _Entities:
         self.lines.append(head + body)
         return handle
 
-    def insert(self, block: str, layer: str, place: list[float], size: float, words: dict[str, tuple[str, str]]) -> None:
+    def insert(
+        self, block: str, layer: str, place: list[float], size: float, words: dict[str, tuple[str, str]]
+    ) -> None:
         """Add a copy of a block with attributes, each a text and its layer; none of them hidden."""
         x, y, z = place
         scale = f" 41\n{size}\n 42\n{size}\n 43\n{size}\n"
@@ -112,7 +114,7 @@ def held_words(model: Model, node: int) -> str:
     """Return how a node is held, such as "ux uy uz", with stiffnesses [N/m, Nm/rad] of springs."""
     if model.truss is None:
         return "fixed node"
-    ways = zip("ux uy uz rx ry rz".split(), model.truss.supports[node].tolist(), strict=True)
+    ways = zip(["ux", "uy", "uz", "rx", "ry", "rz"], model.truss.supports[node].tolist(), strict=True)
     return " ".join(name if np.isinf(value) else f"{name}={value:g}" for name, value in ways if value)
 
 
@@ -133,7 +135,7 @@ def layer_name(words: str) -> str:
 def _layers(model: Model) -> dict[str, int]:
     """Return the layers with their colours."""
     members = dict.fromkeys(layers_of_members(model))
-    colours = {name: next((c for word, c in COLOURS.items() if f" {word}" in name), 3) for name in members}
+    colours = {name: next((c for word, c in LAYER_COLOURS.items() if f" {word}" in name), 3) for name in members}
     return colours | {"panels": 9, "nodes": 1, "supports": 6, "marks members": 8, "marks nodes": 8}
 
 

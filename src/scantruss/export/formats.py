@@ -19,13 +19,17 @@ from ..scan.cloud import PointCloud
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
 from .dxf import encode_dxf
+from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .ply import encode_ply
+from .rhino import encode_3dm
 from .saf import encode_saf
+from .step import encode_step
 from .style import FileStyle
+from .vtu import encode_vtu
 
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
@@ -78,6 +82,12 @@ FORMATS: dict[str, FileFormat] = {
     ),
     ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".ifc": FileFormat("IFC", one(encode_ifc)),
+    ".3dm": FileFormat("3DM", one(encode_3dm), loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
+                       loses_of_structure="supports, loads or forces"),
+    ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
+    ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE),
+    ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
 }  # fmt: skip
 

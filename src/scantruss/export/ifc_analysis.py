@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FormatError
 from .bodies import Bodies
-from .ifc import Ifc, Profiles
+from .ifc_file import Ifc, Profiles
 from .model import line_loads, temperatures
 from .part21 import Ref, Word, typed
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .bodies import Bodies, member_axes
-from .ifc import Ifc, Profiles
+from .ifc_file import Ifc, Profiles
 from .part21 import Ref, Word, typed
 
 MEMBER, NOT_DEFINED = Word(".MEMBER."), Word(".NOTDEFINED.")

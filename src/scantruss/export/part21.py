@@ -47,6 +47,12 @@ class Part21:
         self._lines.append(f"#{number}={name}({','.join([_WORDS[type(value)](value) for value in values])});\n")
         return Ref(number)
 
+    def complex(self, *parts: str) -> Ref:
+        """Add an instance of several types, each with its values in words, and return its number."""
+        number = len(self._lines)
+        self._lines.append(f"#{number}=({' '.join(parts)});\n")
+        return Ref(number)
+
     def encode(self) -> bytes:
         """Return the file."""
         return ("".join(self._lines) + "ENDSEC;\nEND-ISO-10303-21;\n").encode("ascii")

@@ -29,7 +29,7 @@ STIFFNESSES = (
     "Stiffness X [MN/m]", "Stiffness Y [MN/m]", "Stiffness Z [MN/m]",
     "Stiffness Fix [MNm/rad]", "Stiffness Fiy [MNm/rad]", "Stiffness Fiz [MNm/rad]",
 )  # fmt: skip
-SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
+SAF_SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
     "StructuralMaterial": (
         "Name", "Type", "Subtype", "Quality", "Unit mass [kg/m3]", "E modulus [MPa]", "G modulus [MPa]", "Poisson Coefficient",
         "Thermal expansion [1/K]", "Design properties", "Id",
@@ -74,11 +74,11 @@ SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
         "Name", "Point support", "Direction", "Translation value [mm]", "Rotation value [mrad]", "Load case", "Id",
     ),
 }  # fmt: skip
-ACTIONS = {"snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: load types of variable actions
-MATERIALS = {"steel": "Steel", "aluminium": "Aluminium", "timber": "Timber"}
-CATEGORIES = {"ULS": "ULS (Ultimate Limit State)", "SLS": "SLS (Serviceability Limit State)"}
+SAF_LOAD_TYPES = {"snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: load types of variable actions
+SAF_MATERIALS = {"steel": "Steel", "aluminium": "Aluminium", "timber": "Timber"}
+SAF_CATEGORIES = {"ULS": "ULS (Ultimate Limit State)", "SLS": "SLS (Serviceability Limit State)"}
 
-Row = dict[str, Any]  # column -> value
+SafRow = dict[str, Any]  # column -> value
 
 
 def encode_saf(model: Model, style: FileStyle) -> bytes:
@@ -86,7 +86,7 @@ def encode_saf(model: Model, style: FileStyle) -> bytes:
     truss = model.truss
     if truss is None:
         raise FormatError("SAF holds structures; make one of the grid with scantruss structure")
-    rows: dict[str, list[Row]] = {
+    rows: dict[str, list[SafRow]] = {
         "StructuralMaterial": [_material(truss.material)],
         "StructuralCrossSection": [_section(section, truss.material.name) for section in truss.sections],
         "StructuralPointConnection": [
@@ -100,12 +100,12 @@ def encode_saf(model: Model, style: FileStyle) -> bytes:
             {"Name": f"LG {action}", "Load group type": "Permanent", "Relation": "Standard"}
             if action == "permanent"
             else {"Name": f"LG {action}", "Load group type": "Variable", "Relation": "Standard",
-                  "Load type": ACTIONS.get(action, "Domestic")}
+                  "Load type": SAF_LOAD_TYPES.get(action, "Domestic")}
             for action in dict.fromkeys(case.action for case in truss.cases)
         ],
         "StructuralLoadCase": [_case(case) for case in truss.cases],
         "StructuralLoadCombination": [
-            {"Name": each.name, "Category": CATEGORIES[each.state], "Type": "Linear"}
+            {"Name": each.name, "Category": SAF_CATEGORIES[each.state], "Type": "Linear"}
             | {
                 f"{word} {number}": value
                 for number, (case, factor) in enumerate(each.factors, 1)
@@ -114,7 +114,7 @@ def encode_saf(model: Model, style: FileStyle) -> bytes:
             for each in truss.combinations
         ],
     }  # fmt: skip
-    for name in list(SHEETS)[len(rows) :]:
+    for name in list(SAF_SHEETS)[len(rows) :]:
         rows[name] = []
     for case in truss.cases:
         for name, row in _loads(truss, case):
@@ -123,7 +123,7 @@ def encode_saf(model: Model, style: FileStyle) -> bytes:
     widest = max((len(each.factors) for each in truss.combinations), default=0)
     more = [f"{word} {k + 1}" for k in range(widest) for word in ("Load factor", "Multiplier", "Load case name")]
     sheets: dict[str, Any] = {"Project": [("Name", "ScanTruss")], "Model": _model(model)}
-    for name, columns in SHEETS.items():
+    for name, columns in SAF_SHEETS.items():
         if rows[name]:
             heads = (*columns, *more, "Id") if name == "StructuralLoadCombination" else columns
             for row in rows[name]:
@@ -147,11 +147,11 @@ def _model(model: Model) -> list[tuple[str, str]]:
     ]
 
 
-def _material(material: Material) -> Row:
+def _material(material: Material) -> SafRow:
     isotropic = material.kind != "timber"
     return {
         "Name": material.name,
-        "Type": MATERIALS.get(material.kind, "Other"),
+        "Type": SAF_MATERIALS.get(material.kind, "Other"),
         "Quality": material.name,
         "Unit mass [kg/m3]": material.density,
         "E modulus [MPa]": material.young / 1e6,
@@ -163,7 +163,7 @@ def _material(material: Material) -> Row:
     }  # fmt: skip
 
 
-def _section(section: Section, material: str) -> Row:
+def _section(section: Section, material: str) -> SafRow:
     """Return a section by its shape and dimensions, height along z first."""
     width, depth, wall = (1e3 * value for value in (section.width, section.depth, section.thickness))
     shape, parameters = {
@@ -186,9 +186,9 @@ def _section(section: Section, material: str) -> Row:
     }
 
 
-def _members(model: Model, truss: Truss) -> Iterator[Row]:
+def _members(model: Model, truss: Truss) -> Iterator[SafRow]:
     behaviour = "Axial force only" if truss.pinned else "Standard"
-    analysis = {name: 0.0 for name in SHEETS["StructuralCurveMember"] if name.startswith("Analysis ")}
+    analysis = {name: 0.0 for name in SAF_SHEETS["StructuralCurveMember"] if name.startswith("Analysis ")}
     names, marks = [section.name for section in truss.sections], truss.node_marks
     table = zip(
         truss.member_marks, truss.members.tolist(), truss.lengths.tolist(), truss.axes[:, 2].tolist(),
@@ -217,9 +217,9 @@ def _members(model: Model, truss: Truss) -> Iterator[Row]:
         }
 
 
-def _stiffness(values: list[float]) -> Row:
+def _stiffness(values: list[float]) -> SafRow:
     """Return how translations and turns are held: free, rigid, or flexible with a stiffness [N/m, Nm/rad]."""
-    row: Row = {}
+    row: SafRow = {}
     for way, column, value in zip(WAYS, STIFFNESSES, values, strict=True):
         row[way] = "Rigid" if math.isinf(value) else "Flexible" if value else "Free"
         if row[way] == "Flexible":
@@ -227,7 +227,7 @@ def _stiffness(values: list[float]) -> Row:
     return row
 
 
-def _supports(truss: Truss) -> Iterator[Row]:
+def _supports(truss: Truss) -> Iterator[SafRow]:
     kinds = {(math.inf,) * 6: "Fixed", (math.inf,) * 3 + (0.0,) * 3: "Hinged"}
     for node in np.flatnonzero(truss.supports.any(axis=1)).tolist():
         values = truss.supports[node].tolist()
@@ -235,7 +235,7 @@ def _supports(truss: Truss) -> Iterator[Row]:
         yield {"Name": f"S {truss.node_marks[node]}", "Type": kind, "Node": truss.node_marks[node]} | _stiffness(values)
 
 
-def _hinges(truss: Truss) -> Iterator[Row]:
+def _hinges(truss: Truss) -> Iterator[SafRow]:
     if truss.pinned:  # said by the behaviour of the members
         return
     for member in np.flatnonzero(np.isfinite(truss.end_stiffness).any(axis=(1, 2))).tolist():
@@ -253,16 +253,20 @@ def _is_weight(case: LoadCase) -> bool:
     return case.self_weight == 1.0 and all(load is None for load in loads)
 
 
-def _case(case: LoadCase) -> Row:
-    row: Row = {"Name": case.name, "Load group": f"LG {case.action}"}
+def _case(case: LoadCase) -> SafRow:
+    row: SafRow = {"Name": case.name, "Load group": f"LG {case.action}"}
     if case.self_weight and not _is_weight(case):
         row["Description"] = "Self weight load impulses"
     if case.action == "permanent":
         return row | {"Action type": "Permanent", "Load type": "Self weight" if _is_weight(case) else "Standard"}
-    return row | {"Action type": "Variable", "Load type": ACTIONS.get(case.action, "Standard"), "Duration": "Short"}
+    return row | {
+        "Action type": "Variable",
+        "Load type": SAF_LOAD_TYPES.get(case.action, "Standard"),
+        "Duration": "Short",
+    }
 
 
-def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
+def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, SafRow]]:
     """Yield the sheet and the row of each load of a case."""
     if case.nodal is not None:
         in_node = {"Type": "Standard", "Force action": "In node", "Coordinate system": "Global"}
@@ -299,7 +303,7 @@ def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
             yield "StructuralPointSupportDef", {"Name": f"{mark} {'XYZ'[axis]}", "Point support": f"S {mark}", **moved}
 
 
-def _directed(force: np.ndarray, value: str, vector: str) -> Row:
+def _directed(force: np.ndarray, value: str, vector: str) -> SafRow:
     """Return a force as a number along an axis, or as a vector [kN]."""
     force = force / 1e3
     axes = np.flatnonzero(force)

@@ -23,7 +23,9 @@ class FileStyle(PictureStyle):
     """
 
     obj: str = "faces"  #: what an OBJ file holds: faces for the triangles, lines for the members, or both
-    tube: tuple[float, float | None] | None = None  #: diameter and wall of the members of a grid, which has no sections [mm]
+    tube: tuple[float, float | None] | None = (
+        None  #: diameter and wall of the members of a grid, which has no sections [mm]
+    )
     ball: float | None = (
         None  #: diameter of the nodes, 0 for none; None: twice the greatest diameter of the members [mm]
     )
@@ -38,6 +40,6 @@ class FileStyle(PictureStyle):
         if self.ifc not in IFC_VIEWS:
             raise InputError(f"an IFC file holds {', '.join(IFC_VIEWS)}, got {self.ifc!r}")
         if self.tube is not None and (self.tube[1] is None or not 0 < 2 * self.tube[1] < self.tube[0]):
-            raise InputError(f"a tube has a diameter and a wall of less than half of it in mm, such as 60x3")
+            raise InputError("a tube has a diameter and a wall of less than half of it in mm, such as 60x3")
         if self.ball is not None and not 0 <= self.ball < math.inf:
             raise InputError(f"the diameter of the balls must be a number of mm, got {self.ball!r}")
