@@ -67,6 +67,9 @@ def test_structure_writes_what_convert_writes(place: Path) -> None:
     ("words", "said"),
     [
         ("convert net.json a.jsn", "the nearest is .json"),
+        ("convert net.json a.iffc", "the nearest is .ifc"),
+        ("convert net.json a.saf.xlsx", "SAF holds structures"),
+        ("convert roof.json a.xlsx", "the nearest is .saf.xlsx"),
         ("convert roof.json a.png", "no format"),
         ("convert none.json a.ply", "there is no file none.json"),
         ("convert net.dwg a.ply", "no reader"),
@@ -110,3 +113,46 @@ def test_members_without_triangles_are_no_grid(tmp_path: Path) -> None:
 def test_a_rich_grid_goes_through_every_format(tmp_path: Path) -> None:
     for suffix in suffixes_of("grid"):
         assert all(path.stat().st_size for path in st.write(rich(), tmp_path / f"a{suffix}"))
+
+
+def test_the_page_on_formats_has_a_row_for_each_with_what_it_does_not_hold() -> None:
+    page = (Path(__file__).resolve().parents[1] / "docs" / "formats-output.md").read_text(encoding="utf-8")
+    rows = page[page.index("### Other programs") : page.index("**DXF.**")].splitlines()
+    for suffix, row in FORMATS.items():
+        (line,) = (line for line in rows if line.startswith("| `.") and f"`{suffix}`" in line.split("|")[1])
+        *_, lost, of_structure, _ = (cell.strip() for cell in line.split("|"))
+        assert (lost, of_structure) == (row.loses, row.loses_of_structure)
+
+
+def test_a_grid_without_a_unit_is_refused_once_the_scan_is_read(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points = np.stack(np.meshgrid(np.arange(30.0), np.arange(30.0), [0.0]), axis=-1).reshape(-1, 3)
+    np.savetxt("scan.xyz", points)
+    for out in ("a.ifc", "a.step"):
+        assert main(["grid", "scan.xyz", "a.dxf", out, "--length", "6"]) == 2
+        assert "needs a unit, and that of the grid is not known" in capsys.readouterr().err
+    st.write(dome(3, unit=""), "odd.json")
+    assert main(["convert", "odd.json", "a.ifc"]) == 2
+    assert main(["convert", "odd.json", "a.ifc", "--unit", "mm"]) == 0
+    assert "IfcProject".upper() in Path("a.ifc").read_text()
+    assert not Path("a.dxf").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--tube 60", "such as 60x3"),
+        ("--tube 60x31", "such as 60x3"),
+        ("--tube thick", "needs a diameter and a wall"),
+        ("--ball -3", "diameter of the balls"),
+        ("--ifc parts", "an IFC file holds"),
+        ("--tube 60x3 --ball 100000", "shorter than its balls"),
+    ],
+)
+def test_bodies_that_cannot_be_built_are_refused(
+    words: str, said: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["convert", "net.json", "a.ifc", *words.split()]) == 2
+    line = capsys.readouterr().err
+    assert said in line and line.count("\n") == 1 and not Path("a.ifc").exists()

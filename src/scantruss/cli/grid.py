@@ -83,6 +83,7 @@ def style_of(values: Namespace) -> FileStyle:
 
 def grid(values: Namespace) -> None:
     """Make a grid and save it with its settings."""
+    from ..export.formats import check_unit
     from ..report.figures import report_of
     from ..report.terminal import Bars
     from ..runtime.files import SaveTogether
@@ -97,6 +98,8 @@ def grid(values: Namespace) -> None:
         started = perf_counter()
         settings = settings_to_read(values, settings, bars)
         cloud = read_scan(values.scan, settings, bars)
+        for out in outs:
+            check_unit(out, cloud.unit)
         spent = perf_counter() - started
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)

@@ -28,7 +28,7 @@ class Bodies:
     lengths: np.ndarray  #: (M,) from end to end
 
 
-def bodies_of(model: Model, style: FileStyle, what: str) -> Bodies | None:
+def bodies_of(model: Model, style: FileStyle) -> Bodies | None:
     """Return the bodies of a structure, or of a grid whose tube the style names; None where nothing says how thick members are.
 
     A member ends where the corners of its section meet the ball.
@@ -36,11 +36,11 @@ def bodies_of(model: Model, style: FileStyle, what: str) -> Bodies | None:
     Raises
     ------
     FormatError
-        The unit is not known, or a member is shorter than its balls.
+        A member is shorter than its balls.
     """
     from ..structure.catalogue import circular_hollow
 
-    metres = model.metres(what)
+    metres = model.metres
     if model.truss is not None:
         sections, section_of, axes = model.truss.sections, model.truss.section_of, model.truss.axes
     elif style.tube is not None:

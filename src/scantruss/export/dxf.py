@@ -43,8 +43,8 @@ def encode_dxf(model: Model, style: FileStyle) -> bytes:
         for name, colour in _layers(model).items():
             drawing.layers.add(name, color=colour)
         mean = float(model.lengths.mean()) if len(model.lengths) else 1.0
-        known = bodies_of(model, style, "DXF") if model.truss is not None or style.tube is not None else None
-        radius = known.ball / model.metres("DXF") if known is not None and known.ball else BALL_SYMBOL * mean
+        known = bodies_of(model, style) if model.truss is not None or style.tube is not None else None
+        radius = known.ball / model.metres if known is not None and known.ball else BALL_SYMBOL * mean
         _ball(drawing.blocks.new("NODE"))
         _support(drawing.blocks.new("SUPPORT"))
         first = int(str(drawing.entitydb.handles), 16) + 1

@@ -16,6 +16,7 @@ from ..errors import FormatError
 from ..grid.grid import Grid
 from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
+from ..settings import UNITS
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
 from .dxf import encode_dxf
@@ -50,6 +51,7 @@ class FileFormat:
     loses: str = ""  #: what it cannot hold of a grid or a structure
     loses_of_structure: str = ""  #: what it cannot hold of a structure besides
     holds: tuple[str, ...] = (GRID, STRUCTURE)
+    needs_unit: bool = False  #: whether a grid without a unit is refused
     read: Callable[[Path], Model] | None = None
     library: str = ""  #: module that must be installed
     extra: str = ""  #: of pyproject.toml, which brings it
@@ -80,15 +82,15 @@ FORMATS: dict[str, FileFormat] = {
     ".png": FileFormat(
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
-    ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
-    ".ifc": FileFormat("IFC", one(encode_ifc)),
     ".3dm": FileFormat("3DM", one(encode_3dm), loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
-    ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
-    ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE),
-    ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE),
+    ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
+    ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
 SOLID_SUFFIXES = (".3mf", ".stl")
@@ -124,6 +126,20 @@ def check_output(path: str | Path, kind: str = GRID) -> Path:
     if path.suffix.lower() == ".csv":
         check_place(nodes_path(path), (".csv", path.suffix))
     return path
+
+
+def check_unit(path: Path, unit: str) -> None:
+    """Refuse a format that needs a unit, of a grid that has none; called as soon as that is known.
+
+    Raises
+    ------
+    FormatError
+        The message says how to give one.
+    """
+    row = FORMATS[suffix_of(path, FORMATS)]
+    if row.needs_unit and not unit:
+        known = "|".join(name for name in UNITS if name)
+        raise FormatError(f"{row.name} needs a unit, and that of the grid is not known; give it with --unit {known}")
 
 
 def check_library(row: FileFormat) -> None:
@@ -195,6 +211,7 @@ def write(
     """
     model = model_of(what, cloud=cloud, report=report)
     path = check_output(path, GRID if model.truss is None else STRUCTURE)
+    check_unit(path, model.unit)
     encode = FORMATS[suffix_of(path, suffixes_of())].encode
     assert encode is not None  # `check_output` knows only formats that are written
     return write_files(encode(model, path, style or FileStyle()))

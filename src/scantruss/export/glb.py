@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..runtime.ours import MARK
-from ..settings import UNITS
 from .bodies import bodies_of, member_axes
 from .model import Model
 from .style import FileStyle
@@ -49,10 +48,10 @@ class _Buffer:
 
 def encode_glb(model: Model, style: FileStyle) -> bytes:
     """Return a GLB file; of a grid without a unit one metre a unit."""
-    metres = UNITS.get(model.unit) or 1.0
+    metres = model.metres
     nodes = model.local * metres
     mean = float(model.lengths.mean()) * metres if len(model.members) else 1.0
-    bodies = bodies_of(model, style, "GLB") if model.truss is not None or style.tube is not None else None
+    bodies = bodies_of(model, style) if model.truss is not None or style.tube is not None else None
     if bodies is None:
         radii, axes, ball = (
             np.full(len(model.members), TUBE_SYMBOL * mean),

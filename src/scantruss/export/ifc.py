@@ -14,7 +14,7 @@ from .style import FileStyle
 def encode_ifc(model: Model, style: FileStyle) -> bytes:
     """Return an IFC4 file: physical parts of a grid; of a structure these, its analysis model and its results."""
     ifc = Ifc(model)
-    bodies = bodies_of(model, style, "IFC")
+    bodies = bodies_of(model, style)
     profiles = None if bodies is None else Profiles(ifc, bodies)
     members: list[Ref] = []
     if model.truss is None or style.ifc != "analysis":

@@ -53,7 +53,7 @@ class Ifc(Part21):
         self.project = self.root(
             "IFCPROJECT", "project", "", "ScanTruss", None, None, None, None, (self.context,), units
         )
-        origin = (model.origin * model.metres("IFC")).tolist()
+        origin = (model.origin * model.metres).tolist()
         place = self.add("IFCAXIS2PLACEMENT3D", self.add("IFCCARTESIANPOINT", origin), None, None)
         self.place = self.add("IFCLOCALPLACEMENT", None, place)  #: of all that is relative to the origin
         self.site = self.root(

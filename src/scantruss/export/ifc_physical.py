@@ -21,7 +21,7 @@ def add_physical(ifc: Ifc, bodies: Bodies | None, profiles: Profiles | None) -> 
         "IFCBUILDING", "building", "", "Building", None, None, place, None, None, Word(".ELEMENT."), None, None, None
     )
     ifc.relate("IFCRELAGGREGATES", "site", ifc.site, (building,))
-    points = [ifc.add("IFCCARTESIANPOINT", each) for each in (model.local * model.metres("IFC")).tolist()]
+    points = [ifc.add("IFCCARTESIANPOINT", each) for each in (model.local * model.metres).tolist()]
     members = _members(ifc, bodies, profiles, points)
     nodes = _nodes(ifc, bodies, points)
     panels = _panels(ifc, place)
@@ -45,7 +45,7 @@ def _members(ifc: Ifc, bodies: Bodies | None, profiles: Profiles | None, points:
     density = None if truss is None else truss.material.density
 
     axes = (bodies.axes if bodies is not None else member_axes(model)).tolist()
-    lengths = (model.lengths * model.metres("IFC")).tolist()
+    lengths = (model.lengths * model.metres).tolist()
     made = []
     for number, (start, end) in enumerate(model.members.tolist()):
         mark, (x, y, _), length = model.member_marks[number], axes[number], lengths[number]
@@ -141,7 +141,7 @@ def _ball(ifc: Ifc, radius: float) -> tuple[Ref, Ref]:
 def _panels(ifc: Ifc, place: Ref) -> list[Ref]:
     """Add the panels: triangles without thickness."""
     model, add = ifc.model, ifc.add
-    corners = (model.local * model.metres("IFC"))[model.triangles]
+    corners = (model.local * model.metres)[model.triangles]
     areas = (
         np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     ).tolist()

@@ -70,18 +70,10 @@ class Model:
         """Return the identifier of a part, the same for the same mark of the same kind at the same origin."""
         return uuid5(self._namespace, f"{what} {mark}")
 
-    def metres(self, what: str) -> float:
-        """Return the metres of one `unit`.
-
-        Raises
-        ------
-        FormatError
-            The unit is not known, and the format `what` needs one.
-        """
-        if size := UNITS.get(self.unit):
-            return float(size)
-        known = "|".join(unit for unit in UNITS if unit)
-        raise FormatError(f"{what} needs a unit, and that of the grid is not known; give it with --unit {known}")
+    @property
+    def metres(self) -> float:
+        """Metres of one `unit`, where it is known; else 1."""
+        return UNITS.get(self.unit) or 1.0
 
     def as_grid(self, what: str) -> Grid:
         """Return the grid.

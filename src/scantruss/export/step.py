@@ -16,7 +16,7 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
     """Return a STEP file in the frame of the scan, in the unit of the grid; inches and feet become metres."""
     file = Part21(SCHEMA, "ScanTruss")
     unit = model.unit if model.unit in PREFIX else "m"
-    size = 1.0 if model.unit == unit else model.metres("STEP")
+    size = 1.0 if model.unit == unit else model.metres
     context = _context(file, PREFIX[unit])
     nodes = model.nodes * size
     points = [
