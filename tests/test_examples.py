@@ -93,3 +93,17 @@ def test_fixed_nodes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for position in grid.settings.fixed:
         assert np.linalg.norm(grid.nodes + grid.origin - position, axis=1).min() < 1e-9
     assert grid.quality.shape_min > 0.5
+
+
+def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import ezdxf
+    import ifcopenshell
+    import openpyxl
+    import trimesh
+
+    truss = run("08_other_programs", tmp_path, monkeypatch)
+    count = len(truss.members)
+    assert len(ifcopenshell.open(str(tmp_path / "stadium.ifc")).by_type("IfcStructuralCurveMember")) == count
+    assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
+    assert len(ezdxf.readfile(tmp_path / "stadium.dxf").modelspace().query("LINE")) == count
+    assert "members" in trimesh.load(tmp_path / "stadium.glb").geometry
