@@ -16,7 +16,7 @@ from small_grids import cloud_over, dome, fan, make_grid
 from test_convert import UTM, roof
 
 import scantruss as st
-from scantruss.export.glb import SIDES, colours_of
+from scantruss.export.glb import SIDES, colours_of, linear
 from scantruss.export.model import model_of_truss
 from scantruss.export.part21 import ifc_guid, quoted, real
 from scantruss.export.style import FileStyle
@@ -101,12 +101,13 @@ def test_tubes_have_the_colour_of_their_utilization(tmp_path: Path) -> None:
     assert colours_of(np.array([0.0, 1.0, 2.0, np.nan])).tolist() == [
         [38, 130, 142, 255], [200, 30, 30, 255], [200, 30, 30, 255], [128, 128, 128, 255],
     ]  # fmt: skip
+    assert linear(np.array([[255, 188, 0, 255]])).tolist() == [[255, 128, 0, 255]]  # 188 of a screen is half the light
     truss = roof(3)
     used = np.linspace(0, 1, len(truss.members))
     st.write(model_of_truss(truss, utilization=used), tmp_path / "a.glb")
     scene: Any = trimesh.load(tmp_path / "a.glb")
     shades = np.asarray(scene.geometry["members"].visual.vertex_attributes["color"])
-    np.testing.assert_array_equal(shades.reshape(len(used), -1, 4)[:, 0], colours_of(used))
+    np.testing.assert_array_equal(shades.reshape(len(used), -1, 4)[:, 0], linear(colours_of(used)))
 
 
 def test_vtu_holds_results_of_nodes_and_members(tmp_path: Path) -> None:

@@ -69,6 +69,8 @@ def convert(values: Namespace) -> None:
             check_passed(model.grid, values.keep_failed)
         for out in outs:
             check_output(out, GRID if model.truss is None else STRUCTURE)
+        if model.truss is not None and any(out.suffix.lower() == ".json" for out in outs):
+            bars.note("the checks of the members are not written again; scantruss structure writes them")
         written = write_models(model, outs, save, bars, style)
     size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.triangles):,} triangles"
     print_lines([size, f"wrote {' '.join(map(str, written))}"])

@@ -36,7 +36,7 @@ def bodies_of(model: Model, style: FileStyle) -> Bodies | None:
     Raises
     ------
     FormatError
-        A member is shorter than its balls.
+        The unit of a grid with a tube is not known, or a member is shorter than its balls.
     """
     from ..structure.catalogue import circular_hollow
 
@@ -44,6 +44,8 @@ def bodies_of(model: Model, style: FileStyle) -> Bodies | None:
     if model.truss is not None:
         sections, section_of, axes = model.truss.sections, model.truss.section_of, model.truss.axes
     elif style.tube is not None:
+        if not model.unit:
+            raise FormatError("a tube has a diameter in mm, and the unit of the grid is not known; give it with --unit")
         diameter, wall = style.tube
         assert wall is not None
         sections = (circular_hollow(f"CHS{diameter:g}x{wall:g}", diameter / 1e3, wall / 1e3),)

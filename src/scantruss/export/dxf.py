@@ -93,21 +93,28 @@ def _draw(model: Model, to: _Entities, radius: float, mean: float) -> None:
     corners = [[f" 1{k}\n{x}\n 2{k}\n{y}\n 3{k}\n{z}\n" for x, y, z in nodes.tolist()] for k in range(4)]
     middles = nodes[model.members].mean(axis=1).tolist()
     height = f" 40\n{TEXT * mean}\n"
-    table = zip(model.member_marks, layers_of_members(model), model.members.tolist(), middles, strict=True)
+    table = zip(
+        map(_one_line, model.member_marks), layers_of_members(model), model.members.tolist(), middles, strict=True
+    )
     for mark, layer, (start, end), (x, y, z) in table:
         marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
         to.add("LINE", layer, f"100\nAcDbLine\n{corners[0][start]}{corners[1][end]}{marked}")
         place = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
         to.add("TEXT", "marks members", f"100\nAcDbText\n{place}{height}  1\n{mark}\n100\nAcDbText\n")
-    for mark, (a, b, c) in zip(model.panel_marks, model.triangles.tolist(), strict=True):
+    for mark, (a, b, c) in zip(map(_one_line, model.panel_marks), model.triangles.tolist(), strict=True):
         marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
         places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][c]
         to.add("3DFACE", "panels", f"100\nAcDbFace\n{places}{marked}")
-    for mark, place in zip(model.node_marks, nodes.tolist(), strict=True):
+    for mark, place in zip(map(_one_line, model.node_marks), nodes.tolist(), strict=True):
         to.insert("NODE", "nodes", place, radius, {"MARK": (mark, "marks nodes")})
     for node in model.supported.tolist():
-        words = {"MARK": (model.node_marks[node], "supports"), "HELD": (held_words(model, node), "supports")}
+        words = {"MARK": (_one_line(model.node_marks[node]), "supports"), "HELD": (held_words(model, node), "supports")}
         to.insert("SUPPORT", "supports", nodes[node].tolist(), 2 * radius, words)
+
+
+def _one_line(word: str) -> str:
+    """Return a word that ends no line of the file."""
+    return word if word.isprintable() else " ".join(word.split())
 
 
 def held_words(model: Model, node: int) -> str:

@@ -86,7 +86,7 @@ def encode_glb(model: Model, style: FileStyle) -> bytes:
     places, normals, triangles = _tubes(nodes, model.members, radii, axes)
     more, colour = {"NORMAL": buffer.add(normals.astype("<f4"), FLOAT, "VEC3", 34962)} if len(normals) else {}, STEEL
     if model.utilization is not None and len(normals):
-        shades = np.repeat(colours_of(model.utilization), 2 * SIDES, axis=0)
+        shades = np.repeat(linear(colours_of(model.utilization)), 2 * SIDES, axis=0)
         more["COLOR_0"] = buffer.add(shades, BYTE, "VEC4", 34962, normalized=True)
         colour = (1.0, 1.0, 1.0, 1.0)
     mesh("members", places, colour, triangles, **more)
@@ -121,6 +121,14 @@ def colours_of(utilization: np.ndarray) -> np.ndarray:
     shades = RAMP[low] + (RAMP[low + 1] - RAMP[low]) * (share - low)[:, None]
     shades[np.isnan(utilization)] = 128.0
     return np.column_stack([shades.round(), np.full(len(shades), 255.0)]).astype(np.uint8)
+
+
+def linear(colours: np.ndarray) -> np.ndarray:
+    """Return colours as glTF wants them: in proportion to the light (IEC 61966-2-1), not as screens count it."""
+    share = colours / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    light[:, 3] = share[:, 3]
+    return (255 * light).round().astype(np.uint8)
 
 
 def _chunk(content: bytes, kind: bytes) -> bytes:

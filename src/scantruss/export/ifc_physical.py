@@ -72,7 +72,7 @@ def _members(ifc: Ifc, bodies: Bodies | None, profiles: Profiles | None, points:
             "EndNode": typed("IFCIDENTIFIER", model.node_marks[end]),
             "SystemLength": typed("IFCPOSITIVELENGTHMEASURE", length),
         }
-        if model.utilization is not None:
+        if model.utilization is not None and math.isfinite(model.utilization[number]):
             values["Utilization"] = typed("IFCREAL", float(model.utilization[number]))
         ifc.properties("ScanTruss_Member", mark, values, (member,))
         if bodies is not None and section is not None:

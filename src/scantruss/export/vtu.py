@@ -11,6 +11,7 @@ import numpy as np
 from ..runtime.ours import MARK
 from .model import Model
 from .style import FileStyle
+from .workbook import NOT_IN_XML
 
 TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
 LINE_CELL, TRIANGLE_CELL = 3, 5  #: of VTK's cells
@@ -78,7 +79,7 @@ def _section(name: str, arrays: dict[str, np.ndarray]) -> list[str]:
         words = base64.b64encode(len(data).to_bytes(8, "little") + data).decode("ascii")
         width = f' NumberOfComponents="{array.shape[1]}"' if array.ndim > 1 else ""
         lines.append(
-            f'<DataArray type="{TYPES[array.dtype.name]}" Name={quoteattr(key)}{width} format="binary">'
+            f'<DataArray type="{TYPES[array.dtype.name]}" Name={quoteattr(NOT_IN_XML.sub("?", key))}{width} format="binary">'
             f"{words}</DataArray>\n"
         )
     return [*lines, f"</{name}>\n"]
