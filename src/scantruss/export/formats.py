@@ -17,6 +17,7 @@ from ..grid.grid import Grid
 from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from ..settings import UNITS
+from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
 from .dxf import encode_dxf
@@ -35,7 +36,6 @@ from .vtu import encode_vtu
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
-    from ..structure.truss import Truss
 
 Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]
 
@@ -172,8 +172,9 @@ def model_of(
         return what
     if isinstance(what, Grid):
         return model_of_grid(what, cloud)
-    solution = what if hasattr(what, "truss") else None
-    return model_of_truss(what if solution is None else solution.truss, solution, report)  # type: ignore[arg-type]
+    if isinstance(what, Truss):
+        return model_of_truss(what)
+    return model_of_truss(what.truss, what, report)
 
 
 def write(
