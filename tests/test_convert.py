@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,18 @@ def test_structure_writes_what_convert_writes(place: Path) -> None:
     assert main("structure net.json --supports boundary one.json one.ply --loads self".split()) == 0
     assert main("convert one.json two.ply".split()) == 0
     assert Path("one.ply").read_bytes() == Path("two.ply").read_bytes()
+
+
+def test_the_utilization_of_a_structure_goes_along(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main("structure net.json --supports boundary one.json --loads self,snow:1kN/m2".split()) == 0
+    values = json.loads(Path("one.json").read_text(encoding="utf-8"))
+    model = read_model("one.json")
+    assert model.utilization is not None and model.utilization.tolist() == values["utilization"]
+    values["utilization"].pop()
+    Path("one.json").write_text(json.dumps(values), encoding="utf-8")
+    capsys.readouterr()
+    assert main("convert one.json a.vtu".split()) == 2
+    assert "utilization must be a number for each member" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

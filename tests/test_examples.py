@@ -101,7 +101,7 @@ def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     import openpyxl
     import trimesh
 
-    truss = run("08_other_programs", tmp_path, monkeypatch)
+    truss = run("11_other_programs", tmp_path, monkeypatch)
     count = len(truss.members)
     assert len(ifcopenshell.open(str(tmp_path / "stadium.ifc")).by_type("IfcStructuralCurveMember")) == count
     assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1

@@ -102,7 +102,7 @@ def read_json(path: Path) -> Model:
     FormatError
         The file cannot be read, or it is neither.
     """
-    from ..structure.json import STRUCTURE_FORMAT, read_structure, read_utilization
+    from ..structure.json import STRUCTURE_FORMAT, read_structure
 
     with suppress(OSError), path.open("rb") as file:
         if f'"format": "{STRUCTURE_FORMAT}"'.encode() not in file.read(BYTES_WITH_MARK):
@@ -110,7 +110,12 @@ def read_json(path: Path) -> Model:
     from ..structure.statics import solve
 
     truss = read_structure(path)
-    return model_of_truss(truss, solve(truss) if truss.cases else None, utilization=read_utilization(path))
+    found = json.loads(path.read_text(encoding="utf-8")).get("utilization")
+    try:
+        used = None if found is None else np.array(found, float).reshape(len(truss.members))  # null is NaN
+    except (TypeError, ValueError):
+        raise FormatError(f"{path} is a damaged structure: utilization must be a number for each member") from None
+    return model_of_truss(truss, solve(truss) if truss.cases else None, utilization=used)
 
 
 def read_grid(path: str | Path) -> Grid:

@@ -110,32 +110,6 @@ def read_structure(path: str | Path) -> Truss:
     FormatError
         The file cannot be read, or it is not a structure of ours.
     """
-    values = _read(path)
-    try:
-        return _truss_of(values)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        words = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
-        raise FormatError(f"{path} is a damaged structure: {words}; write it again with scantruss structure") from None
-
-
-def read_utilization(path: str | Path) -> np.ndarray | None:
-    """Return the (M,) utilization of the members in a file of our own, None where they are not checked.
-
-    Raises
-    ------
-    FormatError
-        The file cannot be read, or it is not a structure of ours.
-    """
-    values = _read(path)
-    found = values.get("utilization")
-    try:
-        return None if found is None else _array(found, 1, float)
-    except (TypeError, ValueError) as error:
-        raise FormatError(f"{path} is a damaged structure: utilization: {error}") from None
-
-
-def _read(path: str | Path) -> dict[str, Any]:
-    """Return the values of a file of our own."""
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -148,7 +122,11 @@ def _read(path: str | Path) -> dict[str, Any]:
         )
     if values.get("format_version") != STRUCTURE_VERSION:
         raise FormatError(f"{path} has format_version {values.get('format_version')!r}, known is {STRUCTURE_VERSION}")
-    return values
+    try:
+        return _truss_of(values)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        words = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
+        raise FormatError(f"{path} is a damaged structure: {words}; write it again with scantruss structure") from None
 
 
 def _truss_of(values: dict[str, Any]) -> Truss:
