@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 INSUNITS = {"": 0, "inch": 1, "foot": 2, "mm": 4, "cm": 5, "m": 6}  #: values of that header
 NOT_IN_NAMES = re.compile(r"[<>/\\\":;?*|=`,\x00-\x1f]")  #: of layers
-LAYER_COLOURS = {"boundary": 5, "inner": 7}  #: of the layers of members; 3 for lines
+DXF_COLOURS = {"boundary": 5, "inner": 7}  #: of the layers of members; 3 for lines
 APPLICATION = "SCANTRUSS"  #: of the extended data
 BALL_SYMBOL = 0.03  #: radius of a ball whose diameter is not known, in mean member lengths
 TEXT = 0.06  #: height of the marks, in mean member lengths
@@ -142,7 +142,7 @@ def layer_name(words: str) -> str:
 def _layers(model: Model) -> dict[str, int]:
     """Return the layers with their colours."""
     members = dict.fromkeys(layers_of_members(model))
-    colours = {name: next((c for word, c in LAYER_COLOURS.items() if f" {word}" in name), 3) for name in members}
+    colours = {name: next((c for word, c in DXF_COLOURS.items() if f" {word}" in name), 3) for name in members}
     return colours | {"panels": 9, "nodes": 1, "supports": 6, "marks members": 8, "marks nodes": 8}
 
 

@@ -11,7 +11,7 @@ from ..runtime.ours import MARK
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"  #: of identifiers in IFC
 NOT_PLAIN = re.compile(r"[^ -~]+")
-HEAD = """ISO-10303-21;
+PART21_HEAD = """ISO-10303-21;
 HEADER;
 FILE_DESCRIPTION(({view}),'2;1');
 FILE_NAME('','1980-01-01T00:00:00',(''),(''),{mark},{mark},'');
@@ -39,7 +39,7 @@ class Part21:
     """
 
     def __init__(self, schema: str, view: str) -> None:
-        self._lines = [HEAD.format(view=quoted(view), mark=quoted(MARK), schema=quoted(schema))]
+        self._lines = [PART21_HEAD.format(view=quoted(view), mark=quoted(MARK), schema=quoted(schema))]
 
     def add(self, name: str, *values: Any) -> Ref:
         """Add an instance and return its number; None is "$", a tuple or list is an aggregate."""

@@ -7,7 +7,7 @@ import struct
 import zlib
 
 from ..runtime.ours import MARK
-from .dxf import LAYER_COLOURS, held_words, layers_of_members
+from .dxf import DXF_COLOURS, held_words, layers_of_members
 from .model import Model
 from .style import FileStyle
 
@@ -31,7 +31,7 @@ def encode_3dm(model: Model, style: FileStyle) -> bytes:
         if layer not in layers:
             made = rhino3dm.Layer()
             made.Name, made.Id = layer, model.guid("3dm layer", layer)
-            made.Color = SHADES[next((colour for word, colour in LAYER_COLOURS.items() if f" {word}" in layer), 3)]
+            made.Color = SHADES[next((colour for word, colour in DXF_COLOURS.items() if f" {word}" in layer), 3)]
             layers[layer] = file.Layers.Add(made)
         found = rhino3dm.ObjectAttributes()
         found.Name, found.Id, found.LayerIndex = mark, model.guid(f"3dm {layer}", mark), layers[layer]
