@@ -137,3 +137,17 @@ def test_canopy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cases = {case.name: case for case in report.cases}
     assert cases["wind"].applied[2] > 0 > cases["snow"].applied[2]
     assert (tmp_path / "canopy.json").exists()
+
+
+def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import ezdxf
+    import ifcopenshell
+    import openpyxl
+    import trimesh
+
+    truss = run("11_other_programs", tmp_path, monkeypatch)
+    count = len(truss.members)
+    assert len(ifcopenshell.open(str(tmp_path / "stadium.ifc")).by_type("IfcStructuralCurveMember")) == count
+    assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
+    assert len(ezdxf.readfile(tmp_path / "stadium.dxf").modelspace().query("LINE")) == count
+    assert "members" in trimesh.load(tmp_path / "stadium.glb").geometry

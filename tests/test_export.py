@@ -19,7 +19,7 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, rich, two
 from typed import known
 
 import scantruss as st
-from scantruss.export.formats import GRID_FORMATS, check_output
+from scantruss.export.formats import check_output, suffixes_of
 from scantruss.runtime.files import SaveTogether, write_files
 
 GRIDS = [fan, icosahedron, two_pieces, rich, dome]
@@ -203,7 +203,7 @@ def test_without_a_unit_none_is_said(tmp_path: Path) -> None:
     assert (tmp_path / "a.csv").read_text().splitlines()[0].startswith("id,start,end,start_x,")
 
 
-@pytest.mark.parametrize("suffix", sorted(GRID_FORMATS))
+@pytest.mark.parametrize("suffix", suffixes_of("grid"))
 def test_same_grid_same_bytes(suffix: str, tmp_path: Path) -> None:
     grid = rich()
     first = st.write(grid, tmp_path / f"a{suffix}", cloud=cloud_over(grid))
@@ -211,7 +211,7 @@ def test_same_grid_same_bytes(suffix: str, tmp_path: Path) -> None:
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
 
 
-@pytest.mark.parametrize("suffix", sorted(GRID_FORMATS))
+@pytest.mark.parametrize("suffix", suffixes_of("grid"))
 def test_a_grid_without_triangles_is_written(suffix: str, tmp_path: Path) -> None:
     for path in st.write(make_grid([(0, 0, 0)], []), tmp_path / f"a{suffix}"):
         assert path.stat().st_size > 0
@@ -220,8 +220,9 @@ def test_a_grid_without_triangles_is_written(suffix: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("a.iffc", 'no format for ".iffc"; use one of .csv .json .obj .ply .png'),
-        ("a", 'no format for "a"; use one of .csv'),
+        ("a.jsn", 'no format for ".jsn"; use one of .3dm .csv '),
+        ("a.jsn", "the nearest is .json"),
+        ("a", 'no format for "a"; use one of .3dm .csv'),
         ("a.stl", 'no format for ".stl" of a grid'),
         ("a.3mf", "scantruss print"),
         ("none/a.obj", "none does not exist"),

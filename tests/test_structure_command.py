@@ -189,7 +189,7 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --buckling 99", "numbers of modes, 0 to 50"),
         ("grid.json out.json --node-allowance -1", "node_allowance is a share"),
         ("grid.json out.json --settings no.toml", "cannot read no.toml"),
-        ("grid.json out.obj", 'no format for ".obj"'),
+        ("grid.json out.png", 'no format for ".png"'),
         ("grid.json grid.json", "would overwrite the grid"),
         ("grid.json", "missing OUT"),
         ("no.json out.json", "there is no file no.json"),

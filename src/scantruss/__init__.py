@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .errors import FrontError as FrontError
     from .errors import InputError as InputError
     from .errors import ScanTrussError as ScanTrussError
+    from .export.formats import read_model as read_model
     from .export.formats import write as write
     from .export.json import read_grid as read_grid
     from .export.solid import print_model as print_model
@@ -71,7 +72,7 @@ _HOMES = {
     "optimize_grid": "improve.optimize",
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
-    "write": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
+    "write": "export.formats", "read_model": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
     "print_model": "export.solid",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from .clean import clean, clean_parser
 from .completion import completion_parser, print_completion
+from .convert import convert, convert_parser
 from .demo import demo_parser, make_demo
 from .grid import grid, grid_parser
 from .info import info, info_parser
@@ -39,6 +40,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "print": (print_parser, print_solid),
     "schedule": (schedule_parser, make_schedule),
     "structure": (structure_parser, structure),
+    "convert": (convert_parser, convert),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),

@@ -83,6 +83,7 @@ def style_of(values: Namespace) -> FileStyle:
 
 def grid(values: Namespace) -> None:
     """Make a grid and save it with its settings."""
+    from ..export.formats import check_unit
     from ..report.figures import report_of
     from ..report.terminal import Bars
     from ..runtime.files import SaveTogether
@@ -97,6 +98,8 @@ def grid(values: Namespace) -> None:
         started = perf_counter()
         settings = settings_to_read(values, settings, bars)
         cloud = read_scan(values.scan, settings, bars)
+        for out in outs:
+            check_unit(out, cloud.unit)
         spent = perf_counter() - started
         if not has_length(values):
             settings = choose_length(cloud, settings, bars)
@@ -105,13 +108,11 @@ def grid(values: Namespace) -> None:
         except FrontError as error:
             draw_refusal(error, cloud, outs, style, bars, force=values.force)
             raise
-    from ..export.formats import write
+    from ..export.formats import model_of
+    from .convert import write_models
 
-    written: list[Path] = []
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
-        for number, out in enumerate(outs):
-            bars("write", number / len(outs))
-            written += [out.with_name(file.name) for file in write(result, save.beside(out), cloud=cloud, style=style)]
+        written = write_models(model_of(result, cloud=cloud), outs, save, bars, style)
         save.json(settings_file, (result.settings or settings).to_dict())
         if report is not None:
             save.json(report, report_of(result, len(cloud.points)))
@@ -122,20 +123,17 @@ def grid(values: Namespace) -> None:
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
-    from ..export.csv import nodes_path
     from ..export.formats import check_output
     from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from .convert import claim_models
 
     taken = inputs_of(values)
     if not values.force:
         for out in outs:  # before its suffix is: a pattern without quotes may name several scans
             if out.resolve() not in taken:
                 check_ours(out, "result")
-    for out in outs:
-        claim(check_output(out), "grid", taken, force=values.force)
-        if out.suffix.lower() == ".csv":
-            claim(nodes_path(out), "table of nodes", taken, force=values.force)
+    claim_models([check_output(out) for out in outs], taken, force=values.force, what="grid")
     if report is not None:
         claim(check_place(report, (".json",)), "report", taken, force=values.force)
     check_place(settings_file, (".json",))

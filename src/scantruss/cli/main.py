@@ -33,6 +33,7 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
                                            list nodes, members and panels of such a grid as a workshop needs them
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
+  scantruss convert FILE OUT [OUT ...]     write a saved grid or structure for other programs: .dxf, .ifc, .saf.xlsx ...
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
   scantruss demo  [FOLDER]                 do all of it on a bundled scan, a shell or (--scan bust) a bust

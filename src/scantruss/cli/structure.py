@@ -20,7 +20,13 @@ if TYPE_CHECKING:
     from ..structure.statics import Solution
     from .options import Parser
 
-STRUCTURE_SUFFIXES = (".json", ".html", ".pdf", ".png")
+REPORT_SUFFIXES = (".html", ".pdf", ".png")  # of what a person reads; the others are those of `export.formats`
+    "checks",
+    "size",
+    "size_by",
+    "buckling",
+    "frequencies",
+)  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
@@ -48,11 +54,13 @@ def structure_parser() -> Parser:
 
     parser = Parser(
         "structure",
-        "GRID OUT ... --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
+        "GRID OUT [OUT ...] --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
-    add_outs(parser, "structure with its results .json, report to read .html .pdf, picture .png", "*")
+    add_outs(
+        parser, "structure with its results; the suffix names the format; report to read .html .pdf, picture .png", "*"
+    )
     parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
     parser.add_argument(
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
@@ -66,17 +74,18 @@ def structure_parser() -> Parser:
 
 def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
+    from ..export.formats import STRUCTURE, check_output, model_of
     from ..report.terminal import Bars, print_lines, print_table
     from ..runtime.files import SaveTogether, check_place
+    from .convert import claim_models, write_models
 
-    outs = [check_place(out, STRUCTURE_SUFFIXES) for out in outs_of(values)]
+    outs = [check_output(out, STRUCTURE, also=REPORT_SUFFIXES) for out in outs_of(values)]
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; structure needs a grid saved as .json by scantruss grid")
     report_place = None if values.report is None else check_place(values.report, (".json",))
     settings = structure_settings(values)
     taken = _inputs(values)
-    for out in outs:
-        claim(out, "structure", taken, force=values.force)
+    claim_models(outs, taken, force=values.force, what="structure")
     if report_place is not None:
         claim(report_place, "report", taken, force=values.force)
     from ..export.json import read_grid
@@ -108,8 +117,12 @@ def structure(values: Namespace) -> None:
         found: dict[str, Any] = {"buckling": buckling, "vibration": vibration, "rounds": rounds, "weights": weights}
         report = report_structure(solution, settings.checks, _notes(settings), **found)
         bars("report", 0.0)
+        models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
+        written = write_models(model_of(solution, report=report), models, save, bars)
         for out in outs:
-            save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
+            if out not in models:
+                save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
+                written.append(out)
         if report_place is not None:
             save.json(report_place, report.to_dict())
     print_table(STRUCTURE_HEAD, structure_lines(report))
@@ -117,7 +130,7 @@ def structure(values: Namespace) -> None:
     names = (
         " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
     )
-    wrote = [*outs, *([report_place] if report_place else [])]
+    wrote = [*written, *([report_place] if report_place else [])]
     print_lines(
         [
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
@@ -133,11 +146,7 @@ def structure(values: Namespace) -> None:
 def _encoded(
     out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
 ) -> bytes:
-    """Return what a file of the structure holds."""
-    if out.suffix.lower() == ".json":
-        from ..structure.json import encode_structure
-
-        return encode_structure(solution.truss, solution, report)
+    """Return what a report or a picture of the structure holds."""
     from ..report.structural.contents import ReportSource, overview_picture, report_parts
 
     if out.suffix.lower() == ".png":

@@ -1,70 +1,214 @@
-"""The table of formats a grid can be written in, and `write`."""
+"""The table of formats in which grids and structures are written and read, `write` and `read_model`.
+
+A format is one module with an encoder (and a reader, where it has one) and one row here. Modules import their libraries when they
+are used, and refuse before any work where an extra is not installed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import FormatError
 from ..grid.grid import Grid
-from ..runtime.files import check_place, write_files
+from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
+from ..settings import UNITS
+from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
-from .json import encode_json
+from .dxf import encode_dxf
+from .glb import encode_glb
+from .ifc import encode_ifc
+from .json import encode_model, read_json
+from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .ply import encode_ply
+from .rhino import encode_3dm
+from .saf import encode_saf
+from .step import encode_step
 from .style import FileStyle
+from .vtu import encode_vtu
 
-Encoder = Callable[[Grid, Path, PointCloud | None, FileStyle], dict[Path, bytes]]
+if TYPE_CHECKING:
+    from ..structure.report import StructureReport
+    from ..structure.statics import Solution
 
-#: suffix -> what the files of that format hold: pure functions of the grid, and of the cloud where it is drawn
-GRID_FORMATS: dict[str, Encoder] = {
-    ".csv": lambda grid, path, cloud, style: encode_csv(grid, path, decimal_comma=style.decimal_comma),
-    ".json": lambda grid, path, cloud, style: {path: encode_json(grid)},
-    ".obj": lambda grid, path, cloud, style: {path: encode_obj(grid, style.obj)},
-    ".ply": lambda grid, path, cloud, style: {path: encode_ply(grid)},
-    ".png": lambda grid, path, cloud, style: {path: encode_picture(grid, cloud, style=style)},
-}
+Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]
+
+GRID, STRUCTURE = "grid", "structure"
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """What is known of a format."""
+
+    name: str
+    encode: Encoder | None  #: what its files hold: a pure function of the model
+    loses: str = ""  #: what it cannot hold of a grid or a structure
+    loses_of_structure: str = ""  #: what it cannot hold of a structure besides
+    holds: tuple[str, ...] = (GRID, STRUCTURE)
+    needs_unit: bool = False  #: whether a grid without a unit is refused
+    read: Callable[[Path], Model] | None = None
+    library: str = ""  #: module that must be installed
+    extra: str = ""  #: of pyproject.toml, which brings it
+
+
+def one(encode: Callable[[Model, FileStyle], bytes]) -> Encoder:
+    """Return the encoder of a format with one file."""
+    return lambda model, path, style: {path: encode(model, style)}
+
+
+def of_grid(encode: Callable[[Grid, FileStyle], bytes], name: str) -> Encoder:
+    """Return the encoder of a format that is made of the triangles."""
+    return one(lambda model, style: encode(model.as_grid(name), style))
+
+
+NO_STRUCTURE = "sections, supports, loads or results"
+
+#: suffix -> format
+FORMATS: dict[str, FileFormat] = {
+    ".csv": FileFormat(
+        "CSV",
+        lambda model, path, style: encode_csv(model.as_grid("CSV"), path, decimal_comma=style.decimal_comma),
+        loses_of_structure=NO_STRUCTURE,
+    ),
+    ".json": FileFormat("JSON", one(lambda model, style: encode_model(model)), read=read_json),
+    ".obj": FileFormat("OBJ", of_grid(lambda grid, style: encode_obj(grid, style.obj), "OBJ"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".ply": FileFormat("PLY", of_grid(lambda grid, style: encode_ply(grid), "PLY"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".png": FileFormat(
+        "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
+    ),
+    ".3dm": FileFormat("3DM", one(encode_3dm), loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
+                       loses_of_structure="supports, loads or forces"),
+    ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True),
+    ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
+    ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
+}  # fmt: skip
 
 SOLID_SUFFIXES = (".3mf", ".stl")
 
 
-def check_output(path: str | Path) -> Path:
-    """Return the path if a grid can be written there; called before the long work starts.
+def suffixes_of(kind: str = "") -> list[str]:
+    """Return the suffixes in which a grid, a structure or either ("") is written, sorted."""
+    return sorted(suffix for suffix, row in FORMATS.items() if row.encode and (not kind or kind in row.holds))
+
+
+def check_output(path: str | Path, kind: str = GRID, also: tuple[str, ...] = ()) -> Path:
+    """Return the path if a grid or a structure can be written there; called before the long work starts.
+
+    Parameters
+    ----------
+    path : str or Path
+    kind : str
+        "grid", "structure" or either, "".
+    also : tuple of str
+        Suffixes of files that are written besides those of the table.
 
     Raises
     ------
     FormatError
-        The suffix is unknown, the folder does not exist or cannot be written to, or a folder has this name.
+        The suffix is unknown, its extra is not installed, the folder does not exist or cannot be written to, or a folder has this name.
     """
-    path = Path(path)
-    if path.suffix.lower() in SOLID_SUFFIXES:
+    path, known = Path(path), suffixes_of(kind)
+    if path.suffix.lower() in also:
+        return check_place(path, also)
+    what = f"a {kind or 'grid or structure'}"
+    if path.suffix.lower() in SOLID_SUFFIXES and path.suffix.lower() not in known:
         raise FormatError(
-            f'no format for "{path.suffix}" of a grid; use one of {" ".join(sorted(GRID_FORMATS))}, '
+            f'no format for "{path.suffix}" of {what}; use one of {" ".join(known)}, '
             f"or write a .json and make the solid from it with: scantruss print"
         )
-    path = check_place(path, GRID_FORMATS)
+    if suffix_of(path, FORMATS) not in ("", *known) and kind == GRID:
+        raise FormatError(
+            f"{FORMATS[suffix_of(path, FORMATS)].name} holds structures; make one of the grid with: scantruss structure"
+        )
+    path = check_place(path, [*known, *also])
+    row = FORMATS[suffix_of(path, known)]
+    check_library(row)
     if path.suffix.lower() == ".csv":
         check_place(nodes_path(path), (".csv", path.suffix))
     return path
 
 
+def check_unit(path: Path, unit: str) -> None:
+    """Refuse a format that needs a unit, of a grid that has none; called as soon as that is known.
+
+    Raises
+    ------
+    FormatError
+        The message says how to give one.
+    """
+    row = FORMATS[suffix_of(path, FORMATS)]
+    if row.needs_unit and not unit:
+        known = "|".join(name for name in UNITS if name)
+        raise FormatError(f"{row.name} needs a unit, and that of the grid is not known; give it with --unit {known}")
+
+
+def check_library(row: FileFormat) -> None:
+    """Refuse a format whose library is not installed.
+
+    Raises
+    ------
+    FormatError
+        It is missing; the message has the command that installs it.
+    """
+    if row.library and find_spec(row.library) is None:
+        raise FormatError(
+            f'{row.name} needs {row.library}, which is not installed; install it with: python -m pip install "scantruss[{row.extra}]"'
+        )
+
+
+def losses(model: Model, path: str | Path) -> list[str]:
+    """Return the note on what the format of a path does not hold of a model; none where it holds all."""
+    row = FORMATS[suffix_of(Path(path), FORMATS)]
+    lost = [row.loses, *([row.loses_of_structure] if model.truss is not None else [])]
+    words = ", ".join(each for each in lost if each)
+    return [f"{row.name} holds no {words}"] if words else []
+
+
+def model_of(
+    what: Grid | Truss | Solution | Model, *, cloud: PointCloud | None = None, report: StructureReport | None = None
+) -> Model:
+    """Return the model of a grid, a structure or its results."""
+    if isinstance(what, Model):
+        return what
+    if isinstance(what, Grid):
+        return model_of_grid(what, cloud)
+    if isinstance(what, Truss):
+        return model_of_truss(what)
+    return model_of_truss(what.truss, what, report)
+
+
 def write(
-    grid: Grid, path: str | Path, *, cloud: PointCloud | None = None, style: FileStyle | None = None
+    what: Grid | Truss | Solution | Model,
+    path: str | Path,
+    *,
+    cloud: PointCloud | None = None,
+    style: FileStyle | None = None,
+    report: StructureReport | None = None,
 ) -> list[Path]:
-    """Write a grid; the suffix of the path tells the format.
+    """Write a grid or a structure; the suffix of the path tells the format.
 
     Parameters
     ----------
-    grid : Grid
-        What to write.
+    what : Grid, Truss, Solution or Model
+        What to write; a Solution is a structure with its results.
     path : str or Path
-        File ending in .csv, .json, .obj, .ply or .png.
+        File ending in a suffix of `FORMATS`, such as .json, .dxf, .ifc or .saf.xlsx.
     cloud : PointCloud, optional
-        The scan, drawn in the picture (.png).
+        The scan, drawn in pictures.
     style : FileStyle, optional
-        Views and size of a picture, faces or lines in OBJ, decimal comma in CSV.
+        Choices that formats leave: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
+    report : StructureReport, optional
+        Of a Solution: the utilization of its members.
 
     Returns
     -------
@@ -74,7 +218,35 @@ def write(
     Raises
     ------
     FormatError
-        Unknown suffix, no such folder, no space; nothing half-written is left.
+        Unknown suffix, an extra that is not installed, no such folder, no space; nothing half-written is left.
     """
-    path = check_output(path)
-    return write_files(GRID_FORMATS[path.suffix.lower()](grid, path, cloud, style or FileStyle()))
+    model = model_of(what, cloud=cloud, report=report)
+    path = check_output(path, GRID if model.truss is None else STRUCTURE)
+    check_unit(path, model.unit)
+    encode = FORMATS[suffix_of(path, suffixes_of())].encode
+    assert encode is not None  # `check_output` knows only formats that are written
+    return write_files(encode(model, path, style or FileStyle()))
+
+
+def read_model(path: str | Path) -> Model:
+    """Read a grid or a structure; the suffix of the path tells the format.
+
+    Parameters
+    ----------
+    path : str or Path
+        A .json that `scantruss grid` or `scantruss structure` wrote; a structure with load cases is solved again.
+
+    Raises
+    ------
+    FormatError
+        Unknown suffix, an extra that is not installed, or the file cannot be read.
+    """
+    path = Path(path)
+    known = {suffix: row for suffix, row in FORMATS.items() if row.read is not None}
+    row = known.get(suffix_of(path, known))
+    if row is None or row.read is None:
+        raise FormatError(f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}')
+    if not path.is_file():
+        raise FormatError(f"there is no file {path}; name a grid or a structure, such as one saved as .json")
+    check_library(row)
+    return row.read(path)

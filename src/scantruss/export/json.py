@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,21 @@ from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet, sets_of
 from ..grid.quality import GridQuality
+from ..runtime.ours import BYTES_WITH_MARK
 from ..settings import UNITS, Settings
+from .model import Model, model_of_grid, model_of_truss
 
 FORMAT = "scantruss-grid"
 FORMAT_VERSION = 1
+
+
+def encode_model(model: Model) -> bytes:
+    """Return the text of the JSON file of a grid or a structure."""
+    if model.truss is None:
+        return encode_json(model.as_grid("JSON"))
+    from ..structure.json import encode_structure
+
+    return encode_structure(model.truss, model.solution, model.report)
 
 
 def encode_json(grid: Grid) -> bytes:
@@ -80,6 +92,30 @@ def _text(value: Any) -> str:
 def _lines(rows: list[Any]) -> str:
     """Return JSON of a list, one line per row."""
     return "[\n" + ",\n".join(map(_text, rows)) + "\n]" if rows else "[]"
+
+
+def read_json(path: Path) -> Model:
+    """Read a grid or a structure from our own JSON formats; a structure with load cases is solved again.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, or it is neither.
+    """
+    from ..structure.json import STRUCTURE_FORMAT, read_structure
+
+    with suppress(OSError), path.open("rb") as file:
+        if f'"format": "{STRUCTURE_FORMAT}"'.encode() not in file.read(BYTES_WITH_MARK):
+            return model_of_grid(read_grid(path))
+    from ..structure.statics import solve
+
+    truss = read_structure(path)
+    found = json.loads(path.read_text(encoding="utf-8")).get("utilization")
+    try:
+        used = None if found is None else np.array(found, float).reshape(len(truss.members))  # null is NaN
+    except (TypeError, ValueError):
+        raise FormatError(f"{path} is a damaged structure: utilization must be a number for each member") from None
+    return model_of_truss(truss, solve(truss) if truss.cases else None, utilization=used)
 
 
 def read_grid(path: str | Path) -> Grid:

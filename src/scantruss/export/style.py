@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..errors import InputError
 from .drawing.style import PictureStyle
 
 OBJ_ELEMENTS = ("faces", "lines", "both")
+IFC_VIEWS = ("auto", "physical", "analysis", "both")
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,13 @@ class FileStyle(PictureStyle):
     """
 
     obj: str = "faces"  #: what an OBJ file holds: faces for the triangles, lines for the members, or both
+    tube: tuple[float, float | None] | None = (
+        None  #: diameter and wall of the members of a grid, which has no sections [mm]
+    )
+    ball: float | None = (
+        None  #: diameter of the nodes, 0 for none; None: twice the greatest diameter of the members [mm]
+    )
+    ifc: str = "auto"  #: what an IFC file holds of a structure: physical parts, the analysis model, or (auto) both
     decimal_comma: bool = False  #: CSV with a decimal comma and semicolons between the columns
 
     def __post_init__(self) -> None:
@@ -28,3 +37,9 @@ class FileStyle(PictureStyle):
         super().__post_init__()
         if self.obj not in OBJ_ELEMENTS:
             raise InputError(f"an OBJ file holds {', '.join(OBJ_ELEMENTS)}, got {self.obj!r}")
+        if self.ifc not in IFC_VIEWS:
+            raise InputError(f"an IFC file holds {', '.join(IFC_VIEWS)}, got {self.ifc!r}")
+        if self.tube is not None and (self.tube[1] is None or not 0 < 2 * self.tube[1] < self.tube[0]):
+            raise InputError("a tube has a diameter and a wall of less than half of it in mm, such as 60x3")
+        if self.ball is not None and not 0 <= self.ball < math.inf:
+            raise InputError(f"the diameter of the balls must be a number of mm, got {self.ball!r}")

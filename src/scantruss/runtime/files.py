@@ -12,6 +12,7 @@ import shutil
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +21,14 @@ from typing import Any
 from ..errors import FormatError
 from .ours import MARK, check_ours
 from .stopping import is_clean, left_behind, put_into_place, signals_held
+
+
+def suffix_of(path: Path, suffixes: Collection[str]) -> str:
+    """Return which of some suffixes, in lower case, a name ends in, the longest of several; "" for none."""
+    name = path.name.lower()
+    return max(
+        (suffix for suffix in suffixes if name.endswith(suffix.lower()) and name != suffix), key=len, default=""
+    ).lower()
 
 
 def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
@@ -37,8 +46,12 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
         The suffix is unknown, the folder does not exist or cannot be written to, or a folder has this name.
     """
     path = Path(path)
-    if path.suffix.lower() not in suffixes:
-        raise FormatError(f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}')
+    if not suffix_of(path, suffixes):
+        near = get_close_matches(path.suffix.lower(), suffixes, 1, 0.6)
+        raise FormatError(
+            f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}'
+            + (f"; the nearest is {near[0]}" if near else "")
+        )
     folder = path.parent
     try:
         path.lstat()

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
-import zipfile
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -12,12 +10,12 @@ from typing import Any
 
 from ..errors import FormatError
 from ..export.csv import encode_table
+from ..export.workbook import NOT_IN_XML, without_dates
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
 from .records import Schedule, Schedules, Value
 
 SCHEDULE_SUFFIXES = (".csv", ".xlsx")
-NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
 DECIMALS = {
     "mm": "0.0",
     "degree": "0.00",
@@ -26,7 +24,6 @@ DECIMALS = {
     "m2": "0.000",
 }  # shown in a cell; it holds all digits
 MOST_ROWS = 1_048_576  # of a sheet
-NOT_IN_XML = re.compile("[\x00-\x08\x0b-\x1f\ufffe\uffff]")  # that a name of a line may hold
 MAIN = "members"  # the table in the CSV file that is named
 
 
@@ -99,7 +96,7 @@ def encode_xlsx(schedules: Schedules) -> bytes:
     book.properties.creator = MARK
     stream = io.BytesIO()
     book.save(stream)
-    return _without_dates(stream.getvalue())
+    return without_dates(stream.getvalue())
 
 
 def _filled(cells: list[Any], values: Iterable[Value]) -> list[Any]:
@@ -109,15 +106,3 @@ def _filled(cells: list[Any], values: Iterable[Value]) -> list[Any]:
         if isinstance(value, str):
             cell.data_type = "s"  # a name such as "=B2" is no formula
     return cells
-
-
-def _without_dates(content: bytes) -> bytes:
-    """Return a workbook without the time at which it was written."""
-    stream = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as new:
-        for name in old.namelist():
-            part = old.read(name)
-            if name == "docProps/core.xml":
-                part = re.sub(rb">\d{4}-\d\d-\d\dT[\d:.]+Z?<", b">1980-01-01T00:00:00Z<", part)
-            new.writestr(zipfile.ZipInfo(name, NO_DATE), part, zipfile.ZIP_DEFLATED)
-    return stream.getvalue()

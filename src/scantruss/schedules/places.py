@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from .settings import ScheduleSettings
 
-BOUNDARY, INNER = "boundary", "inner"
-
 
 def into_building(vectors: np.ndarray, settings: ScheduleSettings) -> np.ndarray:
     """Return vectors of the scan (N, 3) in the directions of the building frame, turned about z."""
@@ -37,16 +35,6 @@ def boundary_nodes(grid: Grid) -> np.ndarray:
     found = np.zeros(len(grid.nodes), bool)
     found[grid.edges[grid.edge_triangles[:, 1] < 0]] = True
     return found
-
-
-def member_groups(grid: Grid) -> list[str]:
-    """Return the group of each member: boundary, the name of its fixed line or ridge, or inner."""
-    groups = np.full(len(grid.edges), INNER, object)
-    on_line = np.flatnonzero(grid.edge_on_line)
-    for line in reversed(grid.line_sets):  # the first that holds both nodes stands
-        groups[on_line[np.isin(grid.edges[on_line], line.nodes).all(axis=1)]] = line.name
-    groups[grid.edge_triangles[:, 1] < 0] = BOUNDARY
-    return [str(group) for group in groups]
 
 
 def rings(grid: Grid, height: np.ndarray) -> np.ndarray:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..grid.groups import BOUNDARY, INNER, member_groups
 from ..grid.marks import numbered
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
 from .joints import angle_between
-from .places import BOUNDARY, INNER, boundary_nodes, building_places, into_building, member_groups, rings
+from .places import boundary_nodes, building_places, into_building, rings
 from .records import Column, Schedule, Schedules, Value, column
 
 if TYPE_CHECKING:

@@ -80,12 +80,7 @@ class Truss:
     def axes(self) -> np.ndarray:
         """(M, 3, 3) local axes as rows: x along the member, z nearest to the normal, y = z x x."""
         x = (self.nodes[self.members[:, 1]] - self.nodes[self.members[:, 0]]) / self.lengths[:, None]
-        z = self.member_normals - (self.member_normals * x).sum(axis=1, keepdims=True) * x
-        poor = np.linalg.norm(z, axis=1) < 1e-6  # no normal, or along the member: take the axis that differs most
-        other = np.eye(3)[np.abs(x).argmin(axis=1)]
-        z[poor] = (other - (other * x).sum(axis=1, keepdims=True) * x)[poor]
-        z /= np.linalg.norm(z, axis=1, keepdims=True)
-        return np.stack([x, np.cross(z, x), z], axis=1)
+        return local_axes(x, self.member_normals)
 
     def of_section(self, name: str) -> np.ndarray:
         """(M,) a property of the section of each member, such as `area`."""
@@ -183,6 +178,16 @@ class Truss:
                 " check --scale and the unit of the grid"
             )
         return said
+
+
+def local_axes(x: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the (M, 3, 3) local axes of members along unit vectors as rows: x, y = z x x, z nearest to the normal."""
+    z = normals - (normals * x).sum(axis=1, keepdims=True) * x
+    poor = np.linalg.norm(z, axis=1) < 1e-6  # no normal, or along the member: take the axis that differs most
+    other = np.eye(3)[np.abs(x).argmin(axis=1)]
+    z[poor] = (other - (other * x).sum(axis=1, keepdims=True) * x)[poor]
+    z /= np.linalg.norm(z, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=1)
 
 
 def area_vectors(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:

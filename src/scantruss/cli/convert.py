@@ -1,0 +1,101 @@
+"""The command ``scantruss convert``: a grid or a structure in other formats."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .outputs import Taken, claim, outs_of
+
+if TYPE_CHECKING:
+    from ..export.model import Model
+    from ..export.style import FileStyle
+    from ..report.terminal import Bars
+    from ..runtime.files import SaveTogether
+    from .options import Parser
+
+
+def convert_parser() -> Parser:
+    """Options of ``scantruss convert``."""
+    from ..export.style import IFC_VIEWS
+    from ..settings import UNITS
+    from .options import Parser, add_outs, number
+    from .schedule import tube
+
+    parser = Parser(
+        "convert",
+        "FILE OUT [OUT ...] [options]",
+        "Write a grid or a structure in other formats, such as .dxf, .ifc or .saf.xlsx.",
+    )
+    parser.add_argument("source", metavar="FILE", help="saved as .json by scantruss grid or scantruss structure")
+    add_outs(parser, "results; the suffix names the format", "*")
+    parser.add_argument("--unit", metavar="|".join(filter(None, UNITS)), help="unit of a grid that has none")
+    parser.add_argument(
+        "--tube",
+        metavar="DxT",
+        type=tube,
+        help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC",
+    )
+    parser.add_argument(
+        "--ball", metavar="D", type=number, help="diameter of the nodes [mm] (default: twice that of the members)"
+    )
+    parser.add_argument(
+        "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
+    )
+    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    return parser
+
+
+def convert(values: Namespace) -> None:
+    """Write what a file holds in other formats."""
+    from ..export.formats import GRID, STRUCTURE, check_output, read_model
+    from ..export.model import with_unit
+    from ..export.style import FileStyle
+    from ..grid.certificate import check_passed
+    from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
+
+    outs = [check_output(out, "") for out in outs_of(values)]
+    style = FileStyle(tube=values.tube, ball=values.ball, ifc=values.ifc)
+    taken = {Path(values.source).resolve(): "file that is read"}
+    claim_models(outs, taken, force=values.force)
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        bars("read", 0.0)
+        model = read_model(values.source)
+        if values.unit is not None:
+            model = with_unit(model, values.unit)
+        if model.truss is None and model.grid is not None:
+            check_passed(model.grid, values.keep_failed)
+        for out in outs:
+            check_output(out, GRID if model.truss is None else STRUCTURE)
+        if model.truss is not None and any(out.suffix.lower() == ".json" for out in outs):
+            bars.note("the checks of the members are not written again; scantruss structure writes them")
+        written = write_models(model, outs, save, bars, style)
+    size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.triangles):,} triangles"
+    print_lines([size, f"wrote {' '.join(map(str, written))}"])
+
+
+def claim_models(outs: list[Path], taken: Taken, *, force: bool, what: str = "result") -> None:
+    """Claim the places of grids and structures, with those of the files that are written beside them."""
+    from ..export.csv import nodes_path
+
+    for out in outs:
+        claim(out, what, taken, force=force)
+        if out.suffix.lower() == ".csv":
+            claim(nodes_path(out), "table of nodes", taken, force=force)
+
+
+def write_models(
+    model: Model, outs: list[Path], save: SaveTogether, bars: Bars, style: FileStyle | None = None
+) -> list[Path]:
+    """Write a model in several formats, say once what each does not hold, and return the places of all files."""
+    from ..export.formats import losses, write
+
+    written: list[Path] = []
+    for number, out in enumerate(outs):
+        bars("write", number / len(outs))
+        written += [out.with_name(file.name) for file in write(model, save.beside(out), style=style)]
+        for note in losses(model, out):
+            bars.note_once(note)
+    return written

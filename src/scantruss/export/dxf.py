@@ -1,0 +1,164 @@
+"""DXF by ezdxf: a line for each member, a face for each panel, a block with its mark for each node, on layers by group.
+
+Nothing lies on layer 0, which some programs do not import. The mark of a line or face is its extended data and, on layers that
+can be switched off, a text.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..runtime.ours import MARK
+from .bodies import bodies_of
+from .model import Model
+from .style import FileStyle
+
+if TYPE_CHECKING:
+    from ezdxf.layouts import BlockLayout
+
+INSUNITS = {"": 0, "inch": 1, "foot": 2, "mm": 4, "cm": 5, "m": 6}  #: values of that header
+NOT_IN_NAMES = re.compile(r"[<>/\\\":;?*|=`,\x00-\x1f]")  #: of layers
+DXF_COLOURS = {"boundary": 5, "inner": 7}  #: of the layers of members; 3 for lines
+APPLICATION = "SCANTRUSS"  #: of the extended data
+BALL_SYMBOL = 0.03  #: radius of a ball whose diameter is not known, in mean member lengths
+TEXT = 0.06  #: height of the marks, in mean member lengths
+
+
+def encode_dxf(model: Model, style: FileStyle) -> bytes:
+    """Return a DXF file of version 2010 in the unit and the frame of the scan."""
+    import ezdxf
+    from ezdxf import options
+
+    kept = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True  # no dates, no random identifiers
+    try:
+        drawing = ezdxf.new("R2010")
+        drawing.header["$INSUNITS"] = INSUNITS[model.unit]
+        drawing.header["$MEASUREMENT"] = 0 if model.unit in ("inch", "foot") else 1
+        drawing.appids.add(APPLICATION)
+        for name, colour in _layers(model).items():
+            drawing.layers.add(name, color=colour)
+        mean = float(model.lengths.mean()) if len(model.lengths) else 1.0
+        known = bodies_of(model, style) if model.truss is not None or style.tube is not None else None
+        radius = known.ball / model.metres if known is not None and known.ball else BALL_SYMBOL * mean
+        _ball(drawing.blocks.new("NODE"))
+        _support(drawing.blocks.new("SUPPORT"))
+        first = int(str(drawing.entitydb.handles), 16) + 1
+        entities = _Entities(first, drawing.modelspace().layout_key)
+        _draw(model, entities, radius, mean)
+        drawing.entitydb.handles.reset(f"{entities.next:X}")
+        text = io.StringIO()
+        drawing.write(text)
+    finally:
+        options.write_fixed_meta_data_for_testing = kept
+    head, mark, tail = text.getvalue().partition("SECTION\n  2\nENTITIES\n")
+    return "".join([f"999\n{MARK}\n", head, mark, *entities.lines, tail]).encode("utf-8", "replace")
+
+
+class _Entities:
+    """The text of the entities of the model space: ezdxf takes ten times as long for them."""
+
+    def __init__(self, first: int, owner: str) -> None:
+        self.next, self.owner = first, owner
+        self.lines: list[str] = []
+
+    def add(self, kind: str, layer: str, body: str, owner: str = "") -> str:
+        """Add an entity and return its handle."""
+        handle = f"{self.next:X}"
+        self.next += 1
+        head = f"  0\n{kind}\n  5\n{handle}\n330\n{owner or self.owner}\n100\nAcDbEntity\n  8\n{layer}\n"
+        self.lines.append(head + body)
+        return handle
+
+    def insert(
+        self, block: str, layer: str, place: list[float], size: float, words: dict[str, tuple[str, str]]
+    ) -> None:
+        """Add a copy of a block with attributes, each a text and its layer; none of them hidden."""
+        x, y, z = place
+        scale = f" 41\n{size}\n 42\n{size}\n 43\n{size}\n"
+        at = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
+        handle = self.add("INSERT", layer, f"100\nAcDbBlockReference\n 66\n1\n  2\n{block}\n{at}{scale}")
+        for tag, (word, where) in words.items():
+            text = f"100\nAcDbText\n 10\n{x + size}\n 20\n{y + size}\n 30\n{z}\n 40\n{size}\n  1\n{word}\n"
+            self.add("ATTRIB", where, f"{text}100\nAcDbAttribute\n  2\n{tag}\n 70\n0\n", handle)
+        self.add("SEQEND", layer, "", handle)
+
+
+def _draw(model: Model, to: _Entities, radius: float, mean: float) -> None:
+    nodes = model.nodes
+    corners = [[f" 1{k}\n{x}\n 2{k}\n{y}\n 3{k}\n{z}\n" for x, y, z in nodes.tolist()] for k in range(4)]
+    middles = nodes[model.members].mean(axis=1).tolist()
+    height = f" 40\n{TEXT * mean}\n"
+    table = zip(
+        map(_one_line, model.member_marks), layers_of_members(model), model.members.tolist(), middles, strict=True
+    )
+    for mark, layer, (start, end), (x, y, z) in table:
+        marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
+        to.add("LINE", layer, f"100\nAcDbLine\n{corners[0][start]}{corners[1][end]}{marked}")
+        place = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
+        to.add("TEXT", "marks members", f"100\nAcDbText\n{place}{height}  1\n{mark}\n100\nAcDbText\n")
+    for mark, (a, b, c) in zip(map(_one_line, model.panel_marks), model.triangles.tolist(), strict=True):
+        marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
+        places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][c]
+        to.add("3DFACE", "panels", f"100\nAcDbFace\n{places}{marked}")
+    for mark, place in zip(map(_one_line, model.node_marks), nodes.tolist(), strict=True):
+        to.insert("NODE", "nodes", place, radius, {"MARK": (mark, "marks nodes")})
+    for node in model.supported.tolist():
+        words = {"MARK": (_one_line(model.node_marks[node]), "supports"), "HELD": (held_words(model, node), "supports")}
+        to.insert("SUPPORT", "supports", nodes[node].tolist(), 2 * radius, words)
+
+
+def _one_line(word: str) -> str:
+    """Return a word that ends no line of the file."""
+    return word if word.isprintable() else " ".join(word.split())
+
+
+def held_words(model: Model, node: int) -> str:
+    """Return how a node is held, such as "ux uy uz", with stiffnesses [N/m, Nm/rad] of springs."""
+    if model.truss is None:
+        return "fixed node"
+    ways = zip(["ux", "uy", "uz", "rx", "ry", "rz"], model.truss.supports[node].tolist(), strict=True)
+    return " ".join(name if np.isinf(value) else f"{name}={value:g}" for name, value in ways if value)
+
+
+def layers_of_members(model: Model) -> list[str]:
+    """Return the layer of each member: its group, and its section where there are several."""
+    groups = [layer_name(f"members {name}") for name in model.groups]
+    if model.truss is None or len(model.truss.sections) == 1:
+        return [groups[k] for k in model.group_of.tolist()]
+    both = zip(model.group_of.tolist(), model.truss.section_of.tolist(), strict=True)
+    return [layer_name(f"{groups[k]} {model.truss.sections[s].name}") for k, s in both]
+
+
+def layer_name(words: str) -> str:
+    """Return words without what a name of a layer cannot hold."""
+    return NOT_IN_NAMES.sub("_", words)[:255]
+
+
+def _layers(model: Model) -> dict[str, int]:
+    """Return the layers with their colours."""
+    members = dict.fromkeys(layers_of_members(model))
+    colours = {name: next((c for word, c in DXF_COLOURS.items() if f" {word}" in name), 3) for name in members}
+    return colours | {"panels": 9, "nodes": 1, "supports": 6, "marks members": 8, "marks nodes": 8}
+
+
+def _ball(block: BlockLayout) -> None:
+    """Draw a ball of radius 1, of triangles."""
+    from ezdxf.render.forms import sphere
+
+    ball = sphere(12, 6, radius=1.0)
+    ball.render_polyface(block, {"layer": "nodes"})
+    block.add_attdef("MARK", (1.0, 1.0, 0.0), dxfattribs={"layer": "marks nodes", "height": 1.0})
+
+
+def _support(block: BlockLayout) -> None:
+    """Draw a pyramid with its tip at the node."""
+    corners = [(-0.5, -0.5, -1.0), (0.5, -0.5, -1.0), (0.5, 0.5, -1.0), (-0.5, 0.5, -1.0)]
+    for one, other in zip(corners, corners[1:] + corners[:1], strict=True):
+        block.add_3dface([(0.0, 0.0, 0.0), one, other], {"layer": "supports"})
+    for tag in ("MARK", "HELD"):
+        block.add_attdef(tag, (0.0, 0.0, -1.0), dxfattribs={"layer": "supports", "height": 0.3, "invisible": 1})

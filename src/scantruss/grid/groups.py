@@ -1,0 +1,22 @@
+"""Groups of members: by what they lie on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .grid import Grid
+
+BOUNDARY, INNER = "boundary", "inner"  #: groups of members on no line
+
+
+def member_groups(grid: Grid) -> list[str]:
+    """Return the group of each member: boundary, the name of its fixed line or ridge, or inner."""
+    groups = np.full(len(grid.edges), INNER, object)
+    on_line = np.flatnonzero(grid.edge_on_line)
+    for line in reversed(grid.line_sets):  # the first that holds both nodes stands
+        groups[on_line[np.isin(grid.edges[on_line], line.nodes).all(axis=1)]] = line.name
+    groups[grid.edge_triangles[:, 1] < 0] = BOUNDARY
+    return [str(group) for group in groups]
