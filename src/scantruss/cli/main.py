@@ -29,8 +29,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
                                            make many grids to choose from: a table and pictures
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            turn a grid saved as .json into one watertight solid
-  scantruss schedule GRID OUT.xlsx|OUT.csv --tube DxT
-                                           list nodes, members and panels of such a grid as a workshop needs them
+  scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
+                                           list nodes, members and panels of a grid or structure as a workshop needs them
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss splice SCAN SCAN [SCAN ...] -o OUT

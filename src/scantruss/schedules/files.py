@@ -22,6 +22,8 @@ DECIMALS = {
     "mm": "0.0",
     "degree": "0.00",
     "kg": "0.00",
+    "kN": "0.00",
+    "kNm": "0.00",
     "m": "0.000",
     "m2": "0.000",
 }  # shown in a cell; it holds all digits
