@@ -75,6 +75,8 @@ WRONG = [
     "schedule theirs.json theirs.json --tube 60",
     "schedule a.xyz d.csv --tube 60",
     "schedule theirs.csv theirs.json --tube 60",
+    "setout theirs.json theirs.json --supports boundary",
+    "setout theirs.json d.csv --supports boundary",
     "demo theirs.json",
     "grid theirs.json a.xyz --length L",
     "grid new.obj a.xyz --length L",

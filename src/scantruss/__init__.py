@@ -48,6 +48,10 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .schedules.records import Schedule as Schedule
     from .schedules.records import Schedules as Schedules
     from .schedules.settings import ScheduleSettings as ScheduleSettings
+    from .setout.files import write_setting_out as write_setting_out
+    from .setout.make import SettingOut as SettingOut
+    from .setout.make import set_out as set_out
+    from .setout.settings import SetoutSettings as SetoutSettings
     from .settings import Settings as Settings
     from .structure.json import read_structure as read_structure
     from .structure.statics import solve as solve
@@ -75,6 +79,8 @@ _HOMES = {
     "print_model": "export.solid",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",
+    "set_out": "setout.make", "SettingOut": "setout.make", "SetoutSettings": "setout.settings",
+    "write_setting_out": "setout.files",
     "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
 }  # fmt: skip
 

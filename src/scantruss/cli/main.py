@@ -31,6 +31,8 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
                                            turn a grid saved as .json into one watertight solid
   scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
                                            list nodes, members and panels of a grid or structure as a workshop needs them
+  scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv --supports corners
+                                           set out supports, heights, boundaries; the order of assembly
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss splice SCAN SCAN [SCAN ...] -o OUT

@@ -12,10 +12,11 @@ from ..errors import FormatError
 MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
 CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
-# tables have no place for a mark: those of members, of nodes, of a sweep, of schedules
+# tables have no place for a mark: those of members, of nodes, of a sweep, of schedules, of setting out
 TABLE_HEADS = re.compile(
     rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b|node,node type,ring,"
     rb"|node,hole,member,|member,start,end,group,|panel,node 1,|(node|panel|length) type,count,|item,group,count,|warning,at,with,"
+    rb"|section,at,x|boundary,node,|step,(nodes|member),|node,scan x [^\n]*,(held|set at step),"
 )
 
 
@@ -24,6 +25,8 @@ def kind_of_ours(path: Path) -> str:
     try:
         with path.open("rb") as file:
             head = file.read(BYTES_WITH_MARK)
+            if head.startswith(b"%PDF"):  # its mark stands near the end
+                head += file.read()
         if head.startswith(b"PK") and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as content:
                 name = next(

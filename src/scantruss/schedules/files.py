@@ -14,7 +14,7 @@ from ..errors import FormatError
 from ..export.csv import encode_table
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
-from .records import Schedule, Schedules, Value
+from .records import Schedule, Schedules, Value, Workbook
 
 SCHEDULE_SUFFIXES = (".csv", ".xlsx")
 NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
@@ -69,7 +69,7 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
     return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
 
 
-def encode_xlsx(schedules: Schedules) -> bytes:
+def encode_xlsx(schedules: Workbook) -> bytes:
     """Return a workbook with a sheet for each table: the header frozen, numbers as numbers, sums in the last row."""
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell
