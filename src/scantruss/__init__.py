@@ -28,6 +28,8 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .errors import ScanTrussError as ScanTrussError
     from .export.formats import write as write
     from .export.json import read_grid as read_grid
+    from .export.printed.write import PrintedParts as PrintedParts
+    from .export.printed.write import print_parts as print_parts
     from .export.solid import print_model as print_model
     from .export.style import FileStyle as FileStyle
     from .front.advance import advance_front as advance_front
@@ -76,7 +78,7 @@ _HOMES = {
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
-    "print_model": "export.solid",
+    "print_model": "export.solid", "print_parts": "export.printed.write", "PrintedParts": "export.printed.write",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",
     "set_out": "setout.make", "SettingOut": "setout.make", "SetoutSettings": "setout.settings",
