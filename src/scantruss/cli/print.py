@@ -26,7 +26,7 @@ def print_parser() -> Parser:
     """Options of ``scantruss print``."""
     from .options import Parser, add_outs, number
 
-    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH | --sockets]"
+    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
     said = (
         "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
         "with sockets for rods."

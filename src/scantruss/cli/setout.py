@@ -96,8 +96,7 @@ def make_setting_out(values: Namespace) -> None:
         what, _ = read_grid_or_structure(values.grid)
         if isinstance(what, Truss) and (own := given.keys() & {"supports", "joints", "scale", "unit"}):
             raise InputError(f"a structure has {min(own)} of its own; leave --{min(own)} out")
-        bars("assembly", 0.1)
-        made = set_out(what, settings, keep_failed=values.keep_failed)
+        made = set_out(what, settings, keep_failed=values.keep_failed, progress=bars)
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
             write_setting_out(made, save.beside(out))

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.sparse import diags, identity
 from scipy.sparse.linalg import splu
 
+from ..runtime.progress import Progress
 from ..structure.frame import freedoms, stiffness_matrix
 from ..structure.mechanism import softest_motion
-from ..structure.statics import ORDERING, SINGULAR, solve
+from ..structure.statics import ORDERING, SINGULAR, Factored, solve
 from ..structure.truss import LoadCase, Truss
 
 SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
@@ -37,7 +38,7 @@ class AssemblyStep:
     moves: float  #: greatest displacement under self-weight, props in place [m]
 
 
-def assembly_steps(truss: Truss, ring: np.ndarray) -> list[AssemblyStep]:
+def assembly_steps(truss: Truss, ring: np.ndarray, progress: Progress | None = None) -> list[AssemblyStep]:
     """Return the steps by which a structure is put up.
 
     Parameters
@@ -45,6 +46,8 @@ def assembly_steps(truss: Truss, ring: np.ndarray) -> list[AssemblyStep]:
     truss : Truss
     ring : (V,) int
         The step that adds each node, from 0; -1 for nodes without members.
+    progress : callable, optional
+        Told what is done, and which share of it.
     """
     added = ring[truss.members].max(axis=1)
     _, moves = _stand(_part(truss, np.arange(len(added))), NONE, 0.0, give_up=True)
@@ -52,6 +55,8 @@ def assembly_steps(truss: Truss, ring: np.ndarray) -> list[AssemblyStep]:
     limit = min(max(MOST_TIMES * moves, least), most)
     props, steps = NONE, []
     for number in range(int(ring.max()) + 1):
+        if progress is not None:
+            progress("assembly", number / (int(ring.max()) + 1))
         built = np.flatnonzero(added <= number)
         if len(built):
             part, nodes = _part(truss, built), np.unique(truss.members[built])
@@ -99,14 +104,15 @@ def _stand(part: Truss, props: np.ndarray, limit: float, *, give_up: bool = Fals
         held = part.supports.copy()
         held[propped, :3] = np.inf
         part = part.replace(supports=held)
-        if (loose := _loose(part)) is not None:
-            if give_up and len(loose[0]):
+        if not isinstance(found := _examine(part), Factored):
+            moving, turning = found
+            if give_up and len(moving):
                 return props, np.inf
-            propped[loose[0]] = True
-            held[loose[1], 3:] = np.inf
+            propped[moving] = True
+            held[turning, 3:] = np.inf
             part = part.replace(supports=held)
             continue
-        moves = np.linalg.norm(solve(part).cases[0].displacements[:, :3], axis=1)
+        moves = np.linalg.norm(solve(part, found).cases[0].displacements[:, :3], axis=1)
         most = float(moves.max())
         if most <= limit or give_up:
             return np.flatnonzero(propped), most
@@ -120,23 +126,24 @@ def _near(nodes: np.ndarray, node: int, propped: np.ndarray, reach: float) -> bo
     return bool((np.linalg.norm(nodes[propped] - nodes[node], axis=1) < reach).any())
 
 
-def _loose(part: Truss) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return which nodes to hold against motions without resistance, and, where nothing moves, against turning; None if it stands."""
+def _examine(part: Truss) -> Factored | tuple[np.ndarray, np.ndarray]:
+    """Return the factored stiffness of a part, or which nodes to hold against moving and against turning without resistance."""
     width = freedoms(part)
     free = np.flatnonzero(~np.isinf(part.supports[:, :width]).ravel())
+    stiffness = stiffness_matrix(part)
     if len(free) == 0:
-        return None
-    stiffness = stiffness_matrix(part)[free][:, free]
-    diagonal = stiffness.diagonal()
+        return Factored(part, stiffness, free, np.ones(0), None)
+    inner = stiffness[free][:, free]
+    diagonal = inner.diagonal()
     root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
-    scaled = (diags(1.0 / root) @ stiffness @ diags(1.0 / root)).tocsc()
+    scaled = (diags(1.0 / root) @ inner @ diags(1.0 / root)).tocsc()
     factor = splu((scaled + SHIFT * identity(len(free))).tocsc(), **ORDERING)
     nil = free[np.abs(factor.U.diagonal())[factor.perm_c] < LOOSE]
     if (nil % width < 3).any():
         return np.unique(nil[nil % width < 3] // width), NONE
     value, motion = softest_motion(scaled, factor)
     if value >= 10 * SINGULAR and len(nil) == 0:
-        return None
+        return Factored(part, stiffness, free, root, factor)
     everywhere = np.zeros((len(part.nodes), width))
     everywhere.ravel()[free] = motion / root
     moves, turns = (np.linalg.norm(everywhere[:, k : k + 3], axis=1) for k in (0, 3))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import check_passed
+from ..runtime.progress import Progress
 from ..schedules.forces import grid_of_structure
 from ..schedules.joints import check_grid
 from ..schedules.places import building_places, rings
@@ -46,7 +47,13 @@ class SettingOut:
 TABLES = ("supports", "heights", "boundary", "assembly", "order", "props")  #: names of their files
 
 
-def set_out(what: Grid | Truss, settings: SetoutSettings | None = None, *, keep_failed: bool = False) -> SettingOut:
+def set_out(
+    what: Grid | Truss,
+    settings: SetoutSettings | None = None,
+    *,
+    keep_failed: bool = False,
+    progress: Progress | None = None,
+) -> SettingOut:
     """Return what is set out of a grid or a structure.
 
     Parameters
@@ -57,6 +64,8 @@ def set_out(what: Grid | Truss, settings: SetoutSettings | None = None, *, keep_
         Building frame, sections, paper.
     keep_failed : bool
         Take a grid that failed its certificate too.
+    progress : callable, optional
+        Told what is done, and which share of it.
 
     Raises
     ------
@@ -85,7 +94,7 @@ def set_out(what: Grid | Truss, settings: SetoutSettings | None = None, *, keep_
     number[order] = np.arange(len(order))
     steps = [
         AssemblyStep(step.nodes, np.sort(number[step.members]), step.props, step.moves)
-        for step in assembly_steps(truss, rings(grid, places[:, 2], held))
+        for step in assembly_steps(truss, rings(grid, places[:, 2], held), progress)
     ]
     return SettingOut(
         grid=grid,
