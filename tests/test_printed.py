@@ -1,6 +1,7 @@
 """The printed model in parts: watertight, volumes that add up, parts on the bed, joints with their clearance, balls that take rods."""
 
 import csv
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.engraving import letter_height
 from scantruss.export.printed.nodes import build_nodes
-from scantruss.export.printed.parts import build_parts, check_joint, divide
+from scantruss.export.printed.parts import build_parts, check_apart, check_joint, divide
 from scantruss.export.printed.plates import PrintedPart, lay_out, pack
 from scantruss.export.printed.write import print_parts
 from scantruss.export.solid import as_solid, build_solid, is_watertight, unite
@@ -126,6 +127,13 @@ def test_the_same_parts_again() -> None:
 def test_what_does_not_work_is_refused_in_figures(change: dict[str, Any], words: str) -> None:
     with pytest.raises(st.InputError, match=words):
         parts_of("dome", **change)
+
+
+def test_parts_that_overlap_are_refused() -> None:
+    one, two, *_ = parts_of("dome")
+    check_apart([one, two])
+    with pytest.raises(st.InputError, match=f"{one.name} and {two.name} would overlap by"):
+        check_apart([one, replace(two, body=one.body.translate((0.1, 0.0, 0.0)))])
 
 
 @given(some.lists(some.tuples(*[some.floats(0.1, 10.0)] * 3), min_size=1, max_size=30))

@@ -183,11 +183,11 @@ def build_parts(
             body -= unite(sockets)
         points = np.concatenate([nodes[ids], np.reshape(middles, (-1, 3))])
         made.append(PrintedPart(name, body, flat_axes(points), len(inner) - len(ids) + 1, used[ids]))
-    _check_apart(made)
+    check_apart(made)
     return made
 
 
-def _check_apart(parts: list[PrintedPart]) -> None:
+def check_apart(parts: list[PrintedPart]) -> None:
     """Refuse parts that overlap, where couplings lie too near to other members."""
     boxes = np.array([part.body.bounding_box() for part in parts])
     for a, b in combinations(range(len(parts)), 2):
