@@ -119,7 +119,12 @@ def test_a_grid_without_a_tube_is_lines_and_points(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("section", "shape"), [("SHS100x5", "IfcRectangleHollowProfileDef"), ("R100x200", "IfcRectangleProfileDef")]
+    ("section", "shape"),
+    [
+        ("SHS100x5", "IfcRectangleHollowProfileDef"),
+        ("R100x200", "IfcRectangleProfileDef"),
+        ("IPE200", "IfcIShapeProfileDef"),
+    ],
 )
 def test_other_sections_have_the_area_of_the_catalogue(section: str, shape: str, tmp_path: Path) -> None:
     truss = roof(3, section=section)

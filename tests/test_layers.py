@@ -21,7 +21,7 @@ LAYERS = (  # lowest first; a module imports from its own row and from rows abov
     ("front",),
     ("improve", "check"),
     ("pipeline", "candidates", "hope"),
-    ("structure", "layouts", "schedules", "export", "sweep"),
+    ("structure", "layouts", "schedules", "setout", "export", "sweep"),
     ("report", "studio", "cli", "__main__"),
 )
 MODULES = {

@@ -78,6 +78,8 @@ WRONG = [
     "convert theirs.json a.xyz",
     "convert theirs.json theirs.stl",
     "convert a.xyz new.dxf",
+    "setout theirs.json theirs.json --supports boundary",
+    "setout theirs.json d.csv --supports boundary",
     "demo theirs.json",
     "grid theirs.json a.xyz --length L",
     "grid new.obj a.xyz --length L",

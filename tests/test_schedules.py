@@ -231,26 +231,31 @@ def test_a_member_goes_into_the_hole_of_its_type_where_the_ball_is_drilled_for_i
         assert np.abs(between[0] - between[1]).max() <= 6.0  # each hole is off by 3 degrees at most
 
 
+@pytest.mark.parametrize("other", [30.0, 50.0])
 @pytest.mark.parametrize("angle", [20.0, 45.0, 60.0, 90.0, 135.0, 170.0])
-def test_tubes_part_where_the_formula_says(angle: float) -> None:
-    """Points of one tube beyond that distance lie in no other; a little nearer some do."""
+def test_members_part_where_the_formula_says(angle: float, other: float) -> None:
+    """Points of one beyond that distance lie in no other; a little nearer some do, up to a right angle or of equal widths."""
     a, b = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     joints = find_joints(make_grid([(0, 0, 0), (1000, 0, 0), (1000 * a, 1000 * b, 0)], [(0, 1, 2)]))
     radius = 30.0
-    clear = clear_radii(joints, 2 * radius)[0]
-    assert clear == pytest.approx(radius / math.tan(math.radians(angle / 2)))
+    clear = clear_radii(joints, 2 * np.array([radius, other, radius]))[0]
+    if other == radius:
+        assert clear == pytest.approx(radius / math.tan(math.radians(angle / 2)))
+    else:
+        clear = max(clear, other)  # a ball covers the ends
     along, turn, off = np.meshgrid(
-        np.linspace(0, 400, 801), np.linspace(0, 2 * np.pi, 73), np.linspace(0, radius, 13), indexing="ij"
+        np.linspace(0, 400, 801), np.linspace(0, 2 * np.pi, 73), np.linspace(0, 1, 13), indexing="ij"
     )
     points = np.stack([along, off * np.cos(turn), off * np.sin(turn)], axis=-1).reshape(-1, 3)
-    other = np.array([a, b, 0])
+    axis = np.array([a, b, 0])
 
     def shared(beyond: float) -> bool:
-        mine = points[points[:, 0] > beyond]
-        far = mine @ other
-        return bool(((far > beyond) & (np.linalg.norm(mine - far[:, None] * other, axis=1) < radius)).any())
+        mine = (points * [1, radius, radius])[points[:, 0] > beyond]
+        far = mine @ axis
+        return bool(((far > beyond) & (np.linalg.norm(mine - far[:, None] * axis, axis=1) < other)).any())
 
-    assert not shared(clear + 1e-9) and shared(clear - 1.5)
+    assert not shared(clear + 1e-9)
+    assert clear == other or shared(clear - 1.5)
 
 
 def test_what_cannot_be_built_is_warned_of_with_its_place() -> None:
@@ -427,7 +432,8 @@ def test_a_grid_that_cannot_be_scheduled_is_refused(grid: st.Grid, words: str) -
     [
         {"tube": 0}, {"tube": math.nan}, {"tube": "60"}, {"wall": 31.0}, {"ball": -1.0}, {"clearance": -1.0}, {"tolerance": 0.0},
         {"angle_tolerance": 0}, {"tolerance": 1e-9}, {"scale": math.inf}, {"density": 7850.0, "wall": None},
-        {"unit": "furlong"}, {"origin": (0, 0)},
+        {"unit": "furlong"}, {"origin": (0, 0)}, {"bolts": "10.8"}, {"sleeve": 0.0}, {"thread": -1.0}, {"slenderness": math.nan},
+        {"wall": 4.0, "tube": None},
     ],
 )  # fmt: skip
 def test_an_impossible_value_is_refused_by_name(values: dict[str, Any]) -> None:
@@ -484,8 +490,9 @@ def test_the_command_writes_all_or_nothing(
 def test_the_page_explains_every_table_column_option_and_warning() -> None:
     root = Path(__file__).resolve().parents[1]
     page = (root / "docs" / "schedules.md").read_text(encoding="utf-8")
-    made = st.schedule(fan(1000.0), TUBE)
-    for table in made.tables:
+    truss = st.Truss.from_grid(fan(1000.0), supports="boundary", loads="self,snow:1kN/m2")
+    made, of_structure = st.schedule(fan(1000.0), TUBE), st.schedule(truss, st.ScheduleSettings())
+    for table in (*made.tables, *of_structure.tables):
         assert re.search(rf"^### {table.title}$|^\| {table.title} \|", page, re.MULTILINE)
         for each in table.columns:
             name = re.sub(r"\d$", "1", each.name)
@@ -494,4 +501,4 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
         assert f"`{spec.name}`" in page
     source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
     kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
-    assert len(kinds) == 6 and all(f"| {kind} |" in page for kind in kinds), kinds
+    assert len(kinds) == 10 and all(f"| {kind} |" in page for kind in kinds), kinds

@@ -29,6 +29,8 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .export.formats import read_model as read_model
     from .export.formats import write as write
     from .export.json import read_grid as read_grid
+    from .export.printed.write import PrintedParts as PrintedParts
+    from .export.printed.write import print_parts as print_parts
     from .export.solid import print_model as print_model
     from .export.style import FileStyle as FileStyle
     from .front.advance import advance_front as advance_front
@@ -49,6 +51,10 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .schedules.records import Schedule as Schedule
     from .schedules.records import Schedules as Schedules
     from .schedules.settings import ScheduleSettings as ScheduleSettings
+    from .setout.files import write_setting_out as write_setting_out
+    from .setout.make import SettingOut as SettingOut
+    from .setout.make import set_out as set_out
+    from .setout.settings import SetoutSettings as SetoutSettings
     from .settings import Settings as Settings
     from .structure.json import read_structure as read_structure
     from .structure.statics import solve as solve
@@ -73,9 +79,11 @@ _HOMES = {
     "Certificate": "grid.certificate", "certify": "check.certify",
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "read_model": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
-    "print_model": "export.solid",
+    "print_model": "export.solid", "print_parts": "export.printed.write", "PrintedParts": "export.printed.write",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",
+    "set_out": "setout.make", "SettingOut": "setout.make", "SetoutSettings": "setout.settings",
+    "write_setting_out": "setout.files",
     "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
 }  # fmt: skip
 

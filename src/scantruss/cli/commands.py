@@ -17,6 +17,7 @@ from .grid import grid, grid_parser
 from .info import info, info_parser
 from .print import print_parser, print_solid
 from .schedule import make_schedule, schedule_parser
+from .setout import make_setting_out, setout_parser
 from .splice import splice, splice_parser
 from .structure import structure, structure_parser
 from .sweep import sweep, sweep_parser
@@ -39,6 +40,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
     "schedule": (schedule_parser, make_schedule),
+    "setout": (setout_parser, make_setting_out),
     "structure": (structure_parser, structure),
     "convert": (convert_parser, convert),
     "splice": (splice_parser, splice),

@@ -28,9 +28,12 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
   scantruss sweep SCAN --length 3,4,5 --effort quick,normal -o FOLDER
                                            make many grids to choose from: a table and pictures
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
-                                           turn a grid saved as .json into one watertight solid
-  scantruss schedule GRID OUT.xlsx|OUT.csv --tube DxT
-                                           list nodes, members and panels of such a grid as a workshop needs them
+                                           turn a grid saved as .json into one watertight solid, or
+                                           (--bed, --sockets) into parts with plug joints, or balls for rods
+  scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
+                                           list nodes, members and panels of a grid or structure as a workshop needs them
+  scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv --supports corners
+                                           set out supports, heights, boundaries; the order of assembly
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss convert FILE OUT [OUT ...]     write a saved grid or structure for other programs: .dxf, .ifc, .saf.xlsx ...

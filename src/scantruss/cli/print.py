@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from ..export.printed.plates import Bed
+    from ..export.printed.write import PrintedParts
     from ..export.solid_files import Solid
     from ..grid.grid import Grid
+    from ..runtime.cluster import Work
     from .options import Parser
+
+Made = TypeVar("Made")
 
 MOST_HERE = 500  # members and nodes that are united in this process
 
@@ -21,15 +26,41 @@ def print_parser() -> Parser:
     """Options of ``scantruss print``."""
     from .options import Parser, add_outs, number
 
-    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]"
-    parser = Parser("print", usage, "Make one watertight solid, members and nodes, for a 3D printer.")
+    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
+    said = (
+        "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
+        "with sockets for rods."
+    )
+    parser = Parser("print", usage, said)
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
     parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
+    parser.add_argument("--marks", action="store_true", help="engrave the marks of the nodes on their balls")
+    parser.add_argument(
+        "--bed",
+        metavar="WxDxH",
+        type=bed,
+        help="cut the model into parts that fit the bed, with plug joints, a file OUT_1, OUT_2, ... for each full bed",
+    )
+    parser.add_argument(
+        "--sockets", action="store_true", help="a ball with sockets for each node, OUT_N001, ..., and a list of rods"
+    )
+    parser.add_argument(
+        "--clearance", metavar="C", type=number, help="between peg or rod and socket, all around (default 0.15 members)"
+    )
     parser.add_argument("--keep-failed", action="store_true", help="also print a grid that failed its certificate")
     return parser
+
+
+def bed(text: str) -> Bed:
+    """Return width, depth and height of "200x200x180"."""
+    try:
+        wide, deep, high = (float(side) for side in text.lower().split("x"))
+    except ValueError:
+        raise ArgumentTypeError(f"needs width, depth and height such as 200x200x200, got {text!r}") from None
+    return wide, deep, high
 
 
 def print_solid(values: Namespace) -> None:
@@ -46,6 +77,11 @@ def print_solid(values: Namespace) -> None:
     from ..export.json import read_grid
 
     result = read_grid(values.grid)
+    if values.bed is not None or values.sockets:
+        _print_parts(result, outs, values)
+        return
+    if values.clearance is not None:
+        raise InputError("--clearance is between pegs or rods and their sockets; give --bed or --sockets too")
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         for number, out in enumerate(outs):
             bars("solid", number / len(outs))
@@ -55,6 +91,7 @@ def print_solid(values: Namespace) -> None:
                 member_diameter=values.member_diameter,
                 node_diameter=values.node_diameter,
                 scale=values.scale,
+                marks=values.marks,
                 keep_failed=values.keep_failed,
             )
     size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
@@ -63,15 +100,37 @@ def print_solid(values: Namespace) -> None:
     print_lines([*solid.notes, *notes, f"wrote {' '.join(map(str, outs))}: {bodies}, {size} {solid.unit}".rstrip()])
 
 
+def _print_parts(grid: Grid, outs: list[Path], values: Namespace) -> None:
+    """Make the printable model in parts."""
+    from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
+
+    names = ("member_diameter", "node_diameter", "scale", "bed", "sockets", "clearance", "marks", "keep_failed")
+    options = {name: getattr(values, name) for name in names}
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        for number, out in enumerate(outs):
+            bars("solids", number / len(outs))
+            made = _apart(_print_parts_of, grid, save.beside(out), options)
+    size = " x ".join(f"{side:.4g}" for side in made.size)
+    what = "balls with sockets" if values.sockets else "parts with plug joints"
+    notes = [note for out in outs for note in model_note(out, made.unit)]
+    files = f"{len(made.files):,} files, {made.files[0]} to {made.files[-1]}"
+    print_lines([*made.notes, *notes, f"wrote {files}: {made.parts:,} {what}, the largest {size} {made.unit}".rstrip()])
+
+
 def print_apart(grid: Grid, path: Path, **options: Any) -> Solid:
     """Write the solid of a grid (see `print_model`), a large one in a process of its own, which can be ended at any moment.
 
     The library that unites the parts lets nobody else work meanwhile, and nobody hear of a signal.
     """
+    return _apart(_print, grid, path, options)
+
+
+def _apart(work: Work[tuple[Grid, Path], Made], grid: Grid, path: Path, options: dict[str, Any]) -> Made:
     from ..runtime.cluster import Processes, Workers
 
     with Processes(1) if len(grid.nodes) + len(grid.edges) > MOST_HERE else Workers() as worker:
-        return next(worker.run(_print, [(grid, path)], options))[1]
+        return next(worker.run(work, [(grid, path)], options))[1]
 
 
 def _print(job: tuple[Grid, Path], options: dict[str, Any]) -> Solid:
@@ -79,6 +138,13 @@ def _print(job: tuple[Grid, Path], options: dict[str, Any]) -> Solid:
 
     grid, path = job
     return print_model(grid, path, **options)
+
+
+def _print_parts_of(job: tuple[Grid, Path], options: dict[str, Any]) -> PrintedParts:
+    from ..export.printed.write import print_parts
+
+    grid, path = job
+    return print_parts(grid, path, **options)
 
 
 def model_note(out: Path, unit: str) -> list[str]:

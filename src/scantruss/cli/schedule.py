@@ -11,9 +11,14 @@ from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..schedules.forces import Checked
     from ..schedules.records import Schedule, Schedules
     from ..schedules.settings import ScheduleSettings
+    from ..structure.truss import Truss
     from .options import Parser
+
+HEAD = 200  # bytes of a file in which its format stands
 
 
 def schedule_parser() -> Parser:
@@ -24,18 +29,18 @@ def schedule_parser() -> Parser:
 
     parser = Parser(
         "schedule",
-        "GRID OUT.xlsx|OUT.csv [OUT ...] --tube DxT [options]",
-        "List the nodes, members and panels of a grid as a workshop needs them, their types, quantities and warnings.\n"
+        "GRID|STRUCTURE OUT.xlsx|OUT.csv [OUT ...] [--tube DxT] [options]",
+        "List the nodes, members and panels of a grid or a structure as a workshop needs them, their types, quantities and\n"
+        "warnings; of a structure with forces, checks and bolts.\n"
         "Lengths of tubes, balls, clearance and tolerance are millimetres of what is built.",
     )
-    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    parser.add_argument("grid", metavar="GRID", help="grid or structure saved as .json by scantruss grid or structure")
     add_outs(parser, "workbook .xlsx, or .csv: the members, the other tables beside it", "*")
     parser.add_argument(
         "--tube",
         metavar="DxT",
         type=tube,
-        required=True,
-        help="outer diameter of the members, and wall, e.g. 114.3x5 [mm]",
+        help="of a grid: outer diameter of the members, and wall, e.g. 114.3x5 [mm]",
     )
     parser.add_argument(
         "--ball",
@@ -61,7 +66,17 @@ def schedule_parser() -> Parser:
     units = "|".join(unit for unit in UNITS if unit)
     parser.add_argument("--unit", metavar=units, help="unit of a grid that has none")
     parser.add_argument(
-        "--density", metavar="KG/M3", type=number, help="density of members and balls, for masses, e.g. 7850"
+        "--density",
+        metavar="KG/M3",
+        type=number,
+        help="density of members and balls, for masses, e.g. 7850; of a structure that of the balls",
+    )
+    parser.add_argument("--bolts", metavar="GRADE", help="of a structure: 4.6, 5.6, 6.8, 8.8, 10.9 (default) or none")
+    parser.add_argument(
+        "--thread", metavar="X", type=number, help="depth of a thread over the diameter of its bolt (default 1.1)"
+    )
+    parser.add_argument(
+        "--sleeve", metavar="X", type=number, help="diameter around a sleeve over that of its bolt (default 1.8)"
     )
     parser.add_argument(
         "--origin",
@@ -77,6 +92,9 @@ def schedule_parser() -> Parser:
     )
     parser.add_argument(
         "--least-fold", metavar="DEG", type=number, help="warn of sharper folds, 180 is level (default 150)"
+    )
+    parser.add_argument(
+        "--slenderness", metavar="X", type=number, help="of a structure: warn of more slender members (default 200)"
     )
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
     return parser
@@ -111,7 +129,8 @@ def make_schedule(values: Namespace) -> None:
     outs = [check_place(out, SCHEDULE_SUFFIXES) for out in outs_of(values)]
     names = {spec.name for spec in fields(ScheduleSettings)} - {"tube", "wall"}
     given = {name: value for name, value in vars(values).items() if name in names and value is not None}
-    settings = ScheduleSettings(tube=values.tube[0], wall=values.tube[1], **given)
+    diameter, wall = values.tube or (None, None)
+    settings = ScheduleSettings(tube=diameter, wall=wall, **given)
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; schedule needs a grid saved as .json by scantruss grid")
     taken = {Path(values.grid).resolve(): "grid"}
@@ -119,18 +138,28 @@ def make_schedule(values: Namespace) -> None:
         for place in schedule_paths(out).values() if out.suffix.lower() == ".csv" else (out,):
             check_place(place, SCHEDULE_SUFFIXES)
             claim(place, "schedule", taken, force=values.force)
-    from ..export.json import read_grid
     from ..schedules.make import schedule
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        grid = read_grid(values.grid)
+        what, checked = read_grid_or_structure(values.grid)
         bars("schedules", 0.0)
-        made = schedule(grid, settings, keep_failed=values.keep_failed)
+        made = schedule(what, settings, keep_failed=values.keep_failed, checked=checked)
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
             write_schedules(made, save.beside(out))
     print_lines([*schedule_lines(made, settings), f"wrote {' '.join(map(str, outs))}"])
+
+
+def read_grid_or_structure(path: str) -> tuple[Grid | Truss, Checked | None]:
+    """Return what a file holds, and of a structure what it says of the checks."""
+    from ..export.json import read_grid
+    from ..structure.json import STRUCTURE_FORMAT, read_checked
+
+    with Path(path).open("rb") as file:
+        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
+            return read_checked(path)
+    return read_grid(path), None
 
 
 def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:

@@ -21,12 +21,6 @@ if TYPE_CHECKING:
     from .options import Parser
 
 REPORT_SUFFIXES = (".html", ".pdf", ".png")  # of what a person reads; the others are those of `export.formats`
-    "checks",
-    "size",
-    "size_by",
-    "buckling",
-    "frequencies",
-)  #: settings that the structure itself does not depend on
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),

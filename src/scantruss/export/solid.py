@@ -12,11 +12,14 @@ import numpy as np
 from ..errors import InputError
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
+from ..grid.marks import node_marks
 from ..runtime.files import check_place, write_files
+from .engraving import engraved
 from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
 SLENDEREST = 2_000  #: largest length of a member, in diameters, that can be printed
+MARKED_SIDES = 32  #: of balls with marks
 PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
 
 
@@ -28,6 +31,7 @@ def print_model(
     node_diameter: float,
     scale: float = 1.0,
     sides: int = 12,
+    marks: bool = False,
     keep_failed: bool = False,
 ) -> Solid:
     """Write the grid as one watertight solid for a 3D printer.
@@ -44,6 +48,8 @@ def print_model(
         Size of the model over the size of the grid.
     sides : int
         Sides of a member.
+    marks : bool
+        Engrave the mark of each node on its ball.
     keep_failed : bool
         Print a grid that failed its certificate too.
 
@@ -63,14 +69,22 @@ def print_model(
     """
     path = check_place(path, SUFFIXES)
     check_passed(grid, keep_failed)
-    solid = build_solid(grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides)
+    solid = build_solid(
+        grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides, marks=marks
+    )
     encode = encode_3mf if path.suffix.lower() == ".3mf" else encode_stl
     write_files({path: encode(solid)})
     return solid
 
 
 def build_solid(
-    grid: Grid, *, member_diameter: float, node_diameter: float, scale: float = 1.0, sides: int = 12
+    grid: Grid,
+    *,
+    member_diameter: float,
+    node_diameter: float,
+    scale: float = 1.0,
+    sides: int = 12,
+    marks: bool = False,
 ) -> Solid:
     """Return members (cylinders) and nodes (geodesic balls) of a grid, united.
 
@@ -80,6 +94,7 @@ def build_solid(
     member_diameter, node_diameter : diameters in the solid, not scaled [unit of the grid]
     scale : size of the solid over the size of the grid
     sides : sides of a member
+    marks : engrave the mark of each node on its ball
 
     Raises
     ------
@@ -90,18 +105,33 @@ def build_solid(
     used, edges = np.unique(grid.edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
-    body = _unite(_parts(nodes, edges, member_diameter / 2, node_diameter / 2, sides))
-    mesh = body.to_mesh64()
+    parts = [
+        *balls_of(grid, used, nodes, node_diameter / 2, sides, marks),
+        *bars_of(nodes, edges, member_diameter / 2, sides),
+    ]
+    order = _curve_order(np.concatenate([nodes, nodes[edges].mean(axis=1)]))
     pieces = _count_pieces(len(nodes), edges)
+    return as_solid(unite([parts[k] for k in order]), grid.unit, pieces, len(edges) - len(nodes) + pieces)
+
+
+def as_solid(body: Any, unit: str, pieces: int, genus: int) -> Solid:
+    """Return what manifold3d made as a solid, with the pieces and openings that it has to have.
+
+    Raises
+    ------
+    InputError
+        It is not one closed surface around a volume.
+    """
+    mesh = body.to_mesh64()
     solid = Solid(
         vertices=np.ascontiguousarray(mesh.vert_properties[:, :3], np.float64),
         triangles=np.ascontiguousarray(mesh.tri_verts, np.int64),
-        unit=grid.unit,
+        unit=unit,
         volume=float(body.volume()),
         components=len(body.decompose()),
         genus=0,
         expected_components=pieces,
-        expected_genus=len(edges) - len(nodes) + pieces,
+        expected_genus=genus,
     )
     return _checked(solid)
 
@@ -137,18 +167,38 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
             )
 
 
-def _parts(nodes: np.ndarray, edges: np.ndarray, member_radius: float, node_radius: float, sides: int) -> list[Any]:
-    """Return one ball per node and one cylinder per member, neighbours near each other in the list."""
+def balls_of(
+    grid: Grid, ids: np.ndarray, nodes: np.ndarray, radius: float, sides: int, marks: bool = False
+) -> list[Any]:
+    """Return a ball for each of some nodes (K,) at their places in the solid (K, 3); `marks`: with their marks engraved outside."""
     from manifold3d import Manifold
 
-    ball = Manifold.sphere(node_radius, sides)
-    bar = Manifold.cylinder(1.0, member_radius, member_radius, sides)
-    frames = _frames(nodes, edges)
-    balls = [ball.translate(tuple(node)) for node in nodes.tolist()]
-    bars = [bar.transform(frame) for frame in frames]
-    places = np.concatenate([nodes, nodes[edges].mean(axis=1)])
-    parts = [*balls, *bars]
-    return [parts[k] for k in _curve_order(places)]
+    ball = Manifold.sphere(radius, max(sides, MARKED_SIDES) if marks else sides)
+    if not marks:
+        return [ball.translate(tuple(node)) for node in nodes.tolist()]
+    names, normals = node_marks(grid), _normals(grid)
+    return [
+        engraved(ball, radius, names[k], normals[k]).translate(tuple(node))
+        for k, node in zip(ids.tolist(), nodes.tolist(), strict=True)
+    ]
+
+
+def _normals(grid: Grid) -> np.ndarray:
+    """Return the unit normal of each node (V, 3); up where it has none."""
+    a, b, c = grid.nodes[grid.triangles].transpose(1, 0, 2)
+    total = np.zeros((len(grid.nodes), 3))
+    for corner in grid.triangles.T:
+        np.add.at(total, corner, np.cross(b - a, c - a))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+
+
+def bars_of(nodes: np.ndarray, edges: np.ndarray, radius: float, sides: int) -> list[Any]:
+    """Return a cylinder for each member (E, 2) between nodes (V, 3) of the solid."""
+    from manifold3d import Manifold
+
+    bar = Manifold.cylinder(1.0, radius, radius, sides)
+    return [bar.transform(frame) for frame in _frames(nodes, edges)]
 
 
 def _frames(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -173,7 +223,7 @@ def _curve_order(places: np.ndarray) -> np.ndarray:
     return np.argsort(key, kind="stable")
 
 
-def _unite(parts: list[Any]) -> Any:
+def unite(parts: list[Any]) -> Any:
     """Return the union of all parts, block by block."""
     from manifold3d import Manifold, OpType
 

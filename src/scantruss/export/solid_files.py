@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import math
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,18 +38,19 @@ MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 <model unit="{unit}" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <metadata name="Application">ScanTruss {version}</metadata>
 <resources>
-<object id="1" name="grid truss" type="model"><mesh>
+{objects}
+</resources>
+<build>{items}</build>
+</model>
+"""
+OBJECT = """<object id="{number}" name="{name}" type="model"><mesh>
 <vertices>
 {vertices}
 </vertices>
 <triangles>
 {triangles}
 </triangles>
-</mesh></object>
-</resources>
-<build><item objectid="1"/></build>
-</model>
-"""
+</mesh></object>"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +136,25 @@ def _vertex_normals(solid: Solid) -> np.ndarray:
     return normals
 
 
-def encode_3mf(solid: Solid) -> bytes:
-    """Return a 3MF package; the unit is that of the grid, millimetre where it is not known. No dates, no random ids."""
-    vertices, _ = put_on_lattice(solid)
+def encode_3mf(*solids: Solid, names: Sequence[str] = ("grid truss",)) -> bytes:
+    """Return a 3MF package with an object for each solid; the unit is theirs, millimetre where it is not known. No dates, no random ids."""
+    objects = []
+    for number, (solid, name) in enumerate(zip(solids, names, strict=True), 1):
+        vertices, _ = put_on_lattice(solid)
+        objects.append(
+            OBJECT.format(
+                number=number,
+                name=name,
+                vertices="\n".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in vertices.tolist()),
+                triangles="\n".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in solid.triangles.tolist()),
+            )
+        )
     parts = {"[Content_Types].xml": CONTENT_TYPES, "_rels/.rels": RELATIONS}
     parts["3D/3dmodel.model"] = MODEL.format(
-        unit=UNIT_NAMES.get(solid.unit, "millimeter"),
+        unit=UNIT_NAMES.get(solids[0].unit, "millimeter"),
         version=__version__,
-        vertices="\n".join(f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in vertices.tolist()),
-        triangles="\n".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in solid.triangles.tolist()),
+        objects="\n".join(objects),
+        items="".join(f'<item objectid="{number + 1}"/>' for number in range(len(solids))),
     )
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as package:

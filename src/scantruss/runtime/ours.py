@@ -13,11 +13,12 @@ MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file th
 CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
 LARGEST_PDF = 50_000_000  # bytes of a PDF file in which the mark is sought
-# tables have no place for a mark: those of members, of nodes, of a sweep, of schedules
+# tables have no place for a mark: those of members, of nodes, of a sweep, of schedules, of setting out
 TABLE_HEADS = re.compile(
     rb"id,start,end,start_x|id,x[^,]*,y[^,]*,z[^,]*,valence,|[^\n]*length std/mean[^\n]*[,| ]certificate\b|node,node type,ring,"
     rb"|[^\n]*\brise[ ,|]+mass \[kg\]"
     rb"|node,hole,member,|member,start,end,group,|panel,node 1,|(node|panel|length) type,count,|item,group,count,|warning,at,with,"
+    rb"|section,at,x|boundary,node,|step,(nodes|member),|node,scan x [^\n]*,(held|set at step),"
 )
 
 

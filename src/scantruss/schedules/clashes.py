@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scan.clean.nearby import Nearby
+from .bolts import PITCHES, tension_resistance
 from .records import Schedule, Value, column
 
 if TYPE_CHECKING:
@@ -14,12 +15,20 @@ if TYPE_CHECKING:
 
 SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
 SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
+NO_MOMENT = 1e-6  # [m]: moment over force up to which it is one of rounding
 WarningRow = tuple[Value, ...]
 
 
 def warnings_table(parts: Parts) -> Schedule:
     """Return a row for each place that is hard or impossible to build: what, which, how much, the limit and where."""
-    rows = [*_scale(parts), *_small_angles(parts), *_clashes(parts), *_touching_balls(parts), *_folds(parts)]
+    rows = [
+        *_scale(parts),
+        *_small_angles(parts),
+        *_clashes(parts),
+        *_touching_balls(parts),
+        *_folds(parts),
+        *_of_structure(parts),
+    ]
     heads = ("warning", "at", "with", "value", "limit", "measure")
     units = {"scan x": parts.unit, "scan y": parts.unit, "scan z": parts.unit}
     names = [*heads, *units]
@@ -73,7 +82,7 @@ def _small_angles(parts: Parts) -> list[WarningRow]:
 
 
 def _clashes(parts: Parts) -> list[WarningRow]:
-    """Tubes that overlap outside their ball, and members of which the balls leave nothing."""
+    """Members that overlap outside their ball, and members of which the balls leave nothing."""
     ball = 2.0 * parts.radius[parts.joints.node[parts.joints.pairs[:, 0]]]
     chosen = np.flatnonzero(2.0 * parts.clear > ball * (1.0 + SAME_SIZE))
     rows = _at_node(parts, "members overlap outside the ball", chosen, ball, 2.0 * parts.clear, "mm")
@@ -119,4 +128,28 @@ def _folds(parts: Parts) -> list[WarningRow]:
             ("sharp fold", parts.member_marks[member], f"{parts.panel_marks[one]} {parts.panel_marks[two]}",
              float(fold[member]), limit, "degree", *place.tolist())
         )  # fmt: skip
+    return rows
+
+
+def _of_structure(parts: Parts) -> list[WarningRow]:
+    """Members of a structure that are slender, used beyond 1, or without a bolt that carries them; moments that no bolt carries."""
+    if (forces := parts.forces) is None:
+        return []
+    limit = parts.settings.slenderness
+    found = [("slender member", forces.slenderness, limit, "", forces.slenderness > limit * (1.0 + SAME_SIZE))]
+    if (used := forces.utilization) is not None:
+        found.append(("utilization above one", used, 1.0, "", used > 1.0))
+    rows: list[WarningRow] = []
+    if parts.bolt is not None:
+        most = tension_resistance(max(PITCHES), parts.settings.bolts) / 1000.0
+        found.append(("no bolt carries the tension", forces.high / 1000.0, most, "kN", parts.bolt == 0))
+        if (moment := float(forces.moment.max()) / 1000.0) > NO_MOMENT * max(1.0, float(forces.high.max()) / 1000.0):
+            at = parts.member_marks[int(forces.moment.argmax())]
+            rows.append(
+                ("bolts are chosen for tension and carry no moments", at, None, moment, 0.0, "kNm", None, None, None)
+            )
+    for words, value, most, measure, chosen in found:
+        for member in np.flatnonzero(chosen).tolist():
+            place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
+            rows.append((words, parts.member_marks[member], None, float(value[member]), most, measure, *place.tolist()))
     return rows

@@ -46,23 +46,26 @@ def _sorted_by_count(of: np.ndarray, representative: np.ndarray, misfit: np.ndar
     return Clusters(number[of], representative[order], misfit)
 
 
-def cluster_lengths(lengths: np.ndarray, tolerance: float) -> Clusters:
-    """Return the fewest types of which every length (N,) is within the tolerance of one of its own."""
-    order = np.argsort(lengths, kind="stable")
-    ordered = lengths[order]
+def cluster_lengths(lengths: np.ndarray, tolerance: float, kind: np.ndarray | None = None) -> Clusters:
+    """Return the fewest types of which every length (N,) is within the tolerance of one of its own; different kinds (N,) share none."""
+    kind = np.zeros(len(lengths), np.int64) if kind is None else kind
+    order = np.lexsort((lengths, kind))
     of = np.empty(len(lengths), np.int64)
     representative: list[int] = []
-    begin = 0
-    while begin < len(ordered):  # each type takes one length at least
-        middle = int(np.searchsorted(ordered, ordered[begin] + tolerance, "right")) - 1
-        while ordered[middle] - ordered[begin] > tolerance:  # a sum that was rounded up; ends at `begin`
-            middle -= 1
-        end = int(np.searchsorted(ordered, ordered[middle] + tolerance, "right"))
-        while ordered[end - 1] - ordered[middle] > tolerance:  # ends at `middle`
-            end -= 1
-        of[order[begin:end]] = len(representative)
-        representative.append(int(order[middle]))
-        begin = end
+    for each in np.unique(kind):
+        mine = order[kind[order] == each]
+        ordered = lengths[mine]
+        begin = 0
+        while begin < len(ordered):  # each type takes one length at least
+            middle = int(np.searchsorted(ordered, ordered[begin] + tolerance, "right")) - 1
+            while ordered[middle] - ordered[begin] > tolerance:  # a sum that was rounded up; ends at `begin`
+                middle -= 1
+            end = int(np.searchsorted(ordered, ordered[middle] + tolerance, "right"))
+            while ordered[end - 1] - ordered[middle] > tolerance:  # ends at `middle`
+                end -= 1
+            of[mine[begin:end]] = len(representative)
+            representative.append(int(mine[middle]))
+            begin = end
     found = np.array(representative, np.int64)
     return _sorted_by_count(of, found, np.abs(lengths - lengths[found[of]]))
 
@@ -120,7 +123,7 @@ def cluster_panels(sides: np.ndarray, tolerance: float) -> Clusters:
 
 
 def cluster_nodes(joints: Joints, tolerance: float) -> Clusters:
-    """Return the types of nodes by the directions of their members in the frame of the ball, turned about the normal [degree].
+    """Return the types of nodes by the directions of their members in the frame of the ball, turned about the normal [degree], and bolts.
 
     The misfit is the largest angle between a hole and that of the representative, once the ball is turned to where the sum of squares
     across the normal is least.
@@ -152,6 +155,9 @@ def _misfits(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
     turn = np.angle((np.conj(flat) * their_flat).sum(axis=-1))  # (C, v)
     across = np.abs(flat * np.exp(1j * turn)[..., None] - their_flat)
     chord = np.hypot(across, turned[..., 2] - theirs[..., 2])
+    bolts, place = joints.bolt[joints.start[item] + np.arange(count)], np.arange(count)
+    their_bolts = joints.bolt[joints.start[others][:, None] + place][:, None]  # (C, 1, v)
+    chord[bolts[(place[:, None] + place) % count] != their_bolts] = 2.0  # another thread is another ball
     return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1)
 
 

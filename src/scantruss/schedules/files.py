@@ -13,13 +13,15 @@ from ..export.csv import encode_table
 from ..export.workbook import NOT_IN_XML, without_dates
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
-from .records import Schedule, Schedules, Value
+from .records import Schedule, Schedules, Value, Workbook
 
 SCHEDULE_SUFFIXES = (".csv", ".xlsx")
 DECIMALS = {
     "mm": "0.0",
     "degree": "0.00",
     "kg": "0.00",
+    "kN": "0.00",
+    "kNm": "0.00",
     "m": "0.000",
     "m2": "0.000",
 }  # shown in a cell; it holds all digits
@@ -64,7 +66,7 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
     return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
 
 
-def encode_xlsx(schedules: Schedules) -> bytes:
+def encode_xlsx(schedules: Workbook) -> bytes:
     """Return a workbook with a sheet for each table: the header frozen, numbers as numbers, sums in the last row."""
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell

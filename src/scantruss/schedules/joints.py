@@ -38,6 +38,7 @@ class Joints:
     )  #: (2 E,) the same in the tangent plane, all of a node make 360 [degree]; NaN for the only one
     pairs: np.ndarray  #: (K, 2) any two ends of one node
     angle: np.ndarray  #: (K,) angle between them in space [degree]
+    bolt: np.ndarray  #: (2 E,) diameter of its bolt, 0 where there is none [mm]
 
     @property
     def valence(self) -> np.ndarray:
@@ -139,6 +140,7 @@ def find_joints(grid: Grid) -> Joints:
         turn_to_next=turn,
         pairs=pairs,
         angle=angle,
+        bolt=np.zeros(len(node), np.int64),
     )
 
 
@@ -167,11 +169,21 @@ def _pairs(node: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[
     return pairs, angle_between(direction[pairs[:, 0]], direction[pairs[:, 1]])
 
 
-def clear_radii(joints: Joints, tube: float) -> np.ndarray:
-    """Return for each pair of ends the distance from the node at which their tubes part [unit of `tube`].
+def clear_radii(joints: Joints, width: np.ndarray) -> np.ndarray:
+    """Return for each pair of ends the distance from the node at which their members part (K,) [unit of `width`].
 
-    Two tubes of diameter d whose axes meet at the angle a overlap along the axes up to d / (2 tan(a / 2)): the axes span a plane, in
-    which the inner edges, d / 2 from each axis, meet on the bisector of a, and that point lies so far along either axis. Out of the
-    plane the tubes are narrower.
+    In the plane of two axes at the angle a the edges of members of widths d and e, d / 2 and e / 2 from them, meet at
+    (e / sin a + d / tan a) / 2 from the node along the axis of d, and likewise along the other. A square end no nearer than that, of
+    either, lies beyond the edge of the other member; out of the plane round members are narrower. Beyond 90 degrees e / 2 and d / 2
+    suffice, as a plane across one axis keeps them apart.
+
+    Parameters
+    ----------
+    joints : Joints
+    width : (E,) diameter of each member
     """
-    return tube / 2.0 / np.tan(np.radians(joints.angle) / 2.0)
+    own = width[joints.member[joints.pairs]]
+    other, turn = own[:, ::-1], np.radians(joints.angle)[:, None]
+    apart = (other + own * np.cos(turn)) / np.sin(turn) / 2
+    radii: np.ndarray = np.where(joints.angle > 90.0, np.minimum(apart, other / 2).max(axis=1), apart.min(axis=1))
+    return radii

@@ -1,7 +1,9 @@
-"""Make the schedules of a grid."""
+"""Make the schedules of a grid or a structure."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,59 +13,74 @@ from ..errors import InputError
 from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
 from ..settings import UNITS
+from ..structure.truss import Truss
+from .bolts import NO_BOLTS, PITCHES, bolted_radii, choose_bolts
 from .clusters import Clusters, cluster_lengths, cluster_nodes, cluster_panels
-from .joints import check_grid, clear_radii, find_joints
-from .parts import Parts
-from .records import Schedules
+from .forces import Checked, Forces, find_forces, grid_of_structure
+from .joints import Joints, check_grid, clear_radii, find_joints
+from .parts import Parts, Stock
+from .records import Column, Schedules, column
 from .tables import all_tables
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
     from .settings import ScheduleSettings
 
+METALS = ("steel", "aluminium")  # materials of which balls are made
 SMALLEST, LARGEST = 1e-3, 1e9  # lengths of which a schedule can be made [mm]
 
 
-def schedule(grid: Grid, settings: ScheduleSettings, *, keep_failed: bool = False) -> Schedules:
+def schedule(
+    what: Grid | Truss, settings: ScheduleSettings, *, keep_failed: bool = False, checked: Checked | None = None
+) -> Schedules:
     """Return the schedules of nodes, members and panels, their types, quantities and warnings.
 
     Parameters
     ----------
-    grid : Grid
-        The grid; its coordinates are multiplied by the scale of the settings.
+    what : Grid or Truss
+        A grid, whose coordinates are multiplied by the scale of the settings, or a structure, which brings its size, sections,
+        material, marks and forces along.
     settings : ScheduleSettings
-        Tubes, balls, tolerances, building frame, limits.
+        Tubes of a grid, bolts of a structure, balls, tolerances, building frame, limits.
     keep_failed : bool
         Take a grid that failed its certificate too.
+    checked : (utilization, governing), optional
+        Of the members of a structure; without it they are checked by default (`scantruss.structure.checks`).
 
     Raises
     ------
     InputError
-        The unit is not known, or the grid is no oriented manifold of members with a length.
+        The unit is not known, the grid is no oriented manifold of members with a length, or the structure cannot be solved.
     CertificateError
         The grid failed its certificate.
     """
-    check_passed(grid, keep_failed)
-    if grid.unit and settings.unit not in ("", grid.unit):
-        raise InputError(f"the grid is in {grid.unit}, so the unit cannot be {settings.unit}; leave --unit out")
-    unit = grid.unit or settings.unit
-    metres = UNITS[unit]
-    if metres is None:
-        raise InputError(
-            "the unit of the grid is not known, and a schedule needs it; give --unit mm, cm, m, inch or foot"
-        )
-    size = 1000.0 * metres * settings.scale
+    forces: Forces | None = None
+    if isinstance(what, Truss):
+        grid, order = grid_of_structure(what)
+        settings = _of_structure(settings, what)
+    else:
+        grid = what
+        check_passed(grid, keep_failed)
+    unit, size = _size(grid, settings)
     check_grid(grid)
     longest = float(grid.lengths.max()) * size
     if not SMALLEST <= longest <= LARGEST:
         raise InputError(
             f"the longest member would be {longest:g} mm long; check --scale {settings.scale:g} and the unit, {unit}"
         )
-    joints = find_joints(grid)
-    clear = clear_radii(joints, settings.tube)
-    needed = np.where(joints.valence > 0, settings.tube / 2.0, 0.0)
-    np.maximum.at(needed, joints.node[joints.pairs[:, 0]], clear)
-    needed[joints.valence > 0] += settings.gap
+    joints, marks = find_joints(grid), (node_marks(grid), member_marks(grid))
+    bolt: np.ndarray | None = None
+    kind: np.ndarray | None = None
+    if isinstance(what, Truss):
+        kind = what.section_of[order]
+        forces = find_forces(what, order, checked)
+        marks = list(what.node_marks), [what.member_marks[k] for k in order.tolist()]
+        if settings.bolts != NO_BOLTS:
+            bolt = choose_bolts(np.maximum(forces.high, 0.0), settings.bolts)
+            joints = replace(joints, bolt=bolt[joints.member])
+    stock = _stock(grid, settings, forces)
+    clear = clear_radii(joints, stock.width)
+    needed = _needed(joints, stock.width, clear, settings)
     node_types = cluster_nodes(joints, settings.angle_tolerance)
     radius = np.where(joints.valence > 0, _radii(needed, node_types, settings.ball), 0.0)
     length = grid.lengths * size
@@ -77,6 +94,9 @@ def schedule(grid: Grid, settings: ScheduleSettings, *, keep_failed: bool = Fals
             unit=unit,
             size=size,
             joints=joints,
+            stock=stock,
+            forces=forces,
+            bolt=bolt,
             clear=clear,
             needed=needed,
             radius=radius,
@@ -86,12 +106,67 @@ def schedule(grid: Grid, settings: ScheduleSettings, *, keep_failed: bool = Fals
             fold=inner_folds(grid),
             node_types=node_types,
             panel_types=cluster_panels(sides, settings.tolerance),
-            length_types=cluster_lengths(cut, settings.tolerance),
-            node_marks=node_marks(grid),
-            member_marks=member_marks(grid),
+            length_types=cluster_lengths(cut, settings.tolerance, kind),
+            node_marks=marks[0],
+            member_marks=marks[1],
             panel_marks=panel_marks(grid),
         )
     )
+
+
+def _of_structure(settings: ScheduleSettings, truss: Truss) -> ScheduleSettings:
+    """Return the settings with what a structure brings along, unless they contradict it."""
+    for name, nothing in (("tube", None), ("scale", 1.0), ("unit", "")):
+        if getattr(settings, name) != nothing:
+            raise InputError(f"a structure has a {name} of its own; leave --{name} out")
+    return replace(settings, scale=truss.scale)
+
+
+def _size(grid: Grid, settings: ScheduleSettings) -> tuple[str, float]:
+    """Return the unit of a grid, and what it is in the structure [mm]."""
+    if grid.unit and settings.unit not in ("", grid.unit):
+        raise InputError(f"the grid is in {grid.unit}, so the unit cannot be {settings.unit}; leave --unit out")
+    unit = grid.unit or settings.unit
+    metres = UNITS[unit]
+    if metres is None:
+        raise InputError(
+            "the unit of the grid is not known, and a schedule needs it; give --unit mm, cm, m, inch or foot"
+        )
+    return unit, 1000.0 * metres * settings.scale
+
+
+def _stock(grid: Grid, settings: ScheduleSettings, forces: Forces | None) -> Stock:
+    """Return what the members are cut from."""
+    count = len(grid.edges)
+    if forces is not None:
+        truss, material = forces.truss, forces.truss.material
+        names = column("section", "", forces.sections), column("material", "", [material.name] * count)
+        mass = (truss.of_section("area") * material.density)[forces.order] / 1000.0
+        ball = settings.density or (material.density if material.kind in METALS else None)
+        return Stock(1000.0 * forces.width, mass, names, ball)
+    if settings.tube is None:
+        raise InputError("the tubes of the members are missing; give them with --tube, such as --tube 114.3x5")
+    columns: tuple[Column, ...] = (column("tube", "mm", [settings.tube] * count),)
+    mass = None
+    if settings.wall is not None:
+        columns = (*columns, column("wall", "mm", [settings.wall] * count))
+        if settings.density is not None:
+            area = math.pi * settings.wall * (settings.tube - settings.wall)
+            mass = np.full(count, area * settings.density / 1e9)
+    return Stock(np.full(count, settings.tube), mass, columns, settings.density)
+
+
+def _needed(joints: Joints, width: np.ndarray, clear: np.ndarray, settings: ScheduleSettings) -> np.ndarray:
+    """Return the radius of the smallest ball of each node that clears its members, with the clearance, and its bolts (V,) [mm]."""
+    gap = width / 10.0 if settings.clearance is None else np.full(len(width), settings.clearance)
+    needed = np.zeros(len(joints.valence))
+    np.maximum.at(needed, joints.node, (width / 2.0 + gap)[joints.member])
+    at = joints.node[joints.pairs[:, 0]]
+    np.maximum.at(needed, at, clear + gap[joints.member[joints.pairs]].max(axis=1))
+    if joints.bolt.any():
+        bolts = np.where(joints.bolt > 0, joints.bolt, max(PITCHES))  # none is large enough: the largest
+        np.maximum.at(needed, at, bolted_radii(joints.angle, bolts[joints.pairs], settings.thread, settings.sleeve))
+    return needed
 
 
 def _radii(needed: np.ndarray, types: Clusters, ball: float | None) -> np.ndarray:

@@ -12,7 +12,19 @@ from .joints import Joints
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
+    from .forces import Forces
+    from .records import Column
     from .settings import ScheduleSettings
+
+
+@dataclass(frozen=True, eq=False)
+class Stock:
+    """What the members are cut from, tubes of the settings or sections of a structure; all by member."""
+
+    width: np.ndarray  #: (E,) diameter around it [mm]
+    mass: np.ndarray | None  #: (E,) mass of a length [kg/mm]
+    columns: tuple[Column, ...]  #: what it is called
+    ball_density: float | None  #: [kg/m3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +36,10 @@ class Parts:
     unit: str  #: of the scan
     size: float  #: what a unit of the grid is in the structure [mm]
     joints: Joints
-    clear: np.ndarray  #: (K,) where the tubes of each pair of ends part, from the node
+    stock: Stock
+    forces: Forces | None  #: of a structure
+    bolt: np.ndarray | None  #: (E,) diameters, 0 where none is large enough; None without bolts
+    clear: np.ndarray  #: (K,) where the members of each pair of ends part, from the node
     needed: np.ndarray  #: (V,) radius of the smallest ball that clears its members; 0 without members
     radius: np.ndarray  #: (V,) radius of the balls; 0 without members
     length: np.ndarray  #: (E,)

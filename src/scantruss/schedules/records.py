@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 
@@ -70,6 +71,14 @@ class Schedule:
     def rows(self) -> list[tuple[Value, ...]]:
         """All rows."""
         return list(zip(*(each.values for each in self.columns), strict=True))
+
+
+class Workbook(Protocol):
+    """What has tables for the sheets of a workbook."""
+
+    @property
+    def tables(self) -> list[Schedule]:
+        """All tables in the order of the sheets."""
 
 
 @dataclass(frozen=True, eq=False)

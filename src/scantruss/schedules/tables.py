@@ -10,6 +10,7 @@ import numpy as np
 
 from ..grid.groups import BOUNDARY, INNER, member_groups
 from ..grid.marks import numbered
+from .bolts import bolt_mark
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
 from .joints import angle_between
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 DEGREE = "degree"
+ENOUGH = 1000  # more than any bolt: stands for one that no bolt is large enough for
 
 
 def all_tables(parts: Parts) -> Schedules:
@@ -42,17 +44,56 @@ def all_tables(parts: Parts) -> Schedules:
 
 def _ball_masses(parts: Parts) -> np.ndarray | None:
     """Return the mass of each ball (V,), solid, holes not taken off [kg]; None without a density."""
-    if parts.settings.density is None:
+    if (density := parts.stock.ball_density) is None:
         return None
-    return math.pi / 6.0 * (2.0 * parts.radius / 1000.0) ** 3 * parts.settings.density
+    return math.pi / 6.0 * (2.0 * parts.radius / 1000.0) ** 3 * density
 
 
 def _member_masses(parts: Parts) -> np.ndarray | None:
     """Return the mass of each member (E,), as long as it is cut [kg]; None without a density."""
-    area = parts.settings.section_area
-    if parts.settings.density is None or area is None:
-        return None
-    return np.maximum(parts.cut, 0.0) / 1000.0 * area / 1e6 * parts.settings.density
+    return None if parts.stock.mass is None else np.maximum(parts.cut, 0.0) * parts.stock.mass
+
+
+def _kilonewtons(name: str, forces: np.ndarray) -> Column:
+    """Return a column of forces, given in N."""
+    return column(name, "kN", forces / 1000.0)
+
+
+def _node_forces(parts: Parts, used: np.ndarray) -> list[Column]:
+    """Return the columns of the greatest forces at the nodes of a structure, and of their largest bolts."""
+    if (forces := parts.forces) is None:
+        return []
+    low, high = np.full((2, len(parts.grid.nodes)), [[np.inf], [-np.inf]])
+    for ends in parts.grid.edges.T:
+        np.minimum.at(low, ends, forces.low)
+        np.maximum.at(high, ends, forces.high)
+    columns = [_kilonewtons(name, each[used]) for name, each in (("force min", low), ("force max", high))]
+    columns.append(_kilonewtons("reaction", forces.reaction[used]))
+    if parts.bolt is None:
+        return columns
+    largest = np.zeros(len(low), np.int64)
+    np.maximum.at(largest, parts.joints.node, np.where(parts.joints.bolt > 0, parts.joints.bolt, ENOUGH))
+    marks = [bolt_mark(each) if each < ENOUGH else None for each in largest[used].tolist()]
+    return [*columns, column("largest bolt", "", marks)]
+
+
+def _member_forces(parts: Parts) -> list[Column]:
+    """Return the columns of forces and checks of the members of a structure, and of their bolts."""
+    if (forces := parts.forces) is None:
+        return []
+    columns = [
+        _kilonewtons("force min", forces.low),
+        column("case of min", "", forces.low_case),
+        _kilonewtons("force max", forces.high),
+        column("case of max", "", forces.high_case),
+        column("moment", "kNm", forces.moment / 1000.0),
+        column("slenderness", "", forces.slenderness),
+    ]
+    if forces.utilization is not None:
+        columns += [column("utilization", "", forces.utilization), column("governed by", "", forces.governing)]
+    if parts.bolt is not None:
+        columns.append(column("bolts", "", [bolt_mark(each) for each in parts.bolt.tolist()]))
+    return columns
 
 
 def _mass(mass: np.ndarray | None) -> list[Column]:
@@ -94,6 +135,7 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
             column("smallest angle in tangent plane", DEGREE, turn[used]),
             column("ball needed", "mm", 2.0 * parts.needed[used]),
             column("ball", "mm", 2.0 * parts.radius[used]),
+            *_node_forces(parts, used),
             *_mass(None if mass is None else mass[used]),
         ),
     )
@@ -102,6 +144,10 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
 def _drilling(parts: Parts) -> Schedule:
     """One row for each hole of each ball, in the frame of the ball."""
     joints = parts.joints
+    bolts = [
+        column("bolt", "", [bolt_mark(each) for each in joints.bolt.tolist()]),
+        column("thread", "mm", np.where(joints.bolt > 0, joints.bolt * parts.settings.thread, np.nan)),
+    ]
     return Schedule(
         "Drilling",
         (
@@ -114,6 +160,7 @@ def _drilling(parts: Parts) -> Schedule:
             *_xyz("ball", "", joints.own),
             column("angle to next", DEGREE, joints.to_next),
             column("angle to next in tangent plane", DEGREE, joints.turn_to_next),
+            *(bolts if parts.bolt is not None else ()),
         ),
     )
 
@@ -135,9 +182,8 @@ def end_angles(parts: Parts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray | None) -> Schedule:
     """One row for each member."""
-    edges, settings = parts.grid.edges, parts.settings
+    edges = parts.grid.edges
     start, end, twist = end_angles(parts)
-    wall = [] if settings.wall is None else [column("wall", "mm", [settings.wall] * len(edges))]
     return Schedule(
         "Members",
         (
@@ -151,11 +197,11 @@ def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray
             column("start deduction", "mm", parts.radius[edges[:, 0]]),
             column("end deduction", "mm", parts.radius[edges[:, 1]]),
             column("cut length", "mm", parts.cut, summed=True),
-            column("tube", "mm", [settings.tube] * len(edges)),
-            *wall,
+            *parts.stock.columns,
             column("start angle to normal", DEGREE, start),
             column("end angle to normal", DEGREE, end),
             column("twist", DEGREE, twist),
+            *_member_forces(parts),
             *_mass(mass),
         ),
     )
@@ -226,8 +272,10 @@ def _lengths(parts: Parts) -> Schedule:
     """One row for each type of member."""
     types = parts.length_types
     total = np.bincount(types.of, parts.cut) / 1000.0
+    stock = parts.stock.columns if parts.forces is not None else ()
     return _types(
         "Lengths", "L", types, parts.member_marks, "mm",
+        *(column(each.name, "", [each.values[k] for k in types.representative.tolist()]) for each in stock),
         column("cut length", "mm", parts.cut[types.representative]), column("total", "m", total, summed=True),
     )  # fmt: skip
 
@@ -243,12 +291,18 @@ def _quantities(parts: Parts, groups: list[str], ball: np.ndarray | None, member
     for group, chosen in ((BOUNDARY, on_boundary & used), (INNER, ~on_boundary & used)):
         if chosen.any():
             rows.append(("nodes", group, int(chosen.sum()), None, None, None, total(ball, chosen)))
+    if parts.forces is not None:
+        groups = parts.forces.sections
     of_member = np.array(groups)
     names = dict.fromkeys(groups)
     for group in [*(name for name in (BOUNDARY, INNER) if name in names), *sorted(names.keys() - {BOUNDARY, INNER})]:
         chosen = of_member == group
         length, cut = (total(values / 1000.0, chosen) for values in (parts.length, parts.cut))
         rows.append(("members", group, int(chosen.sum()), length, cut, None, total(member, chosen)))
+    if parts.bolt is not None:
+        for size in np.unique(parts.bolt[parts.bolt > 0]).tolist():
+            count = 2 * int((parts.bolt == size).sum())
+            rows.append(("bolts", f"M{size} {parts.settings.bolts}", count, None, None, None, None))
     areas = _areas(parts)
     rows.append(("panels", "all", len(areas), None, None, float(areas.sum()), None))
     heads = (
@@ -264,4 +318,4 @@ def _quantities(parts: Parts, groups: list[str], ball: np.ndarray | None, member
         column(name, unit, values, summed=name == "mass")
         for (name, unit), values in zip(heads, zip(*rows, strict=True), strict=True)
     ]
-    return Schedule("Quantities", tuple(columns if ball is not None else columns[:-1]))
+    return Schedule("Quantities", tuple(columns if ball is not None or member is not None else columns[:-1]))

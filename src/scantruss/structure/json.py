@@ -110,6 +110,17 @@ def read_structure(path: str | Path) -> Truss:
     FormatError
         The file cannot be read, or it is not a structure of ours.
     """
+    return read_checked(path)[0]
+
+
+def read_checked(path: str | Path) -> tuple[Truss, tuple[np.ndarray, tuple[str, ...]] | None]:
+    """Read a structure, and the (M,) utilizations that it was saved with, their clauses and loads; None where it was not checked.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, or it is not a structure of ours.
+    """
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -123,7 +134,7 @@ def read_structure(path: str | Path) -> Truss:
     if values.get("format_version") != STRUCTURE_VERSION:
         raise FormatError(f"{path} has format_version {values.get('format_version')!r}, known is {STRUCTURE_VERSION}")
     try:
-        return _truss_of(values)
+        return _truss_of(values), _checked_of(values)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         words = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
         raise FormatError(f"{path} is a damaged structure: {words}; write it again with scantruss structure") from None
@@ -164,6 +175,16 @@ def _truss_of(values: dict[str, Any]) -> Truss:
         member_marks=marks[1],
         scale=float(values["scale"]),
     )
+
+
+def _checked_of(values: dict[str, Any]) -> tuple[np.ndarray, tuple[str, ...]] | None:
+    """Return what the results say of the checks; ValueError, TypeError or KeyError where it does not suit the members."""
+    if values.get("utilization") is None:
+        return None
+    used, governing = _array(values["utilization"], 1), tuple(map(str, values["governing"]))
+    if len(used) != len(values["members"]) or len(governing) != len(used):
+        raise ValueError("utilization and governing need a value for each member")
+    return used, governing
 
 
 def _array(rows: Any, columns: int, kind: type = float) -> np.ndarray:

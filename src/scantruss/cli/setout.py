@@ -1,0 +1,127 @@
+"""The command ``scantruss setout``: what is set out on site, and in which order members are put up."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import SUPPRESS, Namespace
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .outputs import claim, outs_of
+from .schedule import read_grid_or_structure
+
+if TYPE_CHECKING:
+    from ..setout.make import SettingOut
+    from ..setout.settings import Cut
+    from .options import Parser
+
+PROPS_NAMED = 8  # of a step
+
+
+def setout_parser() -> Parser:
+    """Options of ``scantruss setout``."""
+    from ..settings import UNITS
+    from .options import Parser, add_outs, number
+    from .positions import position
+
+    parser = Parser(
+        "setout",
+        "GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv|OUT.xlsx [OUT ...] [--supports WHERE] [options]",
+        "Set out a grid or a structure: supports, heights along sections, unrolled boundaries, a plan with marks, and the\n"
+        "assembly by rings from the supports, each step stable or with the nodes that need props.\n"
+        "Lengths that are not of the scan are millimetres of what is built.",
+    )
+    parser.add_argument("grid", metavar="GRID", help="grid or structure saved as .json by scantruss grid or structure")
+    add_outs(parser, "drawing .dxf or .pdf, tables .xlsx or .csv: the supports, the other tables beside it", "*")
+    units = "|".join(unit for unit in UNITS if unit)
+    for name, metavar, kind, said in (
+        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, line:NAME, N001, several joined by +"),
+        ("joints", "TYPE", str, "of a grid: rigid (default) or pinned, while it is put up"),
+        ("scale", "S", number, "of a grid: size of the structure over that of the grid (default 1)"),
+        ("unit", units, str, "unit of a grid that has none"),
+        ("origin", "X,Y,Z", position, "origin of the building frame in the scan (default: lowest corner)"),
+        ("rotation", "DEG", number, "from the scan's x axis to the building's, about z"),
+        ("spacing", "MM", number, "sections across x and y of the building frame, so far apart"),
+        ("paper", "A4|A3|A2|A1|A0", str, "size of the pages of a .pdf (default A3)"),
+    ):  # fmt: skip
+        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=SUPPRESS, help=said)
+    parser.add_argument(
+        "--section",
+        metavar="AXIS=MM",
+        type=plane,
+        action="append",
+        dest="sections",
+        default=SUPPRESS,
+        help="section of the building frame, such as x=2500; again for more (default: the middle of x and of y)",
+    )
+    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    return parser
+
+
+def plane(text: str) -> Cut:
+    """Return the axis and the place of "x=2500"."""
+    axis, _, place = text.partition("=")
+    try:
+        return axis.strip().lower(), float(place)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs an axis and a place in mm such as x=2500, got {text!r}") from None
+
+
+def make_setting_out(values: Namespace) -> None:
+    """Write the setting out of a saved grid or structure."""
+    from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether
+    from ..setout.files import check_setout_place, setout_paths, write_setting_out
+    from ..setout.make import set_out
+    from ..setout.settings import SetoutSettings
+    from ..structure.truss import Truss
+
+    outs = [check_setout_place(out) for out in outs_of(values)]
+    given = {spec.name: vars(values)[spec.name] for spec in fields(SetoutSettings) if spec.name in vars(values)}
+    if "sections" in given:
+        given["sections"] = tuple(given["sections"])
+    settings = SetoutSettings(**given)
+    if not Path(values.grid).exists():
+        raise InputError(
+            f"there is no file {values.grid}; setout needs a grid or structure saved as .json by scantruss"
+        )
+    taken = {Path(values.grid).resolve(): "grid"}
+    for out in outs:
+        for place in setout_paths(out):
+            claim(check_setout_place(place), "setting out", taken, force=values.force)
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        bars("read", 0.0)
+        what, _ = read_grid_or_structure(values.grid)
+        if isinstance(what, Truss) and (own := given.keys() & {"supports", "joints", "scale", "unit"}):
+            raise InputError(f"a structure has {min(own)} of its own; leave --{min(own)} out")
+        made = set_out(what, settings, keep_failed=values.keep_failed, progress=bars)
+        for number, out in enumerate(outs):
+            bars("write", number / len(outs))
+            write_setting_out(made, save.beside(out))
+    print_lines([*setout_lines(made), f"wrote {' '.join(map(str, outs))}"])
+
+
+def setout_lines(made: SettingOut) -> list[str]:
+    """Say what is set out, and which steps need props."""
+    count = int(made.held.any(axis=1).sum())
+    heights = sum(len(line.points) for line in made.section_lines)
+    lines = [
+        f"{count:,} supports, {heights:,} heights along {len(made.section_lines):,} sections,"
+        f" {len(made.boundaries):,} boundaries unrolled"
+    ]
+    loose = [(number, step.props) for number, step in enumerate(made.steps) if len(step.props)]
+    lines.append(
+        f"{len(made.steps):,} steps of assembly, {len(made.steps) - len(loose):,} of them stable by themselves"
+    )
+    before: list[int] = []
+    for number, props in loose:
+        if (now := props.tolist()) != before:
+            named = " ".join(made.node_marks[k] for k in now[:PROPS_NAMED])
+            more = f" and {len(now) - PROPS_NAMED:,} more" if len(now) > PROPS_NAMED else ""
+            lines.append(f"from step {number} on {len(now):,} props: {named}{more}")
+        before = now
+    if len(made.steps[-1].props):
+        lines.append("warning: the whole does not stand by itself; use more supports or rigid joints")
+    return lines

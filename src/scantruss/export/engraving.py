@@ -1,0 +1,50 @@
+"""Marks engraved on the balls of a printed model."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+MARK_WIDTH = 1.1  # width of a mark over the radius of its ball
+TALLEST = 0.6  # height of letters over the radius of the ball
+DEPTH = 0.08  # of the engraving where it is least deep, over the radius of the ball
+
+
+@cache
+def _letters(text: str) -> tuple[np.ndarray, ...]:
+    """Return the outlines of a text in letters of height 1, its middle at 0."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    path = TextPath((0, 0), text, size=1.0, prop=FontProperties(family="DejaVu Sans", weight="bold"))
+    polygons = [np.asarray(each)[:-1] for each in path.to_polygons()]
+    outlines = [each for each in polygons if len(each) > 2]
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return tuple((each - (low + high) / 2) / (high - low)[1] for each in outlines)
+
+
+def engraved(ball: Any, radius: float, text: str, normal: np.ndarray) -> Any:
+    """Return a ball around 0 with a text engraved where a normal (3,) leaves it, read from outside; up is as near to y or z as can be."""
+    from manifold3d import CrossSection, FillRule, Manifold
+
+    outlines = _letters(text)
+    wide = 2 * max(float(np.abs(each[:, 0]).max()) for each in outlines)
+    height = radius * min(MARK_WIDTH / wide, TALLEST)
+    reach = height * max(float(np.linalg.norm(each, axis=1).max()) for each in outlines)
+    floor = float(np.sqrt(radius**2 - reach**2)) - DEPTH * radius
+    flat = CrossSection([(each * height).tolist() for each in outlines], FillRule.EvenOdd)
+    letters = Manifold.extrude(flat, 2 * radius - floor).translate((0.0, 0.0, floor))
+    up = np.array([0.0, 1.0, 0.0] if abs(normal[2]) > 0.5 else [0.0, 0.0, 1.0])
+    x = np.cross(up, normal)
+    x /= np.linalg.norm(x)
+    turn = np.stack([x, np.cross(normal, x), normal, np.zeros(3)], axis=1)
+    return ball - letters.transform(turn)
+
+
+def letter_height(text: str, radius: float) -> float:
+    """Return how high the letters of a text on a ball are."""
+    wide = 2 * max(float(np.abs(each[:, 0]).max()) for each in _letters(text))
+    return radius * min(MARK_WIDTH / wide, TALLEST)

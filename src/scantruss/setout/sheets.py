@@ -1,0 +1,145 @@
+"""Drawings of a setting out: a plan, the sections and the unrolled boundaries, as lines and words in millimetres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .make import SettingOut
+
+MEMBER_LINES, BOUNDARY_LINES, SUPPORT_MARKS, NODE_MARKS, MEMBER_MARKS, SECTION_LINES, HEIGHT_LINES, GROUND_LINES = (
+    "MEMBERS", "BOUNDARY", "SUPPORTS", "NODE_MARKS", "MEMBER_MARKS", "SECTIONS", "HEIGHTS", "GROUND",
+)  # fmt: skip
+LAYERS = (
+    MEMBER_LINES,
+    BOUNDARY_LINES,
+    SUPPORT_MARKS,
+    NODE_MARKS,
+    MEMBER_MARKS,
+    SECTION_LINES,
+    HEIGHT_LINES,
+    GROUND_LINES,
+)
+BELOW, ROOM = 5.2, 20.0  # where heights are written, and room between rows, over the height of words
+WORD = 0.11  # height of marks over the median length of members, as they are seen in plan
+
+
+@dataclass(frozen=True, eq=False)
+class Words:
+    """Words on a drawing, their middle at `place`."""
+
+    layer: str
+    text: str
+    place: tuple[float, float]
+    angle: float = 0.0  #: [degree]
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """One drawing, true to size."""
+
+    title: str
+    lines: list[tuple[str, np.ndarray]]  #: layer and (K, 2) points
+    words: list[Words]
+    height: float  #: of the words
+
+    @property
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner, with room for the words."""
+        points = np.concatenate([line for _, line in self.lines])
+        return points.min(axis=0) - 10 * self.height, points.max(axis=0) + 5 * self.height
+
+
+def make_sheets(made: SettingOut) -> list[Sheet]:
+    """Return the plan, a sheet for each section and one for each boundary."""
+    flat = made.places[:, :2]
+    spans = np.linalg.norm(np.diff(flat[made.grid.edges], axis=1)[:, 0], axis=1)
+    height = WORD * float(np.median(spans))
+    return [
+        _plan(made, height),
+        *(_section(made, number, height) for number in range(len(made.section_lines))),
+        *(_unrolled(made, number, height) for number in range(len(made.boundaries))),
+    ]
+
+
+def _plan(made: SettingOut, height: float) -> Sheet:
+    flat, edges = made.places[:, :2], made.grid.edges
+    on_boundary = made.grid.edge_triangles[:, 1] < 0
+    lines = [
+        (BOUNDARY_LINES if outer else MEMBER_LINES, flat[edge])
+        for edge, outer in zip(edges, on_boundary.tolist(), strict=True)
+    ]
+    lines += [(SUPPORT_MARKS, _diamond(flat[node], height)) for node in np.flatnonzero(made.held.any(axis=1))]
+    low, high = flat[np.unique(edges)].min(axis=0) - 3 * height, flat[np.unique(edges)].max(axis=0) + 3 * height
+    words = []
+    for section in made.section_lines:
+        ends = np.array([low, high])
+        ends[:, section.axis] = section.place
+        lines.append((SECTION_LINES, ends))
+        words.append(Words(SECTION_LINES, section.name, (float(ends[1, 0]), float(ends[1, 1]))))
+    used = np.unique(edges)
+    words += [
+        Words(NODE_MARKS, made.node_marks[k], (x, y + 0.9 * height))
+        for k, (x, y) in zip(used.tolist(), flat[used].tolist(), strict=True)
+    ]
+    for mark, (a, b) in zip(made.member_marks, flat[edges], strict=True):
+        x, y = ((a + b) / 2).tolist()
+        angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+        words.append(Words(MEMBER_MARKS, mark, (x, y), (angle + 90.0) % 180.0 - 90.0))
+    return Sheet("Plan", lines, words, height)
+
+
+def _section(made: SettingOut, number: int, height: float) -> Sheet:
+    line = made.section_lines[number]
+    flat = [1 - line.axis, 2]
+    ground = float(made.places[np.unique(made.grid.edges), 2].min())
+    lines = [(MEMBER_LINES, segment[:, flat]) for segment in line.segments]
+    lines.append((GROUND_LINES, np.array([(line.flat[0, 0], ground), (line.flat[-1, 0], ground)])))
+    words = []
+    for (x, z), node, member in zip(line.flat.tolist(), line.nodes.tolist(), line.members.tolist(), strict=True):
+        lines.append((HEIGHT_LINES, np.array([(x, ground), (x, z)])))
+        mark = made.node_marks[node] if node >= 0 else made.member_marks[member]
+        words.append(Words(NODE_MARKS if node >= 0 else MEMBER_MARKS, mark, (x, z + 2.2 * height), 90.0))
+        words.append(Words(HEIGHT_LINES, f"{x:.0f} / {z:.0f}", (x, ground - BELOW * height), 90.0))
+    return Sheet(f"Section {line.name}", _with_room(lines, height), words, height)
+
+
+def _unrolled(made: SettingOut, number: int, height: float) -> Sheet:
+    """Return the boundary in rows no longer than the plan, each beginning at the node that ends the one before."""
+    each = made.boundaries[number]
+    ground, used = float(each.height.min()), np.unique(made.grid.edges)
+    longest = max(float(np.ptp(made.places[used, :2], axis=0).max()), float(np.diff(each.along).max()))
+    down = float(np.ptp(each.height)) + ROOM * height
+    nodes = np.append(each.nodes, each.nodes[0])
+    lines: list[tuple[str, np.ndarray]] = []
+    words: list[Words] = []
+    begin, row = 0, 0
+    while begin < len(nodes) - 1:  # a row takes one member at least
+        end = int(np.searchsorted(each.along, each.along[begin] + longest * (1 + 1e-9), "right"))
+        shift = np.array([each.along[begin], ground + row * down])
+        flat = np.stack([each.along, each.height], axis=1)[begin:end] - shift
+        low = -row * down
+        lines += [(BOUNDARY_LINES, flat), (GROUND_LINES, np.array([(0.0, low), (float(flat[-1, 0]), low)]))]
+        for node, (x, z), along, true in zip(
+            nodes[begin:end].tolist(), flat.tolist(), each.along[begin:end], each.height[begin:end], strict=True
+        ):
+            lines.append((HEIGHT_LINES, np.array([(x, low), (x, z)])))
+            words.append(Words(NODE_MARKS, made.node_marks[node], (x, z + 2.2 * height), 90.0))
+            words.append(Words(HEIGHT_LINES, f"{along:.0f} / {true:.0f}", (x, low - BELOW * height), 90.0))
+            if made.held[node].any():
+                lines.append((SUPPORT_MARKS, _diamond(np.array([x, z]), height)))
+        begin, row = end - 1, row + 1
+    return Sheet(f"Boundary {number + 1}, unrolled", _with_room(lines, height), words, height)
+
+
+def _with_room(lines: list[tuple[str, np.ndarray]], height: float) -> list[tuple[str, np.ndarray]]:
+    """Return lines of which none has no length: heights of nodes on the ground."""
+    return [(layer, line) for layer, line in lines if np.ptp(line, axis=0).max() > 1e-3 * height]
+
+
+def _diamond(place: np.ndarray, height: float) -> np.ndarray:
+    """Return a closed mark around a support."""
+    return place[:2] + 0.7 * height * np.array([(1, 0), (0, 1), (-1, 0), (0, -1), (1, 0)])
