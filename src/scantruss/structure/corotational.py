@@ -68,11 +68,27 @@ class Response:
     tangents: np.ndarray | None  #: (M, 2 d, 2 d) derivative of the forces
     natural: np.ndarray  #: (M, r) forces that belong to the natural deformations
     strained: np.ndarray  #: (M, 2 d) derivative of the forces by a factor on the initial strain
+    stiffness: np.ndarray  #: (M, r, r) derivative of the natural forces by the natural deformations
+    slope: np.ndarray  #: (M, r, 9) derivative of those by the chord and the turns of both ends, or (M, 1, 3) by the chord
     too_far: bool  #: an end turned too far against its chord; the other values are not to be used
+
+    def foresee(self, step: np.ndarray) -> np.ndarray:
+        """Return the (M, r) natural forces after small displacements (M, 2 d) of the ends, by the derivatives here."""
+        width = step.shape[1] // 2
+        chord = step[:, width : width + 3] - step[:, :3]
+        ways = chord if width == 3 else np.concatenate([chord, step[:, 3:6], step[:, 9:]], axis=1)
+        return self.natural + _times(self.stiffness, _times(self.slope, ways))
 
 
 def respond(
-    members: Members, moves: np.ndarray, turns: np.ndarray, strain: np.ndarray, factor: float, *, tangents: bool = False
+    members: Members,
+    moves: np.ndarray,
+    turns: np.ndarray,
+    strain: np.ndarray,
+    factor: float,
+    *,
+    foreseen: np.ndarray | None = None,
+    tangents: bool = False,
 ) -> Response:
     """Return forces and tangents of the members.
 
@@ -87,6 +103,9 @@ def respond(
         Strain that needs no force.
     factor : float
         By which it is there.
+    foreseen : (M, r) array, optional
+        Natural forces for the tangents, in place of those of the displacements. On the way to equilibrium displacements stretch stiff
+        members far; forces that follow from the step before spoil no tangent (Magisano, Leonetti and Garcea 2017).
     tangents : bool
         Whether they are wanted.
     """
@@ -99,7 +118,7 @@ def respond(
     longer = (moved * (2 * members.chords + moved)).sum(axis=1) / (length + members.lengths)
     plane = (np.eye(3) - along[:, :, None] * along[:, None, :]) / length[:, None, None]
     if members.bending.shape[1] == 1:
-        return _bars(members, longer, along, plane, strain, factor)
+        return _bars(members, longer, along, plane, strain, factor, foreseen)
     first, second = (members.axes @ turns[each].transpose(0, 2, 1) for each in (start, end))
     ends = _End.of(first, along, length), _End.of(second, along, length)
     twist = (np.cross(first[:, 2], second[:, 1]) - np.cross(first[:, 1], second[:, 2])) / 2
@@ -122,15 +141,16 @@ def respond(
     share[:, LENGTHEN] = 1 / members.lengths
     stiff = (members.axial * members.lengths)[:, None]
     answers = _times(members.bending, natural) + (force * members.lengths)[:, None] * share
+    known = answers if foreseen is None else foreseen
+    within = members.bending + (known[:, LENGTHEN] * members.lengths)[:, None, None] * members.bow
+    within += stiff[:, :, None] * share[:, :, None] * share[:, None, :]
     hessian = None
     if tangents:
-        within = members.bending + (force * members.lengths)[:, None, None] * members.bow
-        within += stiff[:, :, None] * share[:, :, None] * share[:, None, :]
         hessian = slope.transpose(0, 2, 1) @ within @ slope
-        hessian[:, :3, :3] += answers[:, LENGTHEN, None, None] * plane
-        _add_twist(hessian, answers[:, TWIST], first, second)
+        hessian[:, :3, :3] += known[:, LENGTHEN, None, None] * plane
+        _add_twist(hessian, known[:, TWIST], first, second)
         for number, each in enumerate(ends):
-            each.add_bending(hessian, number, answers[:, [BEND_Y1 + number, BEND_Z1 + number]], plane, along, length)
+            each.add_bending(hessian, number, known[:, [BEND_Y1 + number, BEND_Z1 + number]], plane, along, length)
         hessian = hessian.take(_ENDS, axis=1).take(_ENDS, axis=2)
         hessian *= _SIGNS[:, None] * _SIGNS
     back = slope.transpose(0, 2, 1)
@@ -139,23 +159,34 @@ def respond(
         tangents=hessian,
         natural=answers,
         strained=_times(back, -(stiff[:, 0] * strain)[:, None] * share)[:, _ENDS] * _SIGNS,
+        stiffness=within,
+        slope=slope,
         too_far=bool(min(each.cosine.min() for each in ends) < FARTHEST_TURN),
     )
 
 
 def _bars(
-    members: Members, longer: np.ndarray, along: np.ndarray, plane: np.ndarray, strain: np.ndarray, factor: float
+    members: Members,
+    longer: np.ndarray,
+    along: np.ndarray,
+    plane: np.ndarray,
+    strain: np.ndarray,
+    factor: float,
+    foreseen: np.ndarray | None,
 ) -> Response:
     """Return what members answer that carry axial forces only."""
     force = members.axial * (longer / members.lengths - factor * strain)
-    block = (members.axial / members.lengths)[:, None, None] * along[:, :, None] * along[:, None, :]
-    block = block + force[:, None, None] * plane
+    known = force if foreseen is None else foreseen[:, 0]
+    stiff = (members.axial / members.lengths)[:, None, None]
+    block = stiff * along[:, :, None] * along[:, None, :] + known[:, None, None] * plane
     both = np.concatenate([-along, along], axis=1)
     return Response(
         forces=force[:, None] * both,
         tangents=np.tile(block, (1, 2, 2)) * np.kron([[1, -1], [-1, 1]], np.ones((3, 3))),
         natural=force[:, None],
         strained=-(members.axial * strain)[:, None] * both,
+        stiffness=stiff,
+        slope=along[:, None, :],
         too_far=False,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -109,9 +110,16 @@ class Equilibrium:
             turns = 1.5 * turns - 0.5 * turns @ turns.transpose(0, 2, 1) @ turns  # as round-off does not let them be
         return State(state.moves + each[:, :3] + more * self.settled, turns, state.factor + more)
 
-    def respond(self, state: State, *, tangents: bool = False) -> Response:
+    def respond(self, state: State, *, foreseen: np.ndarray | None = None, tangents: bool = False) -> Response:
         """Return what the members answer."""
-        return respond(self.members, state.moves, state.turns, self.strain, state.factor, tangents=tangents)
+        given = self.members, state.moves, state.turns, self.strain, state.factor
+        return respond(*given, foreseen=foreseen, tangents=tangents)
+
+    def foresee(self, response: Response, step: np.ndarray) -> np.ndarray:
+        """Return the (M, r) natural forces after a step (F,) from a response, by its derivatives."""
+        every = np.zeros(self.count)
+        every[self.free] = step
+        return response.foresee(every[self.rows])
 
     def unbalanced(self, state: State, response: Response) -> np.ndarray:
         """Return the loads less the forces of members and springs, on all displacements; at supports less the reactions."""
@@ -128,12 +136,11 @@ class Equilibrium:
 
     def error(self, state: State, response: Response, unbalanced: np.ndarray) -> float:
         """Return what is unbalanced on free displacements, over the size of loads, reactions and forces; moments count over an arm."""
-        left = unbalanced.copy()
-        free = float(np.linalg.norm(left[self.free] / self.weights))
-        left[self.free] = 0.0
-        sizes = (np.linalg.norm(each / self.arms) for each in (state.factor * self.loads, left))
-        size = max(*map(float, sizes), float(np.abs(response.natural[:, 0]).max()))
-        return free / size if size else 0.0
+        left = np.square(unbalanced / self.arms)
+        free = float(left[self.free].sum())
+        others = float(left.sum()) - free, float(np.square(state.factor * self.loads / self.arms).sum())
+        size = max(math.sqrt(max(*others, 0.0)), float(np.abs(response.natural[:, 0]).max()))
+        return math.sqrt(free) / size if size else 0.0
 
     def tangent(self, response: Response) -> Tangent:
         """Return the factored tangent of a response with tangents."""

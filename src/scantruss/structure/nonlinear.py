@@ -14,9 +14,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..runtime.progress import Progress
+from .corotational import Response
 from .equilibrium import Equilibrium, State, Tangent
 from .imperfections import Imperfection, imperfection_of
-from .modes import buckling_modes, worst_buckling
+from .modes import Modes, buckling_modes, worst_buckling
 from .statics import Factored, factor_stiffness, solve
 from .truss import LoadCase, Truss
 
@@ -27,15 +28,17 @@ MULTIPLE = 2.0  #: of the linear buckling factor, at which a path ends that stay
 NO_BUCKLING = 10.0  #: load factor at which a path ends that stays stable where linear theory does not buckle
 BALANCED = 1e-9  #: error of equilibrium at which a step has converged
 ITERATIONS = 25  #: of a step at most
-WANTED_WORK = 12  #: iterations of a step, and two more for each tangent; more make the next shorter
+WANTED_WORK = 12  #: iterations of a step, and four more for each tangent; more make the next shorter
 SMOOTH = (0.8, 0.5)  #: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
 SMOOTH_CUTS = 5  #: halvings of a step for that
 TANGENTS = 6  #: factored within a step at most
+ROUGH = 0.2  #: error of a first guess above which the tangent of the state before is of no use
 SLOW = 0.2  #: share of the error left by an iteration, above which a new tangent is factored
 GROWTH = (0.5, 1.5)  #: of the arc length from step to step
 CUTS = 10  #: halvings of a step, after which a path ends
 REFINEMENTS = 14  #: of the place where stability is lost
-CRITICAL = 1e-4  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
+CRITICAL = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
+NEARLY_SAME = (0.05, 1e-5)  #: or the share of the arc length with a relative distance of load factors
 FLAT = 0.05  #: rise of the load with the arc length, over that a step before, below which the place is a limit point
 SAME_FACTOR = 1e-7  #: relative distance of load factors that are one
 
@@ -83,6 +86,7 @@ def solve_path(
     load: str = "",
     *,
     imperfection: str | np.ndarray = "mode",
+    buckling: Modes | None = None,
     steps: int = STEPS,
     stop_factor: float | None = None,
     beyond: int = BEYOND,
@@ -103,6 +107,8 @@ def solve_path(
     imperfection : str or (V, 3) array
         mode (the lowest linear buckling mode, its greatest displacement span/300), mode:30mm, scan (the grid against its fair
         surface), scan:30mm, none; or displacements of the nodes [m].
+    buckling : Modes, optional
+        Linear buckling of the structure, where it is known already; `load` is theirs then.
     steps : int
         At most; more where stability is lost is looked for are not counted.
     stop_factor : float, optional
@@ -128,8 +134,7 @@ def solve_path(
     factored = factor_stiffness(truss)
     if factored.factor is None:
         raise InputError("every node is held: there is no path of what cannot move")
-    solution = solve(truss, factored)
-    modes = buckling_modes(factored, solution[load], 1) if load else worst_buckling(factored, solution, 1)
+    modes = buckling or _first_mode(factored, load)
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)
     last = stop_factor or (MULTIPLE * linear if linear else NO_BUCKLING)
@@ -147,6 +152,12 @@ def solve_path(
             found = now
     assert found is not None
     return found
+
+
+def _first_mode(factored: Factored, load: str) -> Modes:
+    """Return the lowest linear buckling mode of a load, or of that which buckles first."""
+    solution = solve(factored.truss, factored)
+    return buckling_modes(factored, solution[load], 1) if load else worst_buckling(factored, solution, 1)
 
 
 def combined_case(truss: Truss, name: str) -> LoadCase:
@@ -241,13 +252,13 @@ class _Walk:
         self.negative.append(place.tangent.negative)
 
     def _norm(self, step: np.ndarray) -> float:
-        return float(np.linalg.norm(step * self.balance.weights))
+        return math.sqrt(float(np.square(step * self.balance.weights).sum()))
 
     def _place(self, state: State) -> _Place:
         """Return a state of equilibrium with its tangent."""
         response = self.balance.respond(state, tangents=True)
         tangent = self.balance.tangent(response)
-        return _Place(state, tangent, tangent.solve(self.balance.direction(response)))
+        return _Place(state, response, tangent, tangent.solve(self.balance.direction(response)))
 
     def _step(
         self, here: _Place, back: np.ndarray, arc: float, to: float | None = None
@@ -257,12 +268,13 @@ class _Walk:
         scale = balance.weights**2
         ahead = float(back @ (scale * towards))
         more = math.copysign(arc / self._norm(towards), ahead) if to is None else to - here.state.factor
-        taken, state, before = more * towards, here.state, math.inf
+        taken, state, before = more * towards, here.state, ROUGH / SLOW
         first = step = taken
-        fresh = 0
+        response, fresh = here.response, 0
         for iteration in range(1, ITERATIONS + 1):
+            foreseen = balance.foresee(response, step)
             state = balance.moved(state, step, more)
-            response = balance.respond(state)
+            response = balance.respond(state, foreseen=foreseen)
             if response.too_far or not np.isfinite(response.forces).all():
                 return None
             left = balance.unbalanced(state, response)
@@ -270,12 +282,12 @@ class _Walk:
             if error <= BALANCED:
                 if to is None and taken @ (scale * first) <= 0:  # it has turned back
                     return None
-                return self._place(state), taken, iteration + 2 * fresh
+                return self._place(state), taken, iteration + 4 * fresh
             if error > SLOW * before:
                 if fresh == TANGENTS:
                     return None
                 fresh += 1
-                response = balance.respond(state, tangents=True)
+                response = balance.respond(state, foreseen=foreseen, tangents=True)
                 tangent = balance.tangent(response)
                 towards = tangent.solve(balance.direction(response))
             before = error
@@ -306,7 +318,7 @@ class _Walk:
         """Keep the last stable state between two, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois)."""
         low, high = 0.0, arc
         value = start = here.tangent.smallest
-        beyond = there.tangent.smallest
+        beyond, beyond_factor = there.tangent.smallest, there.state.factor
         last = here
         kept: bool | None = None
         for _ in range(REFINEMENTS):
@@ -323,10 +335,11 @@ class _Walk:
                 low, last, value = middle, found[0], found[0].tangent.smallest
                 beyond /= 2 if stable is kept else 1
             else:
-                high, beyond = middle, found[0].tangent.smallest
+                high, beyond, beyond_factor = middle, found[0].tangent.smallest, found[0].state.factor
                 value /= 2 if stable is kept else 1
             kept = stable
-            if last.tangent.smallest < CRITICAL * start or high - low < CRITICAL * arc:
+            near = abs(beyond_factor - last.state.factor) < NEARLY_SAME[1] * abs(last.state.factor)
+            if last.tangent.smallest < CRITICAL * start or high - low < (NEARLY_SAME[0] if near else CRITICAL) * arc:
                 break
         if last is not here:
             self._keep(last)
@@ -340,5 +353,6 @@ class _Place:
     """A state of equilibrium, and where the path goes from there."""
 
     state: State
+    response: Response
     tangent: Tangent
     towards: np.ndarray  # (F,) displacements for a load factor of 1
