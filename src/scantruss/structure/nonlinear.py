@@ -39,7 +39,6 @@ CUTS = 10  #: halvings of a step, after which a path ends
 REFINEMENTS = 14  #: of the place where stability is lost
 CRITICAL = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
 NEARLY_SAME = (0.05, 1e-5)  #: or the share of the arc length with a relative distance of load factors
-FLAT = 0.05  #: rise of the load with the arc length, over that a step before, below which the place is a limit point
 SAME_FACTOR = 1e-7  #: relative distance of load factors that are one
 
 
@@ -210,7 +209,7 @@ class _Walk:
             if there.tangent.negative == 0 and there.state.factor >= self.end:
                 there = self._at_factor(here, taken, there)
             elif self.critical is None and there.tangent.negative:
-                self._find_critical(here, back, arc, there)
+                self._find_critical(here, back, arc, there, taken)
             self._keep(there)
             if self.progress is not None:
                 self.progress("path", done / self.steps)
@@ -299,6 +298,10 @@ class _Walk:
             taken = taken + step
         return None
 
+    def _falls(self, place: _Place, taken: np.ndarray) -> bool:
+        """Whether the load falls as the path goes on."""
+        return float(taken @ (self.balance.weights**2 * place.towards)) < 0
+
     def _is_smooth(self, here: _Place, step: tuple[_Place, np.ndarray, int]) -> bool:
         """Whether a step follows the path closely: it goes on as it began, and the stiffness (Bergan 1980) changes little."""
         there, taken, _ = step
@@ -314,11 +317,13 @@ class _Walk:
         found = self._step(here, taken, 0.0, self.end)
         return there if found is None or found[0].tangent.negative else found[0]
 
-    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, there: _Place) -> None:
+    def _find_critical(
+        self, here: _Place, back: np.ndarray, arc: float, there: _Place, taken: np.ndarray
+    ) -> None:
         """Keep the last stable state between two, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois)."""
         low, high = 0.0, arc
         value = start = here.tangent.smallest
-        beyond, beyond_factor = there.tangent.smallest, there.state.factor
+        beyond, beyond_factor, falls = there.tangent.smallest, there.state.factor, self._falls(there, taken)
         last = here
         kept: bool | None = None
         for _ in range(REFINEMENTS):
@@ -336,6 +341,7 @@ class _Walk:
                 beyond /= 2 if stable is kept else 1
             else:
                 high, beyond, beyond_factor = middle, found[0].tangent.smallest, found[0].state.factor
+                falls = self._falls(found[0], found[1])
                 value /= 2 if stable is kept else 1
             kept = stable
             near = abs(beyond_factor - last.state.factor) < NEARLY_SAME[1] * abs(last.state.factor)
@@ -344,8 +350,7 @@ class _Walk:
         if last is not here:
             self._keep(last)
         self.critical = len(self.states) - 1
-        flat = self._norm(here.towards) < FLAT * self._norm(last.towards)
-        self.kind = "limit point" if flat else "bifurcation"
+        self.kind = "limit point" if falls else "bifurcation"
 
 
 @dataclass(frozen=True, eq=False)
