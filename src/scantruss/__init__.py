@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .schedules.settings import ScheduleSettings as ScheduleSettings
     from .settings import Settings as Settings
     from .structure.json import read_structure as read_structure
+    from .structure.nonlinear import solve_path as solve_path
     from .structure.statics import solve as solve
     from .structure.truss import Truss as Truss
     from .surface.samples import sample_surface as sample_surface
@@ -75,7 +76,7 @@ _HOMES = {
     "print_model": "export.solid",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",
     "Schedule": "schedules.records", "Schedules": "schedules.records",
-    "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
+    "Truss": "structure.truss", "solve": "structure.statics", "solve_path": "structure.nonlinear", "read_structure": "structure.json",
 }  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])

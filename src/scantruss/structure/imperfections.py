@@ -61,10 +61,7 @@ def imperfection_of(truss: Truss, wanted: str | np.ndarray, modes: Modes) -> Ite
             raise InputError(f"an imperfection is {len(truss.nodes):,} displacements of nodes, got {moves.shape}")
         yield Imperfection("given", truss.nodes, moves)
         return
-    kind, _, words = wanted.partition(":")
-    size = quantity(words, LENGTH, "the largest imperfection") if words else None
-    if kind not in ("mode", "scan", "none") or (kind == "none" and size) or (size is not None and size <= 0):
-        raise InputError(f"an imperfection is {IMPERFECTIONS}, got {wanted!r}")
+    kind, size = check_imperfection(wanted)
     if kind == "scan":
         deviation = fair_deviation(truss)
         most = float(np.linalg.norm(deviation, axis=1).max())
@@ -77,6 +74,21 @@ def imperfection_of(truss: Truss, wanted: str | np.ndarray, modes: Modes) -> Ite
             yield Imperfection("mode", truss.nodes, sign * amplitude * shape)
     else:
         yield Imperfection("none", truss.nodes, np.zeros_like(truss.nodes))
+
+
+def check_imperfection(wanted: str) -> tuple[str, float | None]:
+    """Return the kind of an imperfection and its size, where one is given [m].
+
+    Raises
+    ------
+    InputError
+        The words are not understood.
+    """
+    kind, colon, words = wanted.partition(":")
+    size = quantity(words, LENGTH, "the largest imperfection") if colon else None
+    if kind not in ("mode", "scan", "none") or (kind == "none" and colon) or (size is not None and size <= 0):
+        raise InputError(f"an imperfection is {IMPERFECTIONS}, got {wanted!r}")
+    return kind, size
 
 
 def fair_deviation(truss: Truss) -> np.ndarray:

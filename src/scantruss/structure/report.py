@@ -11,6 +11,8 @@ import numpy as np
 
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .modes import Modes
+from .nonlinear import Path
+from .path_report import path_figures, path_warnings, path_words
 from .statics import CaseResult, Solution
 from .truss import Truss
 
@@ -42,6 +44,7 @@ class StructureReport:
     warnings: tuple[str, ...]
     buckling: Modes | None = None  #: of the combination that buckles first, where it was asked for
     vibration: Modes | None = None  #: where it was asked for
+    path: Path | None = None  #: where it was asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -71,6 +74,8 @@ class StructureReport:
             values["buckling_case"] = self.buckling.of
         if self.vibration is not None:
             values["frequencies"] = self.vibration.values.tolist()
+        if self.path is not None:
+            values |= path_figures(self.path)
         return values
 
 
@@ -81,6 +86,7 @@ def report_structure(
     *,
     buckling: Modes | None = None,
     vibration: Modes | None = None,
+    path: Path | None = None,
 ) -> StructureReport:
     """Return the figures of all load cases and combinations, the checks of the members, and warnings.
 
@@ -94,6 +100,8 @@ def report_structure(
         Warnings of whoever made the structure.
     buckling, vibration : Modes, optional
         Of `worst_buckling` and `vibration_modes`.
+    path : Path, optional
+        Of `solve_path`.
     """
     truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)
@@ -125,6 +133,7 @@ def report_structure(
             f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
             " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
         )
+    said += path_warnings(path) if path is not None else []
     return StructureReport(
         truss=truss,
         cases=tuple(figures),
@@ -133,6 +142,7 @@ def report_structure(
         warnings=tuple(said),
         buckling=buckling,
         vibration=vibration,
+        path=path,
     )
 
 
@@ -206,6 +216,8 @@ def mode_lines(report: StructureReport) -> list[str]:
         )
     if report.vibration is not None:
         said.append("natural frequencies: " + ", ".join(f"{value:.4g}" for value in report.vibration.values) + " Hz")
+    if report.path is not None:
+        said.append(path_words(report.path))
     return said
 
 
