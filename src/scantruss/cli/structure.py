@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from .options import Parser
 
 STRUCTURE_SUFFIXES = (".json",)
-NOT_OF_GRID = ("checks", "size", "buckling", "frequencies", "path", "path_steps", "path_factor", "imperfection")  #: settings that the structure itself does not depend on
+NOT_OF_GRID = (  #: settings that the structure itself does not depend on
+    "checks", "size", "buckling", "frequencies", "path", "path_steps", "path_factor", "imperfection",
+)  # fmt: skip
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),

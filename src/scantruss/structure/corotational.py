@@ -34,7 +34,9 @@ class Members:
     lengths: np.ndarray  #: (M,) [m]
     axes: np.ndarray  #: (M, 3, 3) local axes as rows
     axial: np.ndarray  #: (M,) E A [N]
-    bending: np.ndarray  #: (M, 6, 6) stiffness against natural deformations but lengthening; (M, 1, 1) of 0 of a pinned structure
+    bending: (
+        np.ndarray
+    )  #: (M, 6, 6) stiffness against natural deformations but lengthening; (M, 1, 1) of 0 of a pinned structure
     bow: np.ndarray  #: (M, 6, 6) mean shortening by them
 
     @classmethod
@@ -69,7 +71,9 @@ class Response:
     natural: np.ndarray  #: (M, r) forces that belong to the natural deformations
     strained: np.ndarray  #: (M, 2 d) derivative of the forces by a factor on the initial strain
     stiffness: np.ndarray  #: (M, r, r) derivative of the natural forces by the natural deformations
-    slope: np.ndarray  #: (M, r, 9) derivative of those by the chord and the turns of both ends, or (M, 1, 3) by the chord
+    slope: (
+        np.ndarray
+    )  #: (M, r, 9) derivative of those by the chord and the turns of both ends, or (M, 1, 3) by the chord
     too_far: bool  #: an end turned too far against its chord; the other values are not to be used
 
     def foresee(self, step: np.ndarray) -> np.ndarray:
@@ -235,7 +239,9 @@ class _End:
         mixed = more[:, None, None] * slope[0][:, :, None] * slope[1][:, None, :]
         block = mixed + mixed.transpose(0, 2, 1)
         block += (most * sine)[:, None, None] * slope[0][:, :, None] * slope[0][:, None, :]
-        vector = (more * sine)[:, None] * axis + ratio[:, None] * across  # its product with the chord has these second derivatives
+        vector = (more * sine)[:, None] * axis + ratio[
+            :, None
+        ] * across  # its product with the chord has these second derivatives
         product = _dot(vector, along)
         flat = vector - product[:, None] * along
         outer = flat[:, :, None] * along[:, None, :]

@@ -89,7 +89,9 @@ class Equilibrium:
         diagonal = np.arange(count) * (count + 1)
         found, place = np.unique(np.concatenate([keys, diagonal]), return_inverse=True)
         self._diagonal = place[len(keys) :]
-        self._place = np.full(kept.shape, len(found))  # of each value of the members' tangents; those of supports come last
+        self._place = np.full(
+            kept.shape, len(found)
+        )  # of each value of the members' tangents; those of supports come last
         self._place[kept] = place[: len(keys)]
         column, self._row = np.divmod(found, count)
         self._first = np.searchsorted(column, np.arange(count + 1))

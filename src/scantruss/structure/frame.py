@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from .truss import LoadCase, Truss
 
 LENGTHEN, TWIST, BEND_Y1, BEND_Y2, BEND_Z1, BEND_Z2 = range(6)  #: rows of the natural deformations
-BOW = np.array([[4.0, -1.0], [-1.0, 4.0]]) / 30  #: by which turns t of both ends shorten a bent member, t BOW t / 2 of its length
+BOW = (
+    np.array([[4.0, -1.0], [-1.0, 4.0]]) / 30
+)  #: by which turns t of both ends shorten a bent member, t BOW t / 2 of its length
 
 
 def freedoms(truss: Truss) -> int:

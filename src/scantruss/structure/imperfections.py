@@ -15,7 +15,7 @@ from .quantities import LENGTH, quantity
 from .truss import Truss
 
 SPAN_OVER = 300.0  #: span over the amplitude of a mode
-FAIR_RINGS = 4  #: members on the way to the nodes that a quadric is fitted to
+FAIR_RINGS = 3  #: members on the way to the nodes that a quadric is fitted to
 FEWEST_FOR_QUADRIC = 9  #: nodes that a quadric, of six coefficients, is fitted to
 IMPERFECTIONS = "mode, mode:30mm, scan, scan:30mm or none"
 

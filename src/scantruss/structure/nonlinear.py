@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -167,7 +168,7 @@ def combined_case(truss: Truss, name: str) -> LoadCase:
     factors = next((each.factors for each in truss.combinations if each.name == name), None)
     if factors is None or any(case not in cases for case, _ in factors):
         raise InputError(f"no load case or combination {name!r}; there are {', '.join(cases)}")
-    sums: dict[str, np.ndarray] = {}
+    sums: dict[str, Any] = {}
     for case, factor in factors:
         for part in ("nodal", "line", "temperature", "strain", "settlement"):
             if (value := getattr(cases[case], part)) is not None:
@@ -238,7 +239,9 @@ class _Walk:
             displacements=np.stack([state.displacements for state in self.states]),
             reactions=np.stack([balance.reactions(state, answer) for state, answer in pairs]),
             axial=np.stack([answer.natural[:, 0] for answer in answers]),
-            equilibrium_errors=np.array([0.0] + [balance.error(*pair, balance.unbalanced(*pair)) for pair in pairs[1:]]),
+            equilibrium_errors=np.array(
+                [0.0] + [balance.error(*pair, balance.unbalanced(*pair)) for pair in pairs[1:]]
+            ),
             negative_pivots=np.array(self.negative),
             critical=self.critical,
             kind=self.kind,
@@ -317,9 +320,7 @@ class _Walk:
         found = self._step(here, taken, 0.0, self.end)
         return there if found is None or found[0].tangent.negative else found[0]
 
-    def _find_critical(
-        self, here: _Place, back: np.ndarray, arc: float, there: _Place, taken: np.ndarray
-    ) -> None:
+    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, there: _Place, taken: np.ndarray) -> None:
         """Keep the last stable state between two, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois)."""
         low, high = 0.0, arc
         value = start = here.tangent.smallest

@@ -18,7 +18,15 @@ from .truss import Combination
 
 MOST_STEPS = 1000  #: of a nonlinear path
 MOST_MODES = 50  #: of buckling or vibration
-NUMBERS = ("scale", "node_allowance", "size", "buckling", "frequencies", "path_steps", "path_factor")  #: settings that are numbers
+NUMBERS = (
+    "scale",
+    "node_allowance",
+    "size",
+    "buckling",
+    "frequencies",
+    "path_steps",
+    "path_factor",
+)  #: settings that are numbers
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,9 @@ def path_words(path: Path) -> str:
     linear = "" if path.linear_factor is None else f", linear buckling at {path.linear_factor:.4g}"
     if path.limit_factor is None:
         return f"nonlinear path of {path.name}{bent}: stable up to the factor {path.factors.max():.4g}{linear}; {path.ended}"
-    return f"nonlinear path of {path.name}{bent}: {path.kind} at the factor {path.limit_factor:.4g}{linear}; {path.ended}"
+    return (
+        f"nonlinear path of {path.name}{bent}: {path.kind} at the factor {path.limit_factor:.4g}{linear}; {path.ended}"
+    )
 
 
 def path_warnings(path: Path) -> list[str]:
@@ -55,7 +57,9 @@ def path_warnings(path: Path) -> list[str]:
             " imperfection, such as mode"
         )
     if path.limit_factor is not None and path.limit_factor < 1:
-        said.append(f"the structure does not carry {path.name}: it loses its stability at {path.limit_factor:.3g} times it")
+        said.append(
+            f"the structure does not carry {path.name}: it loses its stability at {path.limit_factor:.3g} times it"
+        )
     if path.limit_factor is None and "reached" not in path.ended:
         said.append(f"the path found no limit: {path.ended}")
     return said
@@ -90,7 +94,9 @@ def encode_path(path: Path) -> bytes:
         axes.annotate(words, (moves[end - 1], path.factors[end - 1]), (0, 10), textcoords="offset points", ha="center")
     axes.set_xlabel(f"displacement of {path.truss.node_marks[path.node]} [mm]")
     axes.set_ylabel("load factor")
-    axes.set_title(f"{path.name}; imperfection: {path.imperfection.kind}, {1e3 * path.imperfection.largest:.3g} mm", fontsize=10)
+    axes.set_title(
+        f"{path.name}; imperfection: {path.imperfection.kind}, {1e3 * path.imperfection.largest:.3g} mm", fontsize=10
+    )
     axes.margins(y=0.12)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=9)
