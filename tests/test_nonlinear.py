@@ -131,11 +131,11 @@ def test_the_star_dome_snaps_through_as_a_slow_solution_says() -> None:
     start = ring[[0, 2]]
     for factor, sunk in zip(path.factors[1:], -path.displacements[1:, 0, 2], strict=True):
         for part in np.linspace(0, sunk, 20):
-            start, _, found, _ = fsolve(left, start, (part,), xtol=1e-13, full_output=True)
+            start = fsolve(left, start, (part,), xtol=1e-13)
         if path.negative_pivots[list(path.factors).index(factor)] > 1:
             break  # it has left the symmetric way
         load = 6 * pull(np.array([start[0], 0, start[1]]), top - [0, 0, sunk], math.dist(ring, top))[2]
-        assert factor * 1000 == pytest.approx(-load if load < 0 else load, rel=1e-6)
+        assert factor * 1000 == pytest.approx(-load, rel=1e-6)
         start = ring[[0, 2]]
     assert path.limit_factor is not None and path.limit_factor == pytest.approx(path.factors.max(), rel=1e-4)
 
@@ -156,7 +156,7 @@ def test_a_straight_column_bifurcates_at_the_load_of_euler() -> None:
 def test_a_bent_column_bends_on_as_the_textbook_says() -> None:
     """Timoshenko and Gere 1.12: an initial sine of amplitude a grows to a / (1 - P / P Euler); and nears the load of Euler."""
     path = solve_path(column(), "load", imperfection="mode:6mm", steps=25)
-    small = (path.moves < 0.2) & (path.factors < 0.95) & (path.factors > 0)
+    small = (path.moves < 0.09) & (path.factors < 0.95) & (path.factors > 0)
     assert small.sum() >= 3 and path.imperfection.largest == pytest.approx(0.006)
     middle = np.abs(path.displacements[:, 6, 0])
     assert middle[small] == pytest.approx(0.006 * (1 / (1 - path.factors[small]) - 1), rel=0.02)
@@ -180,7 +180,9 @@ def test_a_settlement_grows_with_the_load_factor() -> None:
     truss = toggle(1.5, 10.0, pinned=True).replace(cases=(LoadCase("load", settlement=moved),))
     path = perfect(truss, stop_factor=1.0)
     place = truss.nodes[2] + path.displacements[-1, 2, :3]
-    assert [math.dist(place, (-10.01, 0, 0)), math.dist(place, (10, 0, 0))] == pytest.approx([truss.lengths[0]] * 2)
+    out = -10 - 0.01 * path.factors[-1]
+    assert path.factors[-1] > 0.5
+    assert [math.dist(place, (out, 0, 0)), math.dist(place, (10, 0, 0))] == pytest.approx([truss.lengths[0]] * 2)
 
 
 def test_tangents_are_the_derivatives_of_forces_and_turn_with_the_structure() -> None:
