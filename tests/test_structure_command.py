@@ -64,6 +64,18 @@ def test_buckling_and_frequencies_come_where_they_are_asked_for(
     assert "buckling factors of ULS" in said and "natural frequencies" in said
 
 
+def test_a_path_is_reported_drawn_and_announced(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = "structure grid.json out.json --scale 50 --loads self,snow:1kN/m2 --path worst --path-steps 3 --imperfection mode:20mm"
+    assert run(f"{words} --dry-run") == 0
+    assert "a path of 3 steps takes about" in capsys.readouterr().out and not Path("out.json").exists()
+    assert run(f"{words} --path-plot path.png --report report.json") == 0
+    report = json.loads(Path("report.json").read_text())
+    assert report["limit_factor"] is None and report["path"]["ended"] == "3 steps are done"
+    assert len(report["path"]["factors"]) == len(report["path"]["displacements"]) == 4
+    assert report["path"]["imperfection_max"] == pytest.approx(0.02)
+    assert Path("path.png").read_bytes()[:4] == b"\x89PNG"
+
+
 def test_a_structure_is_read_back_to_the_last_bit(place: Path) -> None:
     grid = dome(7, 40.0)
     table = [
@@ -187,6 +199,10 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --loads no.toml", "cannot read no.toml"),
         ("grid.json out.json --scale 0", "scale must be a positive number"),
         ("grid.json out.json --buckling 99", "numbers of modes, 0 to 50"),
+        ("grid.json out.json --path worst --path-steps 0", "a path has 1 to"),
+        ("grid.json out.json --path other", "no load case or combination 'other'"),
+        ("grid.json out.json --path worst --imperfection bump", "an imperfection is mode"),
+        ("grid.json out.json --path-plot path.png", "ask for one with --path"),
         ("grid.json out.json --node-allowance -1", "node_allowance is a share"),
         ("grid.json out.json --settings no.toml", "cannot read no.toml"),
         ("grid.json out.png", 'no format for ".png"'),

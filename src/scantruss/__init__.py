@@ -57,6 +57,7 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .setout.settings import SetoutSettings as SetoutSettings
     from .settings import Settings as Settings
     from .structure.json import read_structure as read_structure
+    from .structure.nonlinear import solve_path as solve_path
     from .structure.statics import solve as solve
     from .structure.truss import Truss as Truss
     from .surface.samples import sample_surface as sample_surface
@@ -84,7 +85,7 @@ _HOMES = {
     "Schedule": "schedules.records", "Schedules": "schedules.records",
     "set_out": "setout.make", "SettingOut": "setout.make", "SetoutSettings": "setout.settings",
     "write_setting_out": "setout.files",
-    "Truss": "structure.truss", "solve": "structure.statics", "read_structure": "structure.json",
+    "Truss": "structure.truss", "solve": "structure.statics", "solve_path": "structure.nonlinear", "read_structure": "structure.json",
 }  # fmt: skip
 
 __all__ = sorted([*_HOMES, "__version__"])

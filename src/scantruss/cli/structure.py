@@ -15,9 +15,12 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..grid.grid import Grid
+    from ..runtime.progress import Progress
+    from ..structure.nonlinear import Path as StructurePath
     from ..structure.options import StructureSettings
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
+    from ..structure.truss import Truss
     from .options import Parser
 
 REPORT_SUFFIXES = (".html", ".pdf", ".png")  # of what a person reads; the others are those of `export.formats`
@@ -39,6 +42,10 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
+    ("path", "worst|NAME", "geometrically nonlinear path of a load case or combination; worst is the one that buckles first"),
+    ("path_steps", "COUNT", "steps of the path at most (default 30)"),
+    ("path_factor", "NUMBER", "load factor at which the path ends (default twice the linear buckling factor)"),
+    ("imperfection", "KIND", "of the path: mode (default, span/300), mode:30mm, scan (the scan against its fair surface), none"),
 )  # fmt: skip
 
 
@@ -62,6 +69,8 @@ def structure_parser() -> Parser:
     for name, metavar, said in OWN_OPTIONS:
         kind = {"NUMBER": number, "COUNT": whole_number}.get(metavar, str)
         parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
+    parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
+    parser.add_argument("--dry-run", action="store_true", help="say size and time of the path, and compute nothing")
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
     return parser
 
@@ -77,14 +86,20 @@ def structure(values: Namespace) -> None:
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; structure needs a grid saved as .json by scantruss grid")
     report_place = None if values.report is None else check_place(values.report, (".json",))
+    plot = None if values.path_plot is None else check_place(values.path_plot, (".png",))
     settings = structure_settings(values)
+    if plot is not None and not settings.path:
+        raise InputError("--path-plot shows a path; ask for one with --path worst")
     taken = _inputs(values)
     claim_models(outs, taken, force=values.force, what="structure")
     if report_place is not None:
         claim(report_place, "report", taken, force=values.force)
+    if plot is not None:
+        claim(plot, "picture", taken, force=values.force)
     from ..export.json import read_grid
     from ..grid.certificate import check_passed
     from ..structure.modes import vibration_modes, worst_buckling
+    from ..structure.path_report import encode_path, path_expectation
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
     from ..structure.sizing import SizingRound, size_members, weight_curve
     from ..structure.statics import factor_stiffness, solve
@@ -95,6 +110,9 @@ def structure(values: Namespace) -> None:
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
+        if values.dry_run:
+            print_lines([path_expectation(truss, settings.path_steps)])
+            return
         rounds: list[SizingRound] = []
         weights = None
         if settings.size:
@@ -107,8 +125,11 @@ def structure(values: Namespace) -> None:
         modes = settings.buckling or int(settings.size > 0)
         buckling = worst_buckling(factored, solution, modes) if modes else None
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
+        path = _path(truss, settings, bars) if settings.path else None
         bars("checks", 0.8)
-        found: dict[str, Any] = {"buckling": buckling, "vibration": vibration, "rounds": rounds, "weights": weights}
+        found: dict[str, Any] = {
+            "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
+        }  # fmt: skip
         report = report_structure(solution, settings.checks, _notes(settings), **found)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
@@ -119,18 +140,20 @@ def structure(values: Namespace) -> None:
                 written.append(out)
         if report_place is not None:
             save.json(report_place, report.to_dict())
+        if plot is not None and path is not None:
+            save.beside(plot).write_bytes(encode_path(path))
     print_table(STRUCTURE_HEAD, structure_lines(report))
     counts = report.to_dict()["sections"]
     names = (
         " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
     )
-    wrote = [*written, *([report_place] if report_place else [])]
+    wrote = [*written, *(place for place in (report_place, plot) if place)]
     print_lines(
         [
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             *mode_lines(report),
-            *([] if buckling else ["the stability of the whole is not looked at; --buckling 1 does"]),
+            *([] if buckling or path else ["the stability of the whole is not looked at; --buckling 1 does"]),
             *(f"warning: {words}" for words in report.warnings),
             f"wrote {' '.join(map(str, wrote))}",
         ]
@@ -157,10 +180,24 @@ def _encoded(
 def _command_line(values: Namespace) -> str:
     """Return the command line with these values."""
     words = ["scantruss", "structure", values.grid, *map(str, outs_of(values))]
-    for name in ("settings", "report", *(name for name, _, _ in OWN_OPTIONS)):
+    for name in ("settings", "report", "path_plot", *(name for name, _, _ in OWN_OPTIONS)):
         if vars(values).get(name) is not None:
             words += [f"--{name.replace('_', '-')}", f"{vars(values)[name]}"]
     return shlex.join([*words, *["--keep-failed"] * values.keep_failed])
+
+
+def _path(truss: Truss, settings: StructureSettings, progress: Progress) -> StructurePath:
+    """Return the nonlinear path that the settings ask for."""
+    from ..structure.nonlinear import solve_path
+
+    return solve_path(
+        truss,
+        "" if settings.path == "worst" else settings.path,
+        imperfection=settings.imperfection,
+        steps=settings.path_steps,
+        stop_factor=settings.path_factor or None,
+        progress=progress,
+    )
 
 
 def structure_settings(values: Namespace) -> StructureSettings:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from .truss import LoadCase, Truss
 
 LENGTHEN, TWIST, BEND_Y1, BEND_Y2, BEND_Z1, BEND_Z2 = range(6)  #: rows of the natural deformations
+BOW = (
+    np.array([[4.0, -1.0], [-1.0, 4.0]]) / 30
+)  #: by which turns t of both ends shorten a bent member, t BOW t / 2 of its length
 
 
 def freedoms(truss: Truss) -> int:
@@ -54,6 +57,16 @@ def fixities(truss: Truss) -> np.ndarray:
     rigid = np.isinf(truss.end_stiffness)
     spring = np.where(rigid, 0.0, truss.end_stiffness)
     return np.where(rigid, 1.0, spring / (spring + flexible))
+
+
+def inner_turns(truss: Truss) -> np.ndarray:
+    """Return the (M, 2, 2, 2) matrices, about y and z, from turns of the nodes to turns of the member's ends, behind the springs."""
+    fixity = fixities(truss)
+    first, second = fixity[:, 0], fixity[:, 1]
+    under = 4 - first * second
+    rows = (1 - 4 * (1 - first) / under, -2 * second * (1 - first) / under,
+            -2 * first * (1 - second) / under, 1 - 4 * (1 - second) / under)  # fmt: skip
+    return np.stack(rows, axis=2).reshape(-1, 2, 2, 2)
 
 
 def natural_stiffness(truss: Truss) -> np.ndarray:

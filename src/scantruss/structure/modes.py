@@ -14,7 +14,7 @@ from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..errors import InputError
-from .frame import BEND_Y1, BEND_Z1, LENGTHEN, assemble, fixities, freedoms, member_freedoms, transforms
+from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
 from .statics import CaseResult, Factored, Solution
 from .truss import GRAVITY, Truss
 
@@ -114,18 +114,10 @@ def _geometric(truss: Truss, axial: np.ndarray) -> np.ndarray:
     made = (axial / length)[:, None, None] * (across.transpose(0, 2, 1) @ across)
     if truss.pinned:
         return made
-    change, fixity = transforms(truss), fixities(truss)
+    change, inner = transforms(truss), inner_turns(truss)
     for axis, row in enumerate((BEND_Y1, BEND_Z1)):
-        first, second = fixity[:, 0, axis], fixity[:, 1, axis]
-        under = 4 - first * second
-        inner = np.array(  # from turns of the nodes to turns of the member's ends, behind the springs
-            [
-                [1 - 4 * (1 - first) / under, -2 * second * (1 - first) / under],
-                [-2 * first * (1 - second) / under, 1 - 4 * (1 - second) / under],
-            ]
-        ).transpose(2, 0, 1)
-        turns = inner @ change[:, row : row + 2]
-        weight = (axial * length / 30)[:, None, None] * np.array([[4.0, -1.0], [-1.0, 4.0]])
+        turns = inner[:, axis] @ change[:, row : row + 2]
+        weight = (axial * length)[:, None, None] * BOW
         made += turns.transpose(0, 2, 1) @ weight @ turns
     return made
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -12,10 +13,21 @@ from typing import Any
 from ..errors import FormatError, InputError
 from .checks import MemberChecks
 from .groups import WAYS_TO_GROUP
+from .imperfections import check_imperfection
+from .nonlinear import STEPS
 from .truss import Combination
 
+MOST_STEPS = 1000  #: of a nonlinear path
 MOST_MODES = 50  #: of buckling or vibration
-NUMBERS = ("scale", "node_allowance", "size", "buckling", "frequencies")  #: settings that are numbers
+NUMBERS = (
+    "scale",
+    "node_allowance",
+    "size",
+    "buckling",
+    "frequencies",
+    "path_steps",
+    "path_factor",
+)  #: settings that are numbers
 
 
 @dataclass(frozen=True)
@@ -35,6 +47,10 @@ class StructureSettings:
     size_by: str = WAYS_TO_GROUP[0]  #: what has a section of its own in sizing, of `WAYS_TO_GROUP`
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
+    path: str = ""  #: load case or combination of the nonlinear path, or worst; "" for none
+    path_steps: int = STEPS  #: of it at most
+    path_factor: float = 0.0  #: load factor at which it ends; 0: a multiple of the linear buckling factor
+    imperfection: str = "mode"  #: of it: mode, mode:30mm, scan, scan:30mm or none
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
     checks: MemberChecks = field(default_factory=MemberChecks)  #: of a file
 
@@ -44,6 +60,11 @@ class StructureSettings:
             raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
         if self.size_by not in WAYS_TO_GROUP:
             raise InputError(f"size_by must be one of {' '.join(WAYS_TO_GROUP)}, got {self.size_by!r}")
+        if not (1 <= self.path_steps <= MOST_STEPS and 0 <= self.path_factor < math.inf):
+            raise InputError(
+                f"a path has 1 to {MOST_STEPS:,} steps and a positive factor, got {self.path_steps} and {self.path_factor}"
+            )
+        check_imperfection(self.imperfection)
         if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):
             raise InputError(
                 f"buckling and frequencies are numbers of modes, 0 to {MOST_MODES}, got {self.buckling} and {self.frequencies}"
@@ -76,9 +97,9 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
             given[name] = tuple(_combination_of(path, each) for each in value)
         elif name == "loads":
             given[name] = loads_of_words(value) if isinstance(value, str) else tuple(value)
-        elif name in ("scale", "node_allowance") and isinstance(value, int | float):
+        elif name in ("scale", "node_allowance", "path_factor") and isinstance(value, int | float):
             given[name] = float(value)
-        elif name in ("size", "buckling", "frequencies") and isinstance(value, int):
+        elif name in ("size", "buckling", "frequencies", "path_steps") and isinstance(value, int):
             given[name] = value
         elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
             given[name] = str(value)

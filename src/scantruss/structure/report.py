@@ -12,6 +12,8 @@ import numpy as np
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .groups import member_groups_of
 from .modes import Modes
+from .nonlinear import Path
+from .path_report import path_figures, path_warnings, path_words
 from .sizing import SizingRound
 from .statics import CaseResult, Solution
 from .truss import Truss
@@ -48,6 +50,7 @@ class StructureReport:
     weights: dict[int, float] | None = (
         None  #: mass sized with at most so many different sections, see `weight_curve` [kg]
     )
+    path: Path | None = None  #: where it was asked for
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -82,6 +85,8 @@ class StructureReport:
             values["sizing_rounds"] = [asdict(each) for each in self.rounds]
         if self.weights is not None:
             values["mass_by_sections"] = {str(count): mass for count, mass in self.weights.items()}
+        if self.path is not None:
+            values |= path_figures(self.path)
         return values
 
     def _groups(self) -> dict[str, Any]:
@@ -108,6 +113,7 @@ def report_structure(
     vibration: Modes | None = None,
     rounds: Sequence[SizingRound] = (),
     weights: dict[int, float] | None = None,
+    path: Path | None = None,
 ) -> StructureReport:
     """Return the figures of all load cases and combinations, the checks of the members, and warnings.
 
@@ -125,6 +131,8 @@ def report_structure(
         Of `size_members`.
     weights : dict of int to float, optional
         Of `weight_curve`.
+    path : Path, optional
+        Of `solve_path`.
     """
     truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)
@@ -156,6 +164,7 @@ def report_structure(
             f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
             " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
         )
+    said += path_warnings(path) if path is not None else []
     return StructureReport(
         truss=truss,
         cases=tuple(figures),
@@ -166,6 +175,7 @@ def report_structure(
         vibration=vibration,
         rounds=tuple(rounds),
         weights=weights,
+        path=path,
     )
 
 
@@ -241,6 +251,8 @@ def mode_lines(report: StructureReport) -> list[str]:
         )
     if report.vibration is not None:
         said.append("natural frequencies: " + ", ".join(f"{value:.4g}" for value in report.vibration.values) + " Hz")
+    if report.path is not None:
+        said.append(path_words(report.path))
     return said
 
 

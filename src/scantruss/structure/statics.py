@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -290,6 +290,14 @@ def solve(truss: Truss, factored: Factored | None = None) -> Solution:
             )
         )
     return Solution(truss, tuple(results))
+
+
+def dead_loads(truss: Truss, case: LoadCase) -> tuple[np.ndarray, np.ndarray]:
+    """Return the loads of a case on all displacements, without temperature and strain, and the (M, r) forces in held members."""
+    part = replace(case, temperature=None, strain=None)
+    count = freedoms(truss)
+    found = _loads(truss, part, transforms(truss), member_freedoms(truss), count, len(truss.nodes) * count)
+    return found[:2]
 
 
 def _loads(

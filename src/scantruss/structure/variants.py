@@ -22,6 +22,10 @@ OF_ANALYSIS = (
     "size_by",
     "buckling",
     "frequencies",
+    "path",
+    "path_steps",
+    "path_factor",
+    "imperfection",
 )  #: settings that the structure itself does not depend on
 
 
