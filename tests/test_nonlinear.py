@@ -29,7 +29,8 @@ def chain(length: float, count: int, axis: ArrayLike = (1.0, 0.0, 0.0)) -> tuple
 
 def perfect(truss: Truss, load: str = "load", **others: Any) -> Path:
     """The path without imperfection, far."""
-    return solve_path(truss, load, **({"imperfection": "none", "steps": 100, "beyond": 100} | others))
+    given: dict[str, Any] = {"imperfection": "none", "steps": 100, "beyond": 100}
+    return solve_path(truss, load, **(given | others))
 
 
 def toggle(high: float, half: float, **others: Any) -> Truss:
@@ -56,6 +57,7 @@ def test_von_mises_truss_snaps_through_as_the_closed_form() -> None:
     peak = minimize_scalar(lambda w: -float(load(w)), bounds=(0, high), method="bounded", options={"xatol": 1e-12})
     assert path.factors == pytest.approx(load(path.moves), rel=1e-6, abs=1e-6)
     assert path.limit_factor == pytest.approx(-peak.fun, rel=1e-6) and path.kind == "limit point"
+    assert path.limit_factor is not None
     assert path.factors.min() < -0.9 * path.limit_factor and path.factors[-1] == pytest.approx(
         40.0
     )  # it has gone through
@@ -269,4 +271,5 @@ def test_the_fair_surface_shows_a_node_that_is_off() -> None:
 )
 def test_what_makes_no_path_is_refused(options: dict[str, Any], said: str) -> None:
     with pytest.raises(st.InputError, match=said):
-        solve_path(toggle(0.5, 10.0), **({"load": "load"} | options))
+        given: dict[str, Any] = {"load": "load"}
+        solve_path(toggle(0.5, 10.0), **(given | options))

@@ -205,7 +205,7 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --path-plot path.png", "ask for one with --path"),
         ("grid.json out.json --node-allowance -1", "node_allowance is a share"),
         ("grid.json out.json --settings no.toml", "cannot read no.toml"),
-        ("grid.json out.png", 'no format for ".png"'),
+        ("grid.json out.abc", 'no format for ".abc"'),
         ("grid.json grid.json", "would overwrite the grid"),
         ("grid.json", "missing OUT"),
         ("no.json out.json", "there is no file no.json"),

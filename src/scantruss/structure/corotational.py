@@ -19,7 +19,7 @@ import numpy as np
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, TWIST, inner_turns, natural_stiffness
 from .truss import Truss
 
-TERMS = 24  #: of the series of an angle over its sine
+SERIES_TERMS = 24  #: of the series of an angle over its sine
 FARTHEST_TURN = 0.5  #: cosine of the turn of an end against the chord beyond which an element is too coarse: 60 degrees
 _ENDS = np.array([0, 1, 2, 3, 4, 5, 0, 1, 2, 6, 7, 8])  # of chord and turns, in the order of displacements
 _SIGNS = np.repeat([-1.0, 1.0, 1.0, 1.0], 3)
@@ -287,7 +287,7 @@ def _angle_over_sine(cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     gap = np.clip(1 - cosine, 0.0, 1 - FARTHEST_TURN)
     values = np.zeros((3, len(gap)))
     factor = 1.0
-    coefficients = [1.0] + [factor := factor * n / (2 * n + 1) for n in range(1, TERMS)]
+    coefficients = [1.0] + [factor := factor * n / (2 * n + 1) for n in range(1, SERIES_TERMS)]
     for coefficient in reversed(coefficients):  # Horner's rule with derivatives
         values[2] = values[2] * gap + 2 * values[1]
         values[1] = values[1] * gap + values[0]

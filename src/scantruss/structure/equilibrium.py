@@ -19,7 +19,7 @@ from .truss import LoadCase
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class LoadedState:
     """Where the nodes are, at a load factor."""
 
     moves: np.ndarray  #: (V, 3) [m]
@@ -97,11 +97,11 @@ class Equilibrium:
         self._first = np.searchsorted(column, np.arange(count + 1))
         self._scale = 1 / (self.root[self._row] * self.root[column])
 
-    def start(self) -> State:
+    def start(self) -> LoadedState:
         """Return the state without loads."""
-        return State(np.zeros_like(self.truss.nodes), np.tile(np.eye(3), (len(self.truss.nodes), 1, 1)), 0.0)
+        return LoadedState(np.zeros_like(self.truss.nodes), np.tile(np.eye(3), (len(self.truss.nodes), 1, 1)), 0.0)
 
-    def moved(self, state: State, step: np.ndarray, more: float) -> State:
+    def moved(self, state: LoadedState, step: np.ndarray, more: float) -> LoadedState:
         """Return the state after free displacements (F,) and a change of the load factor."""
         every = np.zeros(self.count)
         every[self.free] = step
@@ -110,9 +110,9 @@ class Equilibrium:
         if self.width == 6:
             turns = Rotation.from_rotvec(each[:, 3:]).as_matrix() @ turns
             turns = 1.5 * turns - 0.5 * turns @ turns.transpose(0, 2, 1) @ turns  # as round-off does not let them be
-        return State(state.moves + each[:, :3] + more * self.settled, turns, state.factor + more)
+        return LoadedState(state.moves + each[:, :3] + more * self.settled, turns, state.factor + more)
 
-    def respond(self, state: State, *, foreseen: np.ndarray | None = None, tangents: bool = False) -> Response:
+    def respond(self, state: LoadedState, *, foreseen: np.ndarray | None = None, tangents: bool = False) -> Response:
         """Return what the members answer."""
         given = self.members, state.moves, state.turns, self.strain, state.factor
         return respond(*given, foreseen=foreseen, tangents=tangents)
@@ -123,12 +123,12 @@ class Equilibrium:
         every[self.free] = step
         return response.foresee(every[self.rows])
 
-    def unbalanced(self, state: State, response: Response) -> np.ndarray:
+    def unbalanced(self, state: LoadedState, response: Response) -> np.ndarray:
         """Return the loads less the forces of members and springs, on all displacements; at supports less the reactions."""
         made = state.factor * self.loads - self._sum(response.forces)
         return made - self._of_springs(state)
 
-    def reactions(self, state: State, response: Response) -> np.ndarray:
+    def reactions(self, state: LoadedState, response: Response) -> np.ndarray:
         """Return the (V, 6) reactions of held supports and springs [N, Nm]."""
         made = np.zeros(self.count)
         held = np.setdiff1d(np.arange(self.count), self.free)
@@ -136,7 +136,7 @@ class Equilibrium:
         made -= self._of_springs(state)
         return np.pad(made.reshape(-1, self.width), ((0, 0), (0, 6 - self.width)))
 
-    def error(self, state: State, response: Response, unbalanced: np.ndarray) -> float:
+    def error(self, state: LoadedState, response: Response, unbalanced: np.ndarray) -> float:
         """Return what is unbalanced on free displacements, over the size of loads, reactions and forces; moments count over an arm."""
         left = np.square(unbalanced / self.arms)
         free = float(left[self.free].sum())
@@ -167,7 +167,7 @@ class Equilibrium:
             made -= self._sum(np.einsum("mij,mj->mi", response.tangents, settled))
         return made[self.free]
 
-    def _of_springs(self, state: State) -> np.ndarray:
+    def _of_springs(self, state: LoadedState) -> np.ndarray:
         """Return the forces of the nodes on spring supports, on all displacements."""
         if not self.springs.any():
             return np.zeros(self.count)

@@ -16,7 +16,7 @@ from .truss import Truss
 
 SPAN_OVER = 300.0  #: span over the amplitude of a mode
 FAIR_RINGS = 3  #: members on the way to the nodes that a quadric is fitted to
-FEWEST_FOR_QUADRIC = 9  #: nodes that a quadric, of six coefficients, is fitted to
+FEWEST_IN_QUADRIC = 9  #: nodes that a quadric, of six coefficients, is fitted to
 IMPERFECTIONS = "mode, mode:30mm, scan, scan:30mm or none"
 
 
@@ -129,7 +129,7 @@ def _above_quadric(truss: Truss, near: csr_matrix, node: int) -> float:
     around = near.indices[near.indptr[node] : near.indptr[node + 1]]
     normal = truss.node_normals[node]
     around = around[truss.node_normals[around] @ normal > 0]  # the surface is a height there
-    if len(around) < FEWEST_FOR_QUADRIC:
+    if len(around) < FEWEST_IN_QUADRIC:
         return 0.0
     along = np.eye(3)[np.abs(normal).argmin()]
     along = along - (along @ normal) * normal

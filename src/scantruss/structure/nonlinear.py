@@ -16,26 +16,29 @@ import numpy as np
 from ..errors import InputError
 from ..runtime.progress import Progress
 from .corotational import Response
-from .equilibrium import Equilibrium, State, Tangent
+from .equilibrium import Equilibrium, LoadedState, Tangent
 from .imperfections import Imperfection, imperfection_of
 from .modes import Modes, buckling_modes, worst_buckling
 from .statics import Factored, factor_stiffness, solve
 from .truss import LoadCase, Truss
 
-STEPS = 30  #: of a path at most, unless told otherwise
+PATH_STEPS = 30  #: of a path at most, unless told otherwise
 FIRST_STEPS = 10  #: the first step is this part of the way to where linear theory buckles
-BEYOND = 5  #: steps after the structure has lost its stability
+STEPS_BEYOND = 5  #: steps after the structure has lost its stability
 MULTIPLE = 2.0  #: of the linear buckling factor, at which a path ends that stays stable
-NO_BUCKLING = 10.0  #: load factor at which a path ends that stays stable where linear theory does not buckle
+UNBUCKLED_FACTOR = 10.0  #: load factor at which a path ends that stays stable where linear theory does not buckle
 BALANCED = 1e-9  #: error of equilibrium at which a step has converged
 ITERATIONS = 25  #: of a step at most
 WANTED_WORK = 12  #: iterations of a step, and four more for each tangent; more make the next shorter
-SMOOTH = (0.8, 0.5)  #: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
+SMOOTH_STEP = (
+    0.8,
+    0.5,
+)  #: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
 SMOOTH_CUTS = 5  #: halvings of a step for that
 TANGENTS = 6  #: factored within a step at most
-ROUGH = 0.2  #: error of a first guess above which the tangent of the state before is of no use
+ROUGH_GUESS = 0.2  #: error of a first guess above which the tangent of the state before is of no use
 SLOW = 0.2  #: share of the error left by an iteration, above which a new tangent is factored
-GROWTH = (0.5, 1.5)  #: of the arc length from step to step
+ARC_GROWTH = (0.5, 1.5)  #: of the arc length from step to step
 CUTS = 10  #: halvings of a step, after which a path ends
 REFINEMENTS = 14  #: of the place where stability is lost
 CRITICAL = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
@@ -87,9 +90,9 @@ def solve_path(
     *,
     imperfection: str | np.ndarray = "mode",
     buckling: Modes | None = None,
-    steps: int = STEPS,
+    steps: int = PATH_STEPS,
     stop_factor: float | None = None,
-    beyond: int = BEYOND,
+    beyond: int = STEPS_BEYOND,
     progress: Progress | None = None,
 ) -> Path:
     """Return how a structure moves under a growing load, past the limit that it carries.
@@ -137,7 +140,7 @@ def solve_path(
     modes = buckling or _first_mode(factored, load)
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)
-    last = stop_factor or (MULTIPLE * linear if linear else NO_BUCKLING)
+    last = stop_factor or (MULTIPLE * linear if linear else UNBUCKLED_FACTOR)
     found: Path | None = None
     for shape in imperfection_of(truss, imperfection, modes):
         limit = found.limit_factor if found else None
@@ -184,7 +187,7 @@ class _Walk:
     ) -> None:
         self.balance, self.end, self.steps, self.beyond, self.progress = balance, end, steps, beyond, progress
         self.first = first
-        self.states: list[State] = [balance.start()]
+        self.states: list[LoadedState] = [balance.start()]
         self.negative = [0]
         self.critical: int | None = None
         self.kind = self.ended = ""
@@ -223,7 +226,7 @@ class _Walk:
                     self.ended = f"{self.beyond} steps beyond the {self.kind}"
                     return
             here, back = there, taken
-            arc *= min(max(math.sqrt(WANTED_WORK / work), GROWTH[0]), GROWTH[1])
+            arc *= min(max(math.sqrt(WANTED_WORK / work), ARC_GROWTH[0]), ARC_GROWTH[1])
         self.ended = f"{self.steps} steps are done"
 
     def path(self, name: str, imperfection: Imperfection, linear: float | None) -> Path:
@@ -256,7 +259,7 @@ class _Walk:
     def _norm(self, step: np.ndarray) -> float:
         return math.sqrt(float(np.square(step * self.balance.weights).sum()))
 
-    def _place(self, state: State) -> _Place:
+    def _place(self, state: LoadedState) -> _Place:
         """Return a state of equilibrium with its tangent."""
         response = self.balance.respond(state, tangents=True)
         tangent = self.balance.tangent(response)
@@ -270,7 +273,7 @@ class _Walk:
         scale = balance.weights**2
         ahead = float(back @ (scale * towards))
         more = math.copysign(arc / self._norm(towards), ahead) if to is None else to - here.state.factor
-        taken, state, before = more * towards, here.state, ROUGH / SLOW
+        taken, state, before = more * towards, here.state, ROUGH_GUESS / SLOW
         first = step = taken
         response, fresh = here.response, 0
         for iteration in range(1, ITERATIONS + 1):
@@ -313,7 +316,7 @@ class _Walk:
         cosine = abs(before) / self._norm(taken)
         stiffness = [self.soft / self._norm(place.towards) for place in (here, there)]
         change = abs(stiffness[1] * math.copysign(1.0, after * before) - stiffness[0])
-        return cosine >= SMOOTH[0] and change <= SMOOTH[1] * max(1.0, stiffness[0])
+        return cosine >= SMOOTH_STEP[0] and change <= SMOOTH_STEP[1] * max(1.0, stiffness[0])
 
     def _at_factor(self, here: _Place, taken: np.ndarray, there: _Place) -> _Place:
         """Return the state at the load factor where the path is to end, or the one beyond it."""
@@ -358,7 +361,7 @@ class _Walk:
 class _Place:
     """A state of equilibrium, and where the path goes from there."""
 
-    state: State
+    state: LoadedState
     response: Response
     tangent: Tangent
     towards: np.ndarray  # (F,) displacements for a load factor of 1

@@ -14,10 +14,10 @@ from ..errors import FormatError, InputError
 from .checks import MemberChecks
 from .groups import WAYS_TO_GROUP
 from .imperfections import check_imperfection
-from .nonlinear import STEPS
+from .nonlinear import PATH_STEPS
 from .truss import Combination
 
-MOST_STEPS = 1000  #: of a nonlinear path
+MOST_PATH_STEPS = 1000  #: of a nonlinear path
 MOST_MODES = 50  #: of buckling or vibration
 NUMBERS = (
     "scale",
@@ -48,7 +48,7 @@ class StructureSettings:
     buckling: int = 0  #: buckling factors that are asked for
     frequencies: int = 0  #: natural frequencies that are asked for
     path: str = ""  #: load case or combination of the nonlinear path, or worst; "" for none
-    path_steps: int = STEPS  #: of it at most
+    path_steps: int = PATH_STEPS  #: of it at most
     path_factor: float = 0.0  #: load factor at which it ends; 0: a multiple of the linear buckling factor
     imperfection: str = "mode"  #: of it: mode, mode:30mm, scan, scan:30mm or none
     combinations: tuple[Combination, ...] | None = None  #: of a file; else those of EN 1990
@@ -60,9 +60,9 @@ class StructureSettings:
             raise InputError(f"size is a number of different sections, 0 or more, got {self.size}")
         if self.size_by not in WAYS_TO_GROUP:
             raise InputError(f"size_by must be one of {' '.join(WAYS_TO_GROUP)}, got {self.size_by!r}")
-        if not (1 <= self.path_steps <= MOST_STEPS and 0 <= self.path_factor < math.inf):
+        if not (1 <= self.path_steps <= MOST_PATH_STEPS and 0 <= self.path_factor < math.inf):
             raise InputError(
-                f"a path has 1 to {MOST_STEPS:,} steps and a positive factor, got {self.path_steps} and {self.path_factor}"
+                f"a path has 1 to {MOST_PATH_STEPS:,} steps and a positive factor, got {self.path_steps} and {self.path_factor}"
             )
         check_imperfection(self.imperfection)
         if not (0 <= self.buckling <= MOST_MODES and 0 <= self.frequencies <= MOST_MODES):

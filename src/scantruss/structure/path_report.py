@@ -6,7 +6,7 @@ import io
 from typing import Any
 
 from ..runtime.ours import MARK
-from .nonlinear import CUTS, STEPS, Path
+from .nonlinear import CUTS, PATH_STEPS, Path
 from .truss import Truss
 
 SECONDS = 4e-5  #: of a step for each displacement of a node, on a usual machine
@@ -65,7 +65,7 @@ def path_warnings(path: Path) -> list[str]:
     return said
 
 
-def path_expectation(truss: Truss, steps: int = STEPS) -> str:
+def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:
     """Return a line that says how long a path may take, and computes nothing."""
     freedoms = len(truss.nodes) * (3 if truss.pinned else 6)
     seconds = (steps + EXTRA_STEPS) * SECONDS * freedoms * max(freedoms / 3e4, 1e-2) ** (GROWS - 1)

@@ -13,14 +13,14 @@ from ...runtime.ours import MARK
 from .parts import DataTable, Headline, Illustration, Listing, PointList, ReportPart, SectionHead, Sentence
 
 A4 = (595.28, 841.89)  #: A4 [pt]
-MARGIN, TOP_MARGIN, FOOT = 48.0, 50.0, 52.0  #: margins, the right one as the left [pt]
-WIDTH = A4[0] - 2 * MARGIN
+PAGE_MARGIN, TOP_MARGIN, PAGE_FOOT = 48.0, 50.0, 52.0  #: margins, the right one as the left [pt]
+WIDTH = A4[0] - 2 * PAGE_MARGIN
 TEXT_SIZE, SMALL, CODE = 9.0, 7.2, 7.0  #: sizes of letters [pt]
 LEAST_TABLE = 4.5  #: size of the letters of a table so wide that it does not fit otherwise [pt]
 PIXELS = 220  #: to an inch, of pictures of very many members
 MEASURED = 100.0  #: size of the letters that are measured [pt]
 SPACING = 1.42  #: from line to line, in sizes of letters
-HEAD = 30.0  #: height of the head of a section [pt]
+PAGE_HEAD = 30.0  #: height of the head of a section [pt]
 GAP = 9.0  #: between columns [pt]
 GREY, RULE, WARNING_COLOUR = "#5b6675", "#8b95a1", "#a85a00"
 
@@ -35,7 +35,7 @@ class PdfPages:
 
     def room(self, height: float) -> float:
         """Return the top of a space of some height, on a new page if need be."""
-        if not self.figures or self.y - height < FOOT:
+        if not self.figures or self.y - height < PAGE_FOOT:
             from matplotlib.figure import Figure
 
             self.figures.append(Figure(figsize=(A4[0] / 72, A4[1] / 72), facecolor="white"))
@@ -46,7 +46,7 @@ class PdfPages:
 
     def keep(self, height: float) -> None:
         """Begin a new page unless this one has room for some height."""
-        if self.y - height < FOOT:
+        if self.y - height < PAGE_FOOT:
             self.y = 0.0
 
     def text(self, x: float, y: float, words: str, size: float = TEXT_SIZE, **style: Any) -> None:
@@ -58,7 +58,7 @@ class PdfPages:
         """Draw a line from margin to margin."""
         from matplotlib.lines import Line2D
 
-        ends = [MARGIN / A4[0], (MARGIN + width) / A4[0]]
+        ends = [PAGE_MARGIN / A4[0], (PAGE_MARGIN + width) / A4[0]]
         self.figures[-1].add_artist(Line2D(ends, [y / A4[1]] * 2, color=colour, linewidth=bold))
 
     def lines(
@@ -67,7 +67,7 @@ class PdfPages:
         """Set lines of text."""
         for line in lines:
             top = self.room(spacing * size)
-            self.text(MARGIN + indent, top - 1.05 * size, line, size, **style)
+            self.text(PAGE_MARGIN + indent, top - 1.05 * size, line, size, **style)
 
 
 def encode_pdf(parts: Sequence[ReportPart]) -> bytes:
@@ -79,15 +79,15 @@ def encode_pdf(parts: Sequence[ReportPart]) -> bytes:
         pages = PdfPages(title)
         for part, after in zip(parts, [*parts[1:], None], strict=True):
             if isinstance(part, SectionHead):  # it stays with what follows
-                pages.keep(HEAD + (WIDTH * after.tall + 40 if isinstance(after, Illustration) else 60))
+                pages.keep(PAGE_HEAD + (WIDTH * after.tall + 40 if isinstance(after, Illustration) else 60))
             _SETTERS[type(part)](pages, part)
         stream = io.BytesIO()
         kept = {"Title": title, "Creator": MARK, "Producer": MARK, "CreationDate": None}
         with PdfFile(stream, metadata=kept) as file:
             for number, figure in enumerate(pages.figures, 1):
                 for x, words, side in (
-                    (MARGIN, title, "left"),
-                    (A4[0] - MARGIN, f"{number} / {len(pages.figures)}", "right"),
+                    (PAGE_MARGIN, title, "left"),
+                    (A4[0] - PAGE_MARGIN, f"{number} / {len(pages.figures)}", "right"),
                 ):
                     figure.text(x / A4[0], 30 / A4[1], words, fontsize=7, color=GREY, ha=side, parse_math=False)
                 file.savefig(figure, dpi=PIXELS)
@@ -101,8 +101,8 @@ def _headline(pages: PdfPages, part: Headline) -> None:
 
 
 def _section_head(pages: PdfPages, part: SectionHead) -> None:
-    top = pages.room(HEAD)
-    pages.text(MARGIN, top - 20, part.words, 12, weight="bold")
+    top = pages.room(PAGE_HEAD)
+    pages.text(PAGE_MARGIN, top - 20, part.words, 12, weight="bold")
     pages.rule(top - 25, colour="#58869e", bold=1.2)
 
 
@@ -130,12 +130,12 @@ def _data_table(pages: PdfPages, part: DataTable) -> None:
     """Set a table with columns as wide as their cells; the last column of words is wrapped if there is too little room."""
     size, widths = _fitting(part)
     gap = GAP * size / SMALL
-    rights = [MARGIN + sum(widths[: column + 1]) + gap * column for column in range(len(widths))]
+    rights = [PAGE_MARGIN + sum(widths[: column + 1]) + gap * column for column in range(len(widths))]
 
     def row(cells: Sequence[str], **style: Any) -> None:
         wrapped = [_wrapped(cell, size, width + 0.5) or [""] for cell, width in zip(cells, widths, strict=True)]
         height = SPACING * size * max(map(len, wrapped)) + 1.6
-        if pages.y - height < FOOT:
+        if pages.y - height < PAGE_FOOT:
             pages.y = 0.0
             head()
         top = pages.room(height)
@@ -157,7 +157,7 @@ def _data_table(pages: PdfPages, part: DataTable) -> None:
                 x = rights[column] - widths[column] if left else rights[column]
                 y = top - SPACING * size * (most - len(lines) + number + 0.8)
                 pages.text(x, y, line, size, ha="left" if left else "right", weight="bold")
-        pages.rule(pages.y + 2.5, rights[-1] - MARGIN)
+        pages.rule(pages.y + 2.5, rights[-1] - PAGE_MARGIN)
 
     pages.room(4)
     pages.keep(5 * SPACING * size)
@@ -195,7 +195,7 @@ def _illustration(pages: PdfPages, part: Illustration) -> None:
     height = WIDTH * part.tall
     top = pages.room(height + SPACING * 8.2 * len(caption) + 12)
     pages.y = top - height - 4
-    place = (MARGIN / A4[0], (top - height) / A4[1], WIDTH / A4[0], height / A4[1])
+    place = (PAGE_MARGIN / A4[0], (top - height) / A4[1], WIDTH / A4[0], height / A4[1])
     part.draw(pages.figures[-1], place)
     pages.lines(caption, 8.2, color=GREY)
     pages.y -= 8
