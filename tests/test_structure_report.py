@@ -162,6 +162,16 @@ def test_what_is_left_out_of_a_table_is_said(place: Path) -> None:
     assert "Those that use the members or move the nodes most" in text
 
 
+def test_the_nonlinear_path_is_in_the_report(place: Path) -> None:
+    assert run(f"a.html --loads {LOADS} --path worst --path-steps 8 --imperfection mode:20mm --report r.json") == 0
+    figures = json.loads(Path("r.json").read_text())
+    page = read("a.html")
+    text = " ".join(page.text)
+    assert "limit factor, nonlinear" in text and "Nonlinear path" in text and "of large displacements" in text
+    assert f"with an imperfection (mode) of {1e3 * figures['path']['imperfection_max']:.3g} mm" in text
+    assert len(page.addresses) == 3 + 1 and figures["limit_factor"] is None or figures["limit_factor"] > 0.0
+
+
 def test_a_picture_shows_the_members(place: Path) -> None:
     assert run(f"a.png --loads {LOADS}") == 0
     with Image.open("a.png") as image:

@@ -76,14 +76,8 @@ def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:
     )
 
 
-def encode_path(path: Path) -> bytes:
-    """Return the picture of a path as PNG: load factor against displacement, unstable states dashed."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5.6), dpi=100, facecolor="white")
-    canvas: Any = FigureCanvasAgg(figure)
-    axes: Any = figure.add_subplot()
+def draw_path(axes: Any, path: Path) -> None:
+    """Draw load factors against displacements, unstable states dashed."""
     moves = 1e3 * path.moves
     end = len(moves) if path.critical is None else path.critical + 1
     axes.plot(moves[:end], path.factors[:end], "-o", color="#1f4e79", markersize=3, label="stable before the limit")
@@ -92,14 +86,30 @@ def encode_path(path: Path) -> bytes:
         axes.plot(moves[end - 1], path.factors[end - 1], "o", color="#b03a2e", markersize=9, markerfacecolor="none")
         words = f"{path.kind} {path.limit_factor:.4g}"
         axes.annotate(words, (moves[end - 1], path.factors[end - 1]), (0, 10), textcoords="offset points", ha="center")
-    axes.set_xlabel(f"displacement of {path.truss.node_marks[path.node]} [mm]")
+    axes.margins(y=0.12)
+    axes.legend(fontsize=9)
+
+
+def moves_label(path: Path) -> str:
+    """Return what the displacements of a path are."""
+    return f"displacement of {path.truss.node_marks[path.node]} [mm]"
+
+
+def encode_path(path: Path) -> bytes:
+    """Return the picture of a path as PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 5.6), dpi=100, facecolor="white")
+    canvas: Any = FigureCanvasAgg(figure)
+    axes: Any = figure.add_subplot()
+    draw_path(axes, path)
+    axes.set_xlabel(moves_label(path))
     axes.set_ylabel("load factor")
     axes.set_title(
         f"{path.name}; imperfection: {path.imperfection.kind}, {1e3 * path.imperfection.largest:.3g} mm", fontsize=10
     )
-    axes.margins(y=0.12)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=9)
     stream = io.BytesIO()
     canvas.print_png(stream, metadata={"Software": MARK})
     return stream.getvalue()

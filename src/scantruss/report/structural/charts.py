@@ -1,4 +1,4 @@
-"""Charts of a report: mass from round to round of sizing, and by the number of sections."""
+"""Charts of a report: mass from round to round of sizing and by the number of sections, and the nonlinear path."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...export.drawing.strokes import INK
+from ...structure.nonlinear import Path
+from ...structure.path_report import draw_path, moves_label
 from ...structure.sizing import SizingRound
 from .parts import Frame
 
@@ -39,8 +41,15 @@ def draw_weights(figure: Any, place: Frame, weights: dict[int, float]) -> None:
     axes.spines[["right"]].set_visible(False)
 
 
-def _axes(figure: Any, place: Frame, across: str, up: str) -> Any:
-    """Return axes with whole numbers across."""
+def draw_nonlinear_path(figure: Any, place: Frame, path: Path) -> None:
+    """Draw load factors over the displacement of the node that moves most."""
+    axes = _axes(figure, place, moves_label(path), "load factor", whole=False)
+    draw_path(axes, path)
+    axes.spines[["right"]].set_visible(False)
+
+
+def _axes(figure: Any, place: Frame, across: str, up: str, whole: bool = True) -> Any:
+    """Return axes, with whole numbers across where asked for."""
     from matplotlib.ticker import MaxNLocator
 
     left, bottom, width, height = place
@@ -48,7 +57,8 @@ def _axes(figure: Any, place: Frame, across: str, up: str) -> Any:
     axes.set_xlabel(across, fontsize=9, color=tuple(INK))
     axes.set_ylabel(up, fontsize=9, color=tuple(INK))
     axes.tick_params(labelsize=8, colors=tuple(INK))
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if whole:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.spines[["top"]].set_visible(False)
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)
     return axes

@@ -13,10 +13,11 @@ from ...export.drawing.structure import FORCES, USED, MemberPicture, draw_member
 from ...structure.checks import CLAUSES, MemberChecks, span_of
 from ...structure.modes import Modes
 from ...structure.options import StructureSettings, settings_text
+from ...structure.path_report import path_words
 from ...structure.report import STRUCTURE_HEAD, CaseFigures, StructureReport, structure_lines
 from ...structure.statics import CaseResult, Solution
 from ...structure.truss import Truss
-from .charts import draw_rounds, draw_weights
+from .charts import draw_nonlinear_path, draw_rounds, draw_weights
 from .parts import DataTable, Frame, Headline, Illustration, Listing, PointList, ReportPart, SectionHead, Sentence
 
 LISTED_MEMBERS = 20  #: of the table of the members that are used most
@@ -80,6 +81,9 @@ def _first_page(source: ReportSource) -> Iterator[ReportPart]:
         rows.append(
             ("lowest natural frequency", f"{report.vibration.values[0]:.3g} Hz", "masses of the permanent loads")
         )
+    if (path := report.path) is not None:
+        limit = f"over {path.factors.max():.3g}" if path.limit_factor is None else f"{path.limit_factor:.3g}"
+        rows.append(("limit factor, nonlinear", limit, f"{path.name}, imperfection {path.imperfection.kind}"))
     yield DataTable(("result", "value", "where"), tuple(rows), words=(0, 2))
     for words in report.warnings:
         yield Sentence(f"Warning: {words}", warns=True)
@@ -116,7 +120,8 @@ def _assumptions(truss: Truss, settings: StructureSettings) -> Iterator[str]:
     joints = {"rigid": "rigid joints", "pinned": "pinned joints, axial forces only"}.get(
         settings.joints, f"rotational springs of {settings.joints} Nm/rad at the member ends"
     )
-    yield f"Linear elastic analysis of small displacements; straight members between nodes, {joints}."
+    more = " The nonlinear path is elastic too, of large displacements." if settings.path else ""
+    yield f"Linear elastic analysis of small displacements; straight members between nodes, {joints}.{more}"
     yield f"Scale {settings.scale:g} of the structure to the grid; lengths in m, forces in N, masses in kg; z is up."
     of = truss.material
     strength = "f,y" if of.kind == "steel" else "characteristic strength"
@@ -164,6 +169,9 @@ def _pictures(source: ReportSource) -> Iterator[ReportPart]:
     if report.vibration is not None and len(report.vibration.values):
         yield SectionHead("Vibration")
         yield from _modes(truss, report.vibration, "Vibration mode {}, {:.4g} Hz")
+    if report.path is not None:
+        yield SectionHead("Nonlinear path")
+        yield Illustration(path_words(report.path), partial(_draw, draw_nonlinear_path, report.path), 0.5)
     if report.rounds:
         yield SectionHead("Sizing")
         yield Illustration(
