@@ -18,6 +18,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from small_grids import dome  # noqa: E402
 from small_trusses import EA, EI, FREE, HELD, HINGED, STEEL, TUBE, forces, line_of, make_truss, stiff_along  # noqa: E402
+from test_nonlinear import elastica, perfect, toggle, williams  # noqa: E402
 
 from scantruss.structure.catalogue import find_material, find_section  # noqa: E402
 from scantruss.structure.checks import CLAUSES, strengths, utilizations  # noqa: E402
@@ -51,7 +52,7 @@ class Proof(NamedTuple):
 
 def proofs() -> list[Proof]:
     """Return all proofs, in their order in the docs."""
-    return [*_statics(), *_stability(), *_sections(), *_checks(), *_shells()]
+    return [*_statics(), *_stability(), *_paths(), *_sections(), *_checks(), *_shells()]
 
 
 def _statics() -> Iterator[Proof]:
@@ -174,6 +175,37 @@ def _stability() -> Iterator[Proof]:
         first,
         float(vibration_modes(factor_stiffness(beam), 1).values[0]),
     )
+
+
+def _paths() -> Iterator[Proof]:
+    """Yield limits and large displacements of nonlinear paths."""
+    high, half = 0.5, 10.0
+    length = math.hypot(half, high)
+    rise = math.sqrt(
+        (length * half**2) ** (2 / 3) - half**2
+    )  # at the limit: the moved bar is the cube root of L half2 long
+    now = math.hypot(half, rise)
+    limit = 2 * EA * (length - now) / length * rise / now / 1e3
+    path = perfect(toggle(high, half, pinned=True), stop_factor=40.0)
+    reference = "von Mises truss: 2 E A (L - l) / L h / l, greatest where l3 = L b2"
+    yield Proof("two pinned bars 10 x 0.5 m: limit", "kN", reference, limit, path.limit_factor or 0.0, 1e-5)
+    path = perfect(williams(), stop_factor=1.2)
+    yield Proof(
+        "toggle of two held members: limit", "lb", "Williams 1964", 34.0, 34.0 * (path.limit_factor or 0.0), 5e-3
+    )
+    load, down, away = elastica(1.0)
+    nodes, members = (
+        np.linspace(0, 5.0, 17)[:, None] * [1.0, 0.0, 0.0],
+        np.stack([np.arange(16), np.arange(1, 17)], axis=1),
+    )
+    tip = forces(17, {16: (0, 0, -load * EI / 25.0)})
+    path = perfect(make_truss(nodes, members, {0: HELD}, tip, sections=(stiff_along(factor=1e3),)), stop_factor=1.0)
+    reference = "elastica, Bisshopp and Drucker 1945"
+    moved = path.displacements[-1, 16]
+    yield Proof(
+        "cantilever 5 m, force that turns its tip by 1 rad: tip sinks", "m", reference, 5 * down, -moved[2], 1e-3
+    )
+    yield Proof("the same: tip lies out", "m", reference, 5 * away, 5 + moved[0], 1e-3)
 
 
 def _sections() -> Iterator[Proof]:

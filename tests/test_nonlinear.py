@@ -1,16 +1,17 @@
 """The nonlinear path: closed forms and published figures, laws of every path, and slow obvious twins of the elements."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from scipy.optimize import fsolve, minimize_scalar
+from scipy.optimize import brentq, fsolve, minimize_scalar
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 from small_grids import dome
-from small_trusses import EA, EI, HELD, HINGED, STEEL, forces, make_truss, stiff_along
+from small_trusses import EA, EI, HELD, HINGED, STEEL, TUBE, forces, make_truss, stiff_along
 
 import scantruss as st
 from scantruss.structure.corotational import Members, respond
@@ -64,6 +65,57 @@ def test_von_mises_truss_snaps_through_as_the_closed_form() -> None:
     assert path.ended == "the load factor 40 is reached"
 
 
+WILLIAMS = (12.943, 0.386, 1.885e6, 9.27e3)  # half span and rise [in], E A [lb], E I [lb in2] of Williams' frame, 1964
+
+
+def williams_load(sunk: float) -> float:
+    """By hand: two beam-columns, held at their feet and guided at the top, shallow; the load for a displacement of the top [in, lb]."""
+    half, high, axial, bending = WILLIAMS
+    along = np.linspace(0.0, half, 2001)
+
+    def shortening(pressed: float) -> float:
+        k = math.sqrt(pressed / bending)
+        own, turn = math.cos(k * half) - 1.0, math.sin(k * half)
+        bent = own * (1 - np.cos(k * along)) + turn * (k * along - np.sin(k * along))
+        slopes = sunk / bent[-1] * k * (own * np.sin(k * along) + turn * (1 - np.cos(k * along)))
+        return float(high * sunk / half - np.trapezoid(slopes**2, along) / 2 - pressed * half / axial)
+
+    euler = math.pi**2 * bending / half**2
+    pressed = brentq(shortening, 1e-9 * euler, 3.9 * euler)
+    k = math.sqrt(pressed / bending)
+    return float(2 * (pressed * sunk / (2 / k * math.tan(k * half / 2) - half) + pressed * high / half))
+
+
+def williams() -> Truss:
+    """The frame, loaded by its published limit of 34 lb at the top."""
+    half, high, axial, bending = WILLIAMS
+    count = 8
+    shares = np.linspace(0.0, 1.0, count + 1)[:, None]
+    left = (1 - shares) * [-half, 0.0, 0.0] + shares * [0.0, 0.0, high]
+    nodes = np.concatenate([left, left[-2::-1] * [-1.0, 1.0, 1.0]])
+    members = np.stack([np.arange(2 * count), np.arange(1, 2 * count + 1)], axis=1)
+    values: dict[str, Any] = {"inertia_y": bending, "inertia_z": bending, "torsion": bending, "area": axial}
+    section = replace(TUBE, **{name: value / STEEL.young for name, value in values.items()})
+    plane = (0.0, np.inf, 0.0, np.inf, 0.0, np.inf)
+    held = dict.fromkeys(range(1, 2 * count), plane) | {0: HELD, 2 * count: HELD}
+    held[count] = (np.inf, np.inf, 0.0, np.inf, np.inf, np.inf)
+    load = forces(2 * count + 1, {count: (0, 0, -34.0)})
+    return make_truss(nodes, members, held, load, sections=(section,))
+
+
+def test_williams_toggle_snaps_as_two_beam_columns_do() -> None:
+    """Its limit of 34 lb is published: Williams 1964, and many since."""
+    truss = williams()
+    top = len(truss.nodes) // 2
+    path = perfect(truss, stop_factor=1.2)
+    assert path.limit_factor is not None and 34 * path.limit_factor == pytest.approx(34.0, rel=0.005)
+    peak = minimize_scalar(lambda sunk: -williams_load(sunk), bounds=(0.05, 0.4), method="bounded")
+    assert 34 * path.limit_factor == pytest.approx(-peak.fun, rel=2e-3)
+    sunk = -path.displacements[1:, top, 2]
+    assert sunk.max() > 0.5 and (np.diff(path.factors) < 0.0).any()  # through the limit, and stiff again
+    assert 34 * path.factors[1:] == pytest.approx([williams_load(each) for each in sunk], rel=5e-3)
+
+
 def test_a_cantilever_under_an_end_moment_rolls_up_into_a_circle() -> None:
     """The turn is M L / E I in every state, and the tip lies on the circle, in any direction in space."""
     length, count = 10.0, 20
@@ -80,14 +132,18 @@ def test_a_cantilever_under_an_end_moment_rolls_up_into_a_circle() -> None:
         assert Rotation.from_rotvec(turn.T @ moved[3:]).as_rotvec()[1] == pytest.approx(-length / radius, rel=1e-4)
 
 
-@pytest.mark.parametrize("slope", [0.5, 1.0, 1.3])
-def test_a_cantilever_under_an_end_force_is_the_elastica(slope: float) -> None:
-    """Bisshopp and Drucker 1945: elliptic integrals, by the slope of the tip."""
+def elastica(slope: float) -> tuple[float, float, float]:
+    """Load [E I / L2], and how far down and out the tip of a cantilever lies [L], by its slope: Bisshopp and Drucker 1945."""
     modulus = (1 + math.sin(slope)) / 2
     start = math.asin(math.sqrt(1 / (2 * modulus)))
     load = float(ellipk(modulus) - ellipkinc(start, modulus)) ** 2
     down = 1 - 2 * float(ellipe(modulus) - ellipeinc(start, modulus)) / math.sqrt(load)
-    away = math.sqrt(2 * math.sin(slope) / load)
+    return load, down, math.sqrt(2 * math.sin(slope) / load)
+
+
+@pytest.mark.parametrize("slope", [0.5, 1.0, 1.3])
+def test_a_cantilever_under_an_end_force_is_the_elastica(slope: float) -> None:
+    load, down, away = elastica(slope)
     length, count = 5.0, 16
     nodes, members = chain(length, count)
     tip = forces(count + 1, {count: (0, 0, -load * EI / length**2)})

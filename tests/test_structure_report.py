@@ -169,7 +169,8 @@ def test_the_nonlinear_path_is_in_the_report(place: Path) -> None:
     text = " ".join(page.text)
     assert "limit factor, nonlinear" in text and "Nonlinear path" in text and "of large displacements" in text
     assert f"with an imperfection (mode) of {1e3 * figures['path']['imperfection_max']:.3g} mm" in text
-    assert len(page.addresses) == 3 + 1 and figures["limit_factor"] is None or figures["limit_factor"] > 0.0
+    assert len(page.addresses) == 3 + 1
+    assert figures["limit_factor"] is None or f"{figures['limit_factor']:.3g}" in text
 
 
 def test_a_picture_shows_the_members(place: Path) -> None:
