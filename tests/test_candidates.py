@@ -113,7 +113,15 @@ def test_where_none_passes_the_first_fault_is_the_one_that_is_raised(monkeypatch
     begun = refusing(monkeypatch, lambda _: False)
     with pytest.raises(FrontError, match="fault 1"):
         st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
-    assert len(begun) == 4 * 4 + 3
+    assert len(begun) == 2 * (4 * 4 + 3)  # with the effort asked for, then with the least
+    assert [attempt.settings.effort for attempt in begun] == ["normal"] * (4 * 4 + 3) + ["quick"] * (4 * 4 + 3)
+
+
+def test_more_effort_never_gives_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing(monkeypatch, lambda attempt: attempt.settings.effort == "quick")
+    for effort in ("normal", "best", "quick"):
+        grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0, effort=effort))
+        assert known(grid.settings).effort == "quick" and known(grid.certificate).passed
 
 
 def test_no_more_grids_are_made_than_the_law_says(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -121,7 +129,7 @@ def test_no_more_grids_are_made_than_the_law_says(monkeypatch: pytest.MonkeyPatc
     begun = refusing(monkeypatch, lambda _: False)
     with pytest.raises(FrontError, match="fault 1"):
         st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
-    assert len(begun) == MOST_RUNS
+    assert len(begun) == 2 * MOST_RUNS  # for each of two efforts
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])

@@ -23,6 +23,8 @@ from .scan.stream.fit import read_to_fit
 from .settings import Settings
 from .surface.samples import sample_surface
 
+LEAST_EFFORT = "quick"
+
 
 def grid_from_points(
     points: np.ndarray, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
@@ -88,19 +90,23 @@ def grid_from_cloud(
     -------
     Grid
         Where no grid passes the checks, one with a look at sharp edges, without the ridges of the scan, of its mean surface, with
-        other samples or by the paper's method, if that passes; its settings say so: `plain_body`, `sharp_edges`, `ridge_angle` 0, a
-        `smooth_scale`, another `box_size`, `method` "paper".
+        other samples, by the paper's method or with the least effort, if that passes; its settings say so: `plain_body`,
+        `sharp_edges`, `ridge_angle` 0, a `smooth_scale`, another `box_size`, `method` "paper", `effort` "quick".
     """
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
-    try:
-        return first_that_passes(cloud, settings, attempts(cloud, settings), progress=watch).replace(
-            seconds=watch.seconds()
-        )
-    except CertificateError as error:
-        if not keep_failed or not len(error.grid.triangles):
-            raise
-        return error.grid.replace(settings=settings, seconds=watch.seconds())
+    refused: FrontError | None = None
+    for effort in dict.fromkeys((settings.effort, LEAST_EFFORT)):  # more effort never gives less
+        tried = settings.replace(effort=effort)
+        try:
+            grid = first_that_passes(cloud, tried, attempts(cloud, tried), progress=watch)
+            return grid.replace(seconds=watch.seconds())
+        except FrontError as error:
+            refused = refused or error
+    assert refused is not None
+    if not keep_failed or not isinstance(refused, CertificateError) or not len(refused.grid.triangles):
+        raise refused
+    return refused.grid.replace(settings=settings, seconds=watch.seconds())
 
 
 def first_that_passes(

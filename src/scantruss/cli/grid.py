@@ -171,6 +171,7 @@ def grid_with_notes(
         "limb_girth": f"no grid passes with thin limbs cut off as asked, so it is made as with --limb-girth {made.limb_girth:g}",
         "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
+        "effort": f"no grid passes with --effort {settings.effort}, so it is made as with --effort {made.effort}",
         "method": "no grid of the default method passes its certificate here, so it is made by the method of the paper",
     }.items():
         if getattr(made, name) != getattr(settings, name) and not (smoothed and name == "ridge_angle"):
