@@ -1,15 +1,19 @@
 """Statics: textbook values to four digits, laws that hold for every structure, and an independent solver."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from shapes import make
 from small_grids import dome, fan
 from small_trusses import EA, EI, FREE, HELD, HINGED, STEEL, TUBE, forces, line_of, make_truss, stiff_along
 
 import scantruss as st
+from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
 from scantruss.structure.statics import factor_stiffness, solve
@@ -269,14 +273,29 @@ def test_a_slender_structure_is_no_mechanism() -> None:
     assert result.displacements[100, 2] == pytest.approx(-1e6 / (3 * EI), rel=1e-4)
 
 
-@pytest.mark.parametrize("supports", ["boundary", "corners", "lowest:0.5"])
-@pytest.mark.parametrize("count", [5, 8])
-def test_pynite_agrees(supports: str, count: int) -> None:
+def coarse_grid(name: str) -> Grid:
+    """A grid of about a hundred nodes from the scan of a shell, in mm."""
+    scan = make(name, 12_000).points
+    length = math.sqrt(np.ptp(scan[:, :2], axis=0).prod()) / 9
+    return st.grid_from_points(scan, st.Settings(length=length, effort="quick", unit="mm"))
+
+
+GRIDS: dict[str, tuple[Callable[[], Grid], str]] = {  # and their supports
+    **{f"dome {count} {supports}": (partial(dome, count, 40.0), supports)
+       for count in (5, 8) for supports in ("boundary", "corners", "lowest:0.5")},
+    **{name: (partial(coarse_grid, name), "boundary") for name in ("scallop", "limpet", "stadium", "cloth", "clam", "great_court")},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_pynite_agrees(name: str) -> None:
     """The same nodes, members and forces in an independent solver."""
     pynite = pytest.importorskip("Pynite")
+    grid, supports = GRIDS[name][0](), GRIDS[name][1]
     truss = Truss.from_grid(
-        dome(count, 40.0),
-        scale=50,
+        grid,
+        unit="mm",
+        scale=2000.0 / float(grid.lengths.mean()),
         supports=supports,
         support_type="fixed",
         loads="cladding:0.5kN/m2,wind:0.8kN/m2:0.8/-0.5@30",
