@@ -9,8 +9,10 @@ import numpy as np
 
 from ..grid.certificate import LeftOut, place_of
 from ..kernels.geometry.components import component_labels
+from ..kernels.mesh.coverage import nearest_distances
 from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SLIT, SPARSE_POINT
 from ..surface.owners import owners_of
+from .distances import boxes_of
 from .gaps import by_x, is_empty_within
 
 if TYPE_CHECKING:
@@ -60,25 +62,40 @@ def points_left_out(
     for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
         if len(which := np.flatnonzero(samples.judged == judged)):
             parts.append(_part(kind, which, samples, distance))
-    for kind, judged in (("limbs", LIMB), ("slits", SLIT)):
-        if len(which := np.flatnonzero((samples.judged == judged) & (distance > reach))):
-            group = _near_each_other(samples.scan[which], LIMBS_APART * members[which])
-            parts += _places(kind, which, group, samples, distance)
     away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
     owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
     other = small & np.isin(samples.piece[owner], samples.not_chosen)
     floor = other & (samples.piece[owner] == (-1 if samples.floor is None else samples.floor))
+    beyond_cut = _beyond_cut(samples, away, np.where(small & ~other, samples.piece[owner], -1), members)
+    for kind, judged, more in (("limbs", LIMB, away[beyond_cut]), ("slits", SLIT, away[:0])):
+        if len(which := np.union1d(np.flatnonzero((samples.judged == judged) & (distance > reach)), more)):
+            group = _near_each_other(samples.scan[which], LIMBS_APART * members[which])
+            parts += _places(kind, which, group, samples, distance)
     if floor.any():
         parts.append(_part("floor", away[floor], samples, distance))
         other &= ~floor
-    too_small = small & ~other & ~floor
+    too_small = small & ~other & ~floor & ~beyond_cut
     parts += _places("pieces", away[too_small], samples.piece[owner[too_small]], samples, distance)
     far = ~small & (distance[away] > members[away])
     parts += _places("far", away[far], _groups(samples, owner[far]), samples, distance)
     parts.sort(key=lambda part: -part[0].points)
     chosen_out = _places("not chosen", away[other], samples.piece[owner[other]], samples, distance)
     return [*parts, *((replace(part, asked=True), which) for part, which in chosen_out)]
+
+
+def _beyond_cut(samples: SurfaceSamples, which: np.ndarray, piece: np.ndarray, members: np.ndarray) -> np.ndarray:
+    """Return which points (K,) belong to small pieces (K,), else -1, that hung on a limb before it was cut off, as a hoof does."""
+    cut = np.isin(samples.judged, (LIMB, SLIT))
+    beyond = np.zeros(len(which), np.bool_)
+    if cut.any() and (piece >= 0).any():
+        limbs, small = np.ascontiguousarray(samples.scan[cut]), np.flatnonzero(piece >= 0)
+        places, length = np.ascontiguousarray(samples.scan[which[small]]), float(members.max())
+        away = np.empty(len(small))
+        nearest_distances(places, limbs, boxes_of(limbs, length), length, away)
+        hung = piece[small[away < LIMBS_APART * members[which[small]]]]
+        beyond[small] = np.isin(piece[small], hung)
+    return beyond
 
 
 def _part(
