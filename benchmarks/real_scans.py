@@ -81,8 +81,8 @@ WEAKEST = (
     " the scan. At the shorter length its narrow parts are single rows of triangles.",
     "The vase gets members of a seventh of its height, because no shorter length that `info` tries passes. Lip and handle are"
     " smoothed away, and no line says so, as they lie within half a member of the grid.",
-    "The figure with thin limbs passes with less effort than asked for, and its feet, ears and arms are coarse: they are hardly three members"
-    " round. At the longer length both feet are cut off, which is said.",
+    "The figure with thin limbs passes with less effort than asked for, and its feet, ears and arms are coarse: they are hardly"
+    " three members round. At the longer length both feet are cut off, which is said.",
 )
 HEAD = """\
 # Real scans
