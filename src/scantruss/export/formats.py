@@ -26,8 +26,10 @@ from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
+from .opensees import encode_py, encode_tcl
 from .ply import encode_ply
 from .rhino import encode_3dm
+from .s2k import encode_s2k
 from .saf import encode_saf
 from .step import encode_step
 from .style import FileStyle
@@ -67,6 +69,7 @@ def of_grid(encode: Callable[[Grid, FileStyle], bytes], name: str) -> Encoder:
     return one(lambda model, style: encode(model.as_grid(name), style))
 
 
+NO_OPENSEES = "triangles, marks or results (nodes and members are counted from 1)"
 NO_STRUCTURE = "sections, supports, loads or results"
 
 #: suffix -> format
@@ -87,9 +90,12 @@ FORMATS: dict[str, FileFormat] = {
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
     ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True),
+    ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
+    ".s2k": FileFormat("SAP2000", one(encode_s2k), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
     ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
