@@ -6,6 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .grids import add_grid
 from .outputs import Taken, claim, outs_of
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def convert_parser() -> Parser:
         "FILE OUT [OUT ...] [options]",
         "Write a grid or a structure in other formats, such as .dxf, .ifc or .saf.xlsx.",
     )
-    parser.add_argument("source", metavar="FILE", help="saved as .json by scantruss grid or scantruss structure")
+    add_grid(parser, "saved as .json by scantruss grid or scantruss structure", "source", "FILE")
     add_outs(parser, "results; the suffix names the format", "*")
     parser.add_argument("--unit", metavar="|".join(filter(None, UNITS)), help="unit of a grid that has none")
     parser.add_argument(
@@ -62,7 +63,9 @@ def convert(values: Namespace) -> None:
     claim_models(outs, taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        model = read_model(values.source)
+        model = read_model(values.source, values.merge)
+        for note in model.notes:
+            bars.note(note)
         if values.unit is not None:
             model = with_unit(model, values.unit)
         if model.truss is None and model.grid is not None:

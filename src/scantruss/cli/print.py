@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import InputError
+from .grids import add_grid, read_saved_grid
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def print_parser() -> Parser:
         "with sockets for rods."
     )
     parser = Parser("print", usage, said)
-    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    add_grid(parser, "grid saved as .json by scantruss grid")
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
@@ -74,9 +75,7 @@ def print_solid(values: Namespace) -> None:
     taken = {Path(values.grid).resolve(): "grid"}
     for out in outs:
         claim(out, "model", taken, force=values.force)
-    from ..export.json import read_grid
-
-    result = read_grid(values.grid)
+    result = read_saved_grid(values.grid, values.merge)
     if values.bed is not None or values.sockets:
         _print_parts(result, outs, values)
         return

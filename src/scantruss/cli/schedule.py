@@ -8,17 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
-    from ..grid.grid import Grid
-    from ..schedules.forces import Checked
     from ..schedules.records import Schedule, Schedules
     from ..schedules.settings import ScheduleSettings
-    from ..structure.truss import Truss
     from .options import Parser
-
-HEAD = 200  # bytes of a file in which its format stands
 
 
 def schedule_parser() -> Parser:
@@ -34,7 +30,7 @@ def schedule_parser() -> Parser:
         "warnings; of a structure with forces, checks and bolts.\n"
         "Lengths of tubes, balls, clearance and tolerance are millimetres of what is built.",
     )
-    parser.add_argument("grid", metavar="GRID", help="grid or structure saved as .json by scantruss grid or structure")
+    add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
     add_outs(parser, "workbook .xlsx, or .csv: the members, the other tables beside it", "*")
     parser.add_argument(
         "--tube",
@@ -142,24 +138,13 @@ def make_schedule(values: Namespace) -> None:
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        what, checked = read_grid_or_structure(values.grid)
+        what, checked = read_grid_or_structure(values.grid, values.merge, bars)
         bars("schedules", 0.0)
         made = schedule(what, settings, keep_failed=values.keep_failed, checked=checked)
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
             write_schedules(made, save.beside(out))
     print_lines([*schedule_lines(made, settings), f"wrote {' '.join(map(str, outs))}"])
-
-
-def read_grid_or_structure(path: str) -> tuple[Grid | Truss, Checked | None]:
-    """Return what a file holds, and of a structure what it says of the checks."""
-    from ..export.json import read_grid
-    from ..structure.json import STRUCTURE_FORMAT, read_checked
-
-    with Path(path).open("rb") as file:
-        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
-            return read_checked(path)
-    return read_grid(path), None
 
 
 def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of
-from .schedule import read_grid_or_structure
 
 if TYPE_CHECKING:
     from ..setout.make import SettingOut
@@ -33,7 +33,7 @@ def setout_parser() -> Parser:
         "assembly by rings from the supports, each step stable or with the nodes that need props.\n"
         "Lengths that are not of the scan are millimetres of what is built.",
     )
-    parser.add_argument("grid", metavar="GRID", help="grid or structure saved as .json by scantruss grid or structure")
+    add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
     add_outs(parser, "drawing .dxf or .pdf, tables .xlsx or .csv: the supports, the other tables beside it", "*")
     units = "|".join(unit for unit in UNITS if unit)
     for name, metavar, kind, said in (
@@ -93,7 +93,7 @@ def make_setting_out(values: Namespace) -> None:
             claim(check_setout_place(place), "setting out", taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        what, _ = read_grid_or_structure(values.grid)
+        what, _ = read_grid_or_structure(values.grid, values.merge, bars)
         if isinstance(what, Truss) and (own := given.keys() & {"supports", "joints", "scale", "unit"}):
             raise InputError(f"a structure has {min(own)} of its own; leave --{min(own)} out")
         made = set_out(what, settings, keep_failed=values.keep_failed, progress=bars)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from .grids import add_grid, read_saved_grid
 from .outputs import Taken, claim, outs_of
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def structure_parser() -> Parser:
         "GRID OUT [OUT ...] --supports corners [--section CHS114.3x5] [--loads self,snow:1kN/m2] [options]",
         "Make a structure of a saved grid and solve it: supports, loads, linear statics, checks by EN 1993-1-1.",
     )
-    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    add_grid(parser, "grid saved as .json by scantruss grid")
     add_outs(
         parser, "structure with its results; the suffix names the format; report to read .html .pdf, picture .png", "*"
     )
@@ -96,7 +97,6 @@ def structure(values: Namespace) -> None:
         claim(report_place, "report", taken, force=values.force)
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
-    from ..export.json import read_grid
     from ..grid.certificate import check_passed
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
@@ -106,7 +106,7 @@ def structure(values: Namespace) -> None:
     from ..structure.truss import Truss
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
-        grid = read_grid(values.grid)
+        grid = read_saved_grid(values.grid, values.merge, bars)
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))

@@ -7,7 +7,7 @@ are used, and refuse before any work where an extra is not installed.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,14 +20,18 @@ from ..settings import UNITS
 from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
+from .drawing_files import draw_3dm, draw_dxf, draw_ifc, draw_obj, draw_ply
+from .drawing_in import Drawing, grid_of_drawing
 from .dxf import encode_dxf
 from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
+from .opensees import encode_py, encode_tcl
 from .ply import encode_ply
 from .rhino import encode_3dm
+from .s2k import encode_s2k
 from .saf import encode_saf
 from .step import encode_step
 from .style import FileStyle
@@ -53,8 +57,10 @@ class FileFormat:
     holds: tuple[str, ...] = (GRID, STRUCTURE)
     needs_unit: bool = False  #: whether a grid without a unit is refused
     read: Callable[[Path], Model] | None = None
+    draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces that others drew
     library: str = ""  #: module that must be installed
     extra: str = ""  #: of pyproject.toml, which brings it
+    reads_with: str = ""  #: module that must be installed to read; its extra is `extra`
 
 
 def one(encode: Callable[[Model, FileStyle], bytes]) -> Encoder:
@@ -67,6 +73,7 @@ def of_grid(encode: Callable[[Grid, FileStyle], bytes], name: str) -> Encoder:
     return one(lambda model, style: encode(model.as_grid(name), style))
 
 
+NO_OPENSEES = "triangles, marks or results (nodes and members are counted from 1)"
 NO_STRUCTURE = "sections, supports, loads or results"
 
 #: suffix -> format
@@ -77,19 +84,24 @@ FORMATS: dict[str, FileFormat] = {
         loses_of_structure=NO_STRUCTURE,
     ),
     ".json": FileFormat("JSON", one(lambda model, style: encode_model(model)), read=read_json),
-    ".obj": FileFormat("OBJ", of_grid(lambda grid, style: encode_obj(grid, style.obj), "OBJ"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
-    ".ply": FileFormat("PLY", of_grid(lambda grid, style: encode_ply(grid), "PLY"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".obj": FileFormat("OBJ", of_grid(lambda grid, style: encode_obj(grid, style.obj), "OBJ"), draw=draw_obj,
+                       loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".ply": FileFormat("PLY", of_grid(lambda grid, style: encode_ply(grid), "PLY"), draw=draw_ply,
+                       loses_of_structure=f"marks, {NO_STRUCTURE}"),
     ".png": FileFormat(
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
-    ".3dm": FileFormat("3DM", one(encode_3dm), loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
-    ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".3dm": FileFormat("3DM", one(encode_3dm), draw=draw_3dm, loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
-    ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True),
+    ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True, draw=draw_ifc, reads_with="ifcopenshell", extra="bim"),
+    ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
+    ".s2k": FileFormat("SAP2000", one(encode_s2k), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
     ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
@@ -152,7 +164,7 @@ def check_unit(path: Path, unit: str) -> None:
         raise FormatError(f"{row.name} needs a unit, and that of the grid is not known; give it with --unit {known}")
 
 
-def check_library(row: FileFormat) -> None:
+def check_library(row: FileFormat, *, reading: bool = False) -> None:
     """Refuse a format whose library is not installed.
 
     Raises
@@ -160,9 +172,10 @@ def check_library(row: FileFormat) -> None:
     FormatError
         It is missing; the message has the command that installs it.
     """
-    if row.library and find_spec(row.library) is None:
+    library = row.reads_with or row.library if reading else row.library
+    if library and find_spec(library) is None:
         raise FormatError(
-            f'{row.name} needs {row.library}, which is not installed; install it with: python -m pip install "scantruss[{row.extra}]"'
+            f'{row.name} needs {library}, which is not installed; install it with: python -m pip install "scantruss[{row.extra}]"'
         )
 
 
@@ -228,25 +241,32 @@ def write(
     return write_files(encode(model, path, style or FileStyle()))
 
 
-def read_model(path: str | Path) -> Model:
+def read_model(path: str | Path, merge: float | None = None) -> Model:
     """Read a grid or a structure; the suffix of the path tells the format.
 
     Parameters
     ----------
     path : str or Path
-        A .json that `scantruss grid` or `scantruss structure` wrote; a structure with load cases is solved again.
+        A .json that `scantruss grid` or `scantruss structure` wrote, of which a structure with load cases is solved again; or lines
+        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc. The notes of the model say what is to be known of these.
+    merge : float, optional
+        Distance within which ends of such lines are one node; by default a thousandth of their median length.
 
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, or the file cannot be read.
+        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid of triangles.
     """
     path = Path(path)
-    known = {suffix: row for suffix, row in FORMATS.items() if row.read is not None}
+    known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}
     row = known.get(suffix_of(path, known))
-    if row is None or row.read is None:
+    if row is None:
         raise FormatError(f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}')
     if not path.is_file():
         raise FormatError(f"there is no file {path}; name a grid or a structure, such as one saved as .json")
-    check_library(row)
-    return row.read(path)
+    check_library(row, reading=True)
+    if row.draw is None:
+        assert row.read is not None
+        return row.read(path)
+    grid, notes = grid_of_drawing(row.draw(path), path.name, merge)
+    return replace(model_of_grid(grid), notes=notes)

@@ -44,6 +44,7 @@ class Model:
     report: StructureReport | None = None  #: of the solution
     utilization: np.ndarray | None = None  #: (M,) of the members, where they are checked
     cloud: PointCloud | None = None  #: the scan, which some formats draw
+    notes: tuple[str, ...] = ()  #: what a user should know of a file that others made
 
     @cached_property
     def nodes(self) -> np.ndarray:

@@ -34,21 +34,34 @@ def _links(grid: GridTables) -> tuple[np.ndarray, np.ndarray]:
     return order[same], order[same + 1]
 
 
-def _is_orientable(grid: GridTables) -> bool:
-    """Whether the triangles can be turned so that neighbours run along their edge in opposite directions.
-
-    Each triangle is put on two sheets, as it stands and turned over; links join what agrees. The grid is one-sided if
-    a triangle is joined with itself turned over.
-    """
+def _sheets(grid: GridTables) -> np.ndarray:
+    """Return the (2 T,) pieces of two sheets: each triangle as it stands, then turned over; links join what agrees."""
     count = len(grid.triangles)
     one, other = _links(grid)
     starts = grid.triangles.T.ravel()
     turned = starts[one] == starts[other]
     a, b = one % count, other % count
-    label = component_labels(
+    return component_labels(
         2 * count, np.concatenate([a, a + count]), np.concatenate([b + count * turned, b + count * ~turned])
     )
+
+
+def _is_orientable(grid: GridTables) -> bool:
+    """Whether the triangles can be turned so that neighbours run along their edge in opposite directions.
+
+    The grid is one-sided if a triangle is joined with itself turned over.
+    """
+    label, count = _sheets(grid), len(grid.triangles)
     return not np.any(label[:count] == label[count:])
+
+
+def wound_alike(grid: GridTables) -> np.ndarray:
+    """Return the (T, 3) triangles of a grid with two sides, each turned to agree with the first of those it is joined to."""
+    label, count = _sheets(grid), len(grid.triangles)
+    own, other = label[:count], label[count:]
+    _, first, piece = np.unique(np.minimum(own, other), return_index=True, return_inverse=True)
+    turned = own != own[first[piece.ravel()]]
+    return np.where(turned[:, None], grid.triangles[:, [0, 2, 1]], grid.triangles)
 
 
 def pinched_nodes(grid: GridTables) -> np.ndarray:

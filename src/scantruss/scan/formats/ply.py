@@ -51,11 +51,11 @@ def read_ply(path: Path, wanted: Sequence[str] = ()) -> Content:
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}
     points, normals = np.ascontiguousarray(table[:, :3]), None
     if not all(name in attributes for name in NORMAL_COLUMNS):
-        normals = normals_from_faces(points, _faces(path, header))
+        normals = normals_from_faces(points, ply_faces(path, header))
     return Content(points, attributes, metres=metres_of(header.unit), normals=normals)
 
 
-def _faces(path: Path, header: PlyHeader) -> list[np.ndarray]:
+def ply_faces(path: Path, header: PlyHeader) -> list[np.ndarray]:
     """Return the faces of a PLY file, those of as many corners together; none where they are damaged or there are none."""
     element = next((each for each in header.elements if each.name == "face"), None)
     names = [] if element is None else [p.name for p in element.properties if p.count_type]

@@ -14,6 +14,8 @@ from .numpy_ import read_npy, read_npz, write_npy, write_npz
 from .parquet import read_parquet
 from .pcd import read_pcd, write_pcd
 from .ply import read_ply, write_ply
+from .ptx import read_ptx
+from .raster import read_asc
 from .text import read_text, write_text
 
 Reader = Callable[[Path, Sequence[str]], Content]  # path and wanted attributes
@@ -37,7 +39,8 @@ SCAN_FORMATS = {
     ".txt": Format(read_text, write_text),
     ".csv": Format(read_text, write_text),
     ".pts": Format(read_text),
-    ".asc": Format(read_text),
+    ".ptx": Format(read_ptx),
+    ".asc": Format(read_asc),
     ".npy": Format(read_npy, write_npy),
     ".npz": Format(read_npz, write_npz),
     ".parquet": Format(read_parquet),

@@ -1,0 +1,53 @@
+"""Grids and structures that commands read: saved by ScanTruss, or drawn by others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..report.terminal import Bars
+    from ..schedules.forces import Checked
+    from ..structure.truss import Truss
+    from .options import Parser
+
+HEAD = 200  # bytes of a file in which its format stands
+DRAWN = ".obj .ply .dxf .3dm .ifc"  # that `read_model` reads
+
+
+def add_grid(parser: Parser, said: str, name: str = "grid", metavar: str = "GRID") -> None:
+    """Add the argument of a grid, and how one that others drew is read."""
+    from .options import number
+
+    parser.add_argument(name, metavar=metavar, help=f"{said}, or lines or faces that others drew: {DRAWN}")
+    parser.add_argument(
+        "--merge",
+        metavar="D",
+        type=number,
+        help="of lines that others drew: distance within which ends are one node (default: median length/1000)",
+    )
+
+
+def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) -> Grid:
+    """Return the grid of a file; what is to be known of one that others drew is noted."""
+    from ..export.formats import FORMATS, read_model
+    from ..export.json import read_grid
+    from ..report.terminal import print_lines
+
+    if (row := FORMATS.get(Path(path).suffix.lower())) is None or row.draw is None:
+        return read_grid(path)
+    model = read_model(path, merge)
+    for note in model.notes:
+        bars.note(note) if bars else print_lines([note])
+    return model.as_grid("a command")
+
+
+def read_grid_or_structure(path: str, merge: float | None, bars: Bars) -> tuple[Grid | Truss, Checked | None]:
+    """Return what a file holds, and of a structure what it says of the checks."""
+    from ..structure.json import STRUCTURE_FORMAT, read_checked
+
+    with Path(path).open("rb") as file:
+        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
+            return read_checked(path)
+    return read_saved_grid(path, merge, bars), None

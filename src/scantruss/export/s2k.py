@@ -1,0 +1,238 @@
+"""SAP2000's text tables (.s2k): a structure with its axes, releases, supports, springs, load patterns, cases and combinations.
+
+Local axis 2 is our z, along the normal of the surface, local axis 3 our -y. The default of SAP2000 has 2 in the vertical plane through
+the member; the angle of each frame turns it to the normal. Sections are general ones without areas for shear, so that members are
+those of Euler and Bernoulli, as here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import FormatError
+from ..runtime.ours import MARK
+from .model import Model, temperatures
+from .style import FileStyle
+
+if TYPE_CHECKING:
+    from ..structure.truss import LoadCase, Truss
+
+S2K_TYPES = {"steel": "Steel", "aluminium": "Aluminum"}  #: of materials; others are "Other"
+PATTERNS = {"permanent": "Dead", "snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: others are "Live"
+VERTICAL = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
+WAYS = ("U1", "U2", "U3", "R1", "R2", "R3")
+
+Row = dict[str, Any]  # field -> value
+
+
+def encode_s2k(model: Model, style: FileStyle) -> bytes:
+    """Return the text of a structure in kN, m and degrees Celsius, in the frame of the scan."""
+    truss = model.truss
+    if truss is None:
+        raise FormatError("SAP2000 holds structures; make one of the grid with scantruss structure")
+    lines = [f"$ {MARK}"]
+    for name, rows in _tables(model, truss):
+        found = [f"   {'   '.join(f'{field}={_text(value)}' for field, value in row.items())}" for row in rows]
+        if found:
+            lines += ["", f'TABLE:  "{name}"', *found]
+    return ("\r\n".join([*lines, "", "END TABLE DATA", ""])).encode("utf-8")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        value = "".join(letter if letter.isprintable() else " " for letter in value).replace('"', "'")
+        return value if value.isalnum() else f'"{value}"'
+    return repr(value)
+
+
+def frame_angles(axes: np.ndarray) -> np.ndarray:
+    """Return the angles (M,) [degrees] by which local axis 2 turns from its default to our z, of (M, 3, 3) local axes as rows."""
+    x, z = axes[:, 0], axes[:, 2]
+    upright = np.hypot(x[:, 0], x[:, 1]) < VERTICAL
+    reference = np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    second = reference - (reference * x).sum(axis=1, keepdims=True) * x
+    second /= np.linalg.norm(second, axis=1, keepdims=True)
+    third = np.cross(x, second)
+    angles: np.ndarray = np.degrees(np.arctan2((z * third).sum(axis=1), (z * second).sum(axis=1)))
+    return angles
+
+
+def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[Row]]]:
+    from ..structure.truss import GRAVITY
+
+    material, marks, members = truss.material, truss.node_marks, truss.member_marks
+    turning = "No" if truss.pinned else "Yes"
+    yield "PROGRAM CONTROL", [{"ProgramName": "SAP2000", "CurrUnits": "KN, m, C"}]
+    yield (
+        "ACTIVE DEGREES OF FREEDOM",
+        [dict.fromkeys(("UX", "UY", "UZ"), "Yes") | dict.fromkeys(("RX", "RY", "RZ"), turning)],
+    )
+    yield (
+        "MATERIAL PROPERTIES 01 - GENERAL",
+        [
+            {
+                "Material": material.name,
+                "Type": S2K_TYPES.get(material.kind, "Other"),
+                "SymType": "Isotropic",
+                "TempDepend": "No",
+            }
+        ],
+    )
+    yield "MATERIAL PROPERTIES 02 - BASIC MECHANICAL PROPERTIES", [
+        {
+            "Material": material.name, "UnitWeight": material.density * GRAVITY / 1e3, "UnitMass": material.density / 1e3,
+            "E1": material.young / 1e3, "G12": material.shear / 1e3, "U12": material.young / (2 * material.shear) - 1,
+            "A1": material.alpha,
+        }
+    ]  # fmt: skip
+    yield "FRAME SECTION PROPERTIES 01 - GENERAL", [
+        {
+            "SectionName": each.name, "Material": material.name, "Shape": "General", "t3": each.depth, "t2": each.width,
+            "Area": each.area, "TorsConst": each.torsion, "I33": each.inertia_y, "I22": each.inertia_z, "I23": 0.0,
+            "AS2": 0.0, "AS3": 0.0, "S33": each.elastic_y, "S22": each.elastic_z, "Z33": each.plastic_y, "Z22": each.plastic_z,
+        }
+        for each in truss.sections
+    ]  # fmt: skip
+    yield (
+        "LOAD PATTERN DEFINITIONS",
+        [
+            {
+                "LoadPat": case.name,
+                "DesignType": PATTERNS.get(case.action, "Live"),
+                "SelfWtMult": float(case.self_weight),
+            }
+            for case in truss.cases
+        ],
+    )
+    yield "GROUPS 1 - DEFINITIONS", [{"GroupName": name} for name in model.groups]
+    yield (
+        "JOINT COORDINATES",
+        [
+            {
+                "Joint": mark,
+                "CoordSys": "GLOBAL",
+                "CoordType": "Cartesian",
+                "XorR": x,
+                "Y": y,
+                "Z": z,
+                "SpecialJt": "No",
+            }
+            for mark, (x, y, z) in zip(marks, model.nodes.tolist(), strict=True)
+        ],
+    )
+    yield (
+        "CONNECTIVITY - FRAME",
+        [
+            {"Frame": mark, "JointI": marks[start], "JointJ": marks[end], "IsCurved": "No"}
+            for mark, (start, end) in zip(members, truss.members.tolist(), strict=True)
+        ],
+    )
+    held = truss.supports[:, :3] if truss.pinned else truss.supports
+    yield "JOINT RESTRAINT ASSIGNMENTS", [
+        {"Joint": marks[node]} | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(WAYS, held[node].tolist(), strict=False)}
+        for node in np.flatnonzero(np.isinf(held).any(axis=1)).tolist()
+    ]  # fmt: skip
+    springs = np.where(np.isinf(held), 0.0, held) / 1e3
+    yield (
+        "JOINT SPRING ASSIGNMENTS 1 - UNCOUPLED",
+        [
+            {"Joint": marks[node], "CoordSys": "GLOBAL"} | dict(zip(WAYS, springs[node].tolist(), strict=False))
+            for node in np.flatnonzero(springs.any(axis=1)).tolist()
+        ],
+    )
+    yield (
+        "FRAME SECTION ASSIGNMENTS",
+        [
+            {"Frame": mark, "AutoSelect": "N.A.", "AnalSect": truss.sections[section].name, "MatProp": "Default"}
+            for mark, section in zip(members, truss.section_of.tolist(), strict=True)
+        ],
+    )
+    yield (
+        "FRAME LOCAL AXES ASSIGNMENTS 1 - TYPICAL",
+        [
+            {"Frame": mark, "Angle": angle, "AdvanceAxes": "No"}
+            for mark, angle in zip(members, frame_angles(truss.axes).tolist(), strict=True)
+        ],
+    )
+    ends = np.zeros_like(truss.end_stiffness) if truss.pinned else truss.end_stiffness
+    loose = np.flatnonzero(np.isfinite(ends).any(axis=(1, 2))).tolist()
+    yield "FRAME RELEASE ASSIGNMENTS 1 - GENERAL", [_ends(members[k], ends[k], None) for k in loose]
+    partial = np.flatnonzero((np.isfinite(ends) & (ends > 0)).any(axis=(1, 2))).tolist()
+    yield "FRAME RELEASE ASSIGNMENTS 2 - PARTIAL FIXITY", [_ends(members[k], ends[k], 1e-3) for k in partial]
+    yield (
+        "GROUPS 2 - ASSIGNMENTS",
+        [
+            {"GroupName": model.groups[group], "ObjectType": "Frame", "ObjectLabel": mark}
+            for mark, group in zip(members, model.group_of.tolist(), strict=True)
+        ],
+    )
+    loads: dict[str, list[Row]] = {}
+    for case in truss.cases:
+        for name, row in _loads(truss, case):
+            loads.setdefault(name, []).append(row)
+    yield from loads.items()
+    yield (
+        "LOAD CASE DEFINITIONS",
+        [
+            {"Case": case.name, "Type": "LinStatic", "InitialCond": "Zero", "DesTypeOpt": "Prog Det", "RunCase": "Yes"}
+            for case in truss.cases
+        ],
+    )
+    yield (
+        "CASE - STATIC 1 - LOAD ASSIGNMENTS",
+        [{"Case": case.name, "LoadType": "Load pattern", "LoadName": case.name, "LoadSF": 1.0} for case in truss.cases],
+    )
+    yield (
+        "COMBINATION DEFINITIONS",
+        [
+            {"ComboName": each.name}
+            | ({} if number else {"ComboType": "Linear Add", "AutoDesign": "No"})
+            | {"CaseType": "Linear Static", "CaseName": case, "ScaleFactor": float(factor)}
+            for each in truss.combinations
+            for number, (case, factor) in enumerate(each.factors)
+        ],
+    )
+
+
+def _ends(mark: str, springs: np.ndarray, kilo: float | None) -> Row:
+    """Return the releases of a member, or with `kilo` their springs; M3 is about our y, M2 about our z."""
+    row: Row = {"Frame": mark}
+    for axis, word in ((1, "M2"), (0, "M3")):
+        for end, letter in enumerate("IJ"):
+            value = float(springs[end, axis])
+            if kilo is None:
+                row[f"{word}{letter}"] = "No" if np.isinf(value) else "Yes"
+            elif np.isfinite(value) and value > 0:
+                row[f"{word}{letter}"] = value * kilo
+    return row
+
+
+def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
+    """Yield the table and the row of each load; weight is a factor of the load pattern."""
+    if case.nodal is not None:
+        forces = case.nodal / 1e3
+        for node in np.flatnonzero(forces.any(axis=1)).tolist():
+            row: Row = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
+            yield (
+                "JOINT LOADS - FORCE",
+                row | dict(zip(("F1", "F2", "F3", "M1", "M2", "M3"), forces[node].tolist(), strict=True)),
+            )
+    if case.line is not None:
+        for member, axis in np.argwhere(case.line).tolist():
+            value = float(case.line[member, axis]) / 1e3
+            yield "FRAME LOADS - DISTRIBUTED", {
+                "Frame": truss.member_marks[member], "LoadPat": case.name, "CoordSys": "GLOBAL", "Type": "Force", "Dir": "XYZ"[axis],
+                "DistType": "RelDist", "RelDistA": 0.0, "RelDistB": 1.0, "FOverLA": value, "FOverLB": value,
+            }  # fmt: skip
+    for member, change in enumerate(temperatures(truss, case, "SAP2000").tolist()):
+        if change:
+            row = {"Frame": truss.member_marks[member], "LoadPat": case.name, "Type": "Temperature", "Temp": change}
+            yield "FRAME LOADS - TEMPERATURE", row | {"JtPattern": "None"}
+    if case.settlement is not None:
+        moved = np.nan_to_num(case.settlement)
+        for node in np.flatnonzero(moved.any(axis=1)).tolist():
+            row = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
+            yield "JOINT LOADS - GROUND DISPLACEMENT", row | dict(zip(WAYS, moved[node].tolist(), strict=False))

@@ -1,0 +1,228 @@
+"""Files for SAP2000 and OpenSees: rebuilt by a reader of their text or run by a solver that is not ours, and compared."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_grids import dome
+from test_convert import UTM, roof
+
+import scantruss as st
+from scantruss.structure.catalogue import Material, Section
+from scantruss.structure.truss import GRAVITY, LoadCase
+
+KINDS: list[dict[str, Any]] = [
+    {},
+    {"joints": "pinned", "support_type": "springs:5MN/m"},
+    {"joints": 2e5, "support_type": "springs:5MN/m", "section": "IPE200", "material": "6082-T6"},
+    {"section": "R100x200", "material": "GL24h", "node_allowance": 0.15, "support_type": "fixed"},
+]
+
+
+def example(others: dict[str, Any]) -> st.Truss:
+    """A roof; the first with every kind of load and joint that a structure can have."""
+    truss = roof(4, **others)
+    if others:
+        return truss
+    rng = np.random.default_rng(1)
+    count, held = len(truss.nodes), np.flatnonzero(truss.supports.any(axis=1))
+    settled = np.full((count, 3), np.nan)
+    settled[held[2], 2] = -0.005
+    springs = truss.end_stiffness.copy()
+    springs[3, 0], springs[5] = [0.0, 3e5], [1e5, np.inf]
+    supports = truss.supports.copy()
+    supports[held[1], :3] = [3e6, np.inf, 0.0]
+    odd = LoadCase("Träger =1 中", nodal=1e3 * rng.normal(size=(count, 6)), line=1e3 * rng.normal(size=(len(truss.members), 3)),
+                   strain=rng.normal(size=len(truss.members)) * 1e-4, settlement=settled)  # fmt: skip
+    return truss.replace(cases=(*truss.cases, odd), end_stiffness=springs, supports=supports, section_of=np.arange(
+        len(truss.members)) % 2, sections=(truss.sections[0], st.Truss.from_grid(dome(3, unit="m"), supports="boundary",
+        section="IPE200").sections[0]))  # fmt: skip
+
+
+def read_s2k(path: Path) -> dict[str, list[dict[str, str]]]:
+    """Return the tables of a text file of SAP2000, each a list of rows."""
+    tables: dict[str, list[dict[str, str]]] = {}
+    text = path.read_bytes().decode("utf-8")
+    assert text.endswith("\r\nEND TABLE DATA\r\n") and text.count("\n") == text.count("\r\n")
+    for line in text.splitlines():
+        if found := re.fullmatch(r'TABLE:  "(.*)"', line):
+            rows = tables.setdefault(found[1], [])
+            assert not rows
+        elif line.startswith("   "):
+            fields = re.findall(r'   (\w+)=("[^"]*"|\S+)', line)
+            assert "".join(f"   {name}={value}" for name, value in fields) == line
+            rows.append({name: value.strip('"') for name, value in fields})
+    return tables
+
+
+def axes_of_sap(start: np.ndarray, end: np.ndarray, angle: float) -> np.ndarray:
+    """Return the local axes 1, 2, 3 as its manual says: 2 in the vertical plane, upwards, or along X; then turned about 1."""
+    one = (end - start) / np.linalg.norm(end - start)
+    up = np.array([1.0, 0, 0]) if np.linalg.norm(np.cross(one, [0, 0, 1])) < 1e-3 else np.array([0, 0, 1.0])
+    three = np.cross(one, up)
+    three /= np.linalg.norm(three)
+    two = np.cross(three, one)
+    cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return np.stack([one, cos * two + sin * three, cos * three - sin * two])
+
+
+def _section(row: dict[str, str]) -> Section:
+    area, major, minor, torsion = (float(row[name]) for name in ("Area", "I33", "I22", "TorsConst"))
+    return Section(row["SectionName"], "CHS", 1, 1, 0.1, "", area, major, minor, torsion, 1, 1, 1, 1)
+
+
+def truss_of_s2k(tables: dict[str, list[dict[str, str]]]) -> st.Truss:
+    """Return the structure that a program which knows the tables alone makes of them."""
+    assert tables["PROGRAM CONTROL"][0]["CurrUnits"] == "KN, m, C"
+    joints = {row["Joint"]: k for k, row in enumerate(tables["JOINT COORDINATES"])}
+    nodes = np.array([[float(row[name]) for name in ("XorR", "Y", "Z")] for row in tables["JOINT COORDINATES"]])
+    frames = {row["Frame"]: k for k, row in enumerate(tables["CONNECTIVITY - FRAME"])}
+    members = np.array([[joints[row[end]] for end in ("JointI", "JointJ")] for row in tables["CONNECTIVITY - FRAME"]])
+    steel = tables["MATERIAL PROPERTIES 02 - BASIC MECHANICAL PROPERTIES"][0]
+    material = Material("A", "other", 1e3 * float(steel["E1"]), 1e3 * float(steel["G12"]), 1e3 * float(steel["UnitMass"]),
+                        float(steel["A1"]), 1.0, 1.0)  # fmt: skip
+    assert float(steel["UnitWeight"]) == pytest.approx(float(steel["UnitMass"]) * GRAVITY)
+    names = [row["SectionName"] for row in tables["FRAME SECTION PROPERTIES 01 - GENERAL"]]
+    sections = tuple(_section(row) for row in tables["FRAME SECTION PROPERTIES 01 - GENERAL"])
+    of = {row["Frame"]: names.index(row["AnalSect"]) for row in tables["FRAME SECTION ASSIGNMENTS"]}
+    normals = np.zeros((len(members), 3))
+    for row in tables["FRAME LOCAL AXES ASSIGNMENTS 1 - TYPICAL"]:
+        k = frames[row["Frame"]]
+        normals[k] = axes_of_sap(nodes[members[k, 0]], nodes[members[k, 1]], float(row["Angle"]))[1]
+    ways = ("U1", "U2", "U3", "R1", "R2", "R3")
+    supports = np.zeros((len(nodes), 6))
+    for row in tables.get("JOINT SPRING ASSIGNMENTS 1 - UNCOUPLED", []):
+        supports[joints[row["Joint"]]] = [1e3 * float(row.get(way, 0)) for way in ways]
+    for row in tables.get("JOINT RESTRAINT ASSIGNMENTS", []):
+        supports[joints[row["Joint"]], [row.get(way) == "Yes" for way in ways]] = np.inf
+    springs = np.full((len(members), 2, 2), np.inf)
+    for name, held in (("1 - GENERAL", False), ("2 - PARTIAL FIXITY", True)):
+        for row in tables.get(f"FRAME RELEASE ASSIGNMENTS {name}", []):
+            for axis, word in ((0, "M3"), (1, "M2")):
+                for end, letter in enumerate("IJ"):
+                    if held and f"{word}{letter}" in row:
+                        assert springs[frames[row["Frame"]], end, axis] == 0
+                        springs[frames[row["Frame"]], end, axis] = 1e3 * float(row[f"{word}{letter}"])
+                    elif row.get(f"{word}{letter}") == "Yes":
+                        springs[frames[row["Frame"]], end, axis] = 0.0
+    pinned = tables["ACTIVE DEGREES OF FREEDOM"][0]["RX"] == "No"
+    if pinned:
+        assert not springs.any()
+    size, count = len(nodes), len(members)
+    loads: dict[str, dict[str, Any]] = {
+        row["LoadPat"]: {
+            "self_weight": float(row["SelfWtMult"]),
+            "nodal": np.zeros((size, 6)),
+            "line": np.zeros((count, 3)),
+            "temperature": np.zeros(count),
+            "settlement": np.full((size, 3), np.nan),
+        }
+        for row in tables["LOAD PATTERN DEFINITIONS"]
+    }
+    for row in tables.get("JOINT LOADS - FORCE", []):
+        force = [float(row[word]) for word in ("F1", "F2", "F3", "M1", "M2", "M3")]
+        loads[row["LoadPat"]]["nodal"][joints[row["Joint"]]] += 1e3 * np.array(force)
+    for row in tables.get("FRAME LOADS - DISTRIBUTED", []):
+        assert row["FOverLA"] == row["FOverLB"] and (row["CoordSys"], row["RelDistB"]) == ("GLOBAL", "1.0")
+        loads[row["LoadPat"]]["line"][frames[row["Frame"]], "XYZ".index(row["Dir"])] += 1e3 * float(row["FOverLA"])
+    for row in tables.get("FRAME LOADS - TEMPERATURE", []):
+        loads[row["LoadPat"]]["temperature"][frames[row["Frame"]]] += float(row["Temp"])
+    for row in tables.get("JOINT LOADS - GROUND DISPLACEMENT", []):
+        where = joints[row["Joint"]]
+        moved = np.array([float(row[way]) for way in ways[:3]])
+        loads[row["LoadPat"]]["settlement"][where] = np.where(np.isinf(supports[where, :3]), moved, np.nan)
+    cases = {name: LoadCase(name, **values) for name, values in loads.items()}
+    assert [row["LoadName"] for row in tables["CASE - STATIC 1 - LOAD ASSIGNMENTS"]] == list(cases)
+    return st.Truss(
+        nodes=nodes - nodes[0], members=members, triangles=np.zeros((0, 3), np.int64), node_normals=np.zeros_like(nodes),
+        member_normals=normals, sections=sections, section_of=np.array([of[name] for name in frames]), material=material,
+        supports=supports, end_stiffness=np.full_like(springs, np.inf) if pinned else springs, pinned=pinned,
+        cases=tuple(cases.values()), node_marks=tuple(joints), member_marks=tuple(frames),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("others", KINDS)
+def test_a_program_that_knows_the_tables_of_sap2000_finds_the_same_structure(
+    others: dict[str, Any], tmp_path: Path
+) -> None:
+    truss = example(others)
+    st.write(truss, tmp_path / "Dach 屋顶.s2k")
+    tables = read_s2k(tmp_path / "Dach 屋顶.s2k")
+    back = truss_of_s2k(tables)
+    assert np.abs(back.nodes - (truss.nodes - truss.nodes[0])).max() < 1e-6
+    x, y, z = (float(tables["JOINT COORDINATES"][0][name]) for name in ("XorR", "Y", "Z"))
+    assert np.abs(np.array([x, y, z]) - truss.nodes[0] - UTM).max() < 1e-6
+    assert (back.node_marks, back.member_marks) == (truss.node_marks, truss.member_marks)
+    np.testing.assert_allclose(back.axes, truss.axes, atol=1e-7)
+    np.testing.assert_allclose(
+        back.supports[:, : 3 if truss.pinned else 6], truss.supports[:, : 3 if truss.pinned else 6]
+    )
+    if not truss.pinned:
+        np.testing.assert_allclose(back.end_stiffness, truss.end_stiffness)
+    for one, other in zip(st.solve(truss).cases, st.solve(back).cases, strict=True):
+        assert one.name == other.name
+        np.testing.assert_allclose(other.displacements, one.displacements, atol=1e-6 * np.abs(one.displacements).max())
+    rows = tables["COMBINATION DEFINITIONS"]
+    found = [(row["ComboName"], row["CaseName"], float(row["ScaleFactor"])) for row in rows]
+    assert found == [(each.name, *factor) for each in truss.combinations for factor in each.factors]
+    assert {row["ObjectLabel"] for row in tables["GROUPS 2 - ASSIGNMENTS"]} == set(truss.member_marks)
+
+
+def test_upright_members_turn_from_x(tmp_path: Path) -> None:
+    from small_trusses import make_truss
+
+    truss = make_truss([(0, 0, 0), (0, 0, 3), (1, 2, 3)], [(0, 1), (1, 2)], {0: (np.inf,) * 6})
+    truss = truss.replace(
+        member_normals=np.array([[0.6, 0.8, 0], [0, 0, -1.0]]), cases=(LoadCase("a", self_weight=1.0),)
+    )
+    st.write(truss, tmp_path / "a.s2k")
+    np.testing.assert_allclose(truss_of_s2k(read_s2k(tmp_path / "a.s2k")).axes, truss.axes, atol=1e-12)
+
+
+@pytest.mark.skipif(find_spec("opensees") is None, reason="opensees, the BSD build of OpenSees, is not installed")
+@pytest.mark.parametrize("suffix", [".tcl", ".py"])
+@pytest.mark.parametrize("others", KINDS)
+def test_opensees_finds_the_same_displacements(others: dict[str, Any], suffix: str, tmp_path: Path) -> None:
+    truss = example(others)
+    path = tmp_path / f"roof{suffix}"
+    st.write(truss, path)
+    command = [sys.executable, *(["-m", "opensees"] if suffix == ".tcl" else []), str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=tmp_path)
+    assert said.returncode == 0, said.stderr
+    found = np.array([line.split() for line in said.stdout.splitlines() if re.match(r"\d+ \d+ ", line)], float)
+    found = found.reshape(len(truss.cases), len(truss.nodes), -1)
+    np.testing.assert_array_equal(found[0, :, 1], np.arange(1, len(truss.nodes) + 1))
+    for case, values in zip(st.solve(truss).cases, found, strict=True):
+        moved = case.displacements[:, : values.shape[1] - 2]
+        for part in (slice(0, 3), slice(3, 6)):
+            if moved[:, part].size:
+                np.testing.assert_allclose(
+                    values[:, 2:][:, part], moved[:, part], atol=1e-3 * np.abs(moved[:, part]).max()
+                )
+
+
+def test_both_scripts_of_opensees_hold_the_same_commands(tmp_path: Path) -> None:
+    truss = example({})
+    st.write(truss, tmp_path / "a.tcl")
+    st.write(truss, tmp_path / "a.py")
+    text, script = ((tmp_path / name).read_text(encoding="utf-8") for name in ("a.tcl", "a.py"))
+    tcl = re.findall(r"^ {4,8}(\w+ .*)$", text.split("proc solve")[0], re.MULTILINE)
+    python = re.findall(r"^ {4}ops\.(\w+)\((.*)\)$", script.split("def solve")[0], re.MULTILINE)
+    commands = [" ".join([name, *(part.strip().strip("'\"") for part in rest.split(","))]) for name, rest in python]
+    assert [line.removesuffix(" {") for line in tcl] == commands
+    compile(script, "a.py", "exec")
+    axes = [np.array(line.split()[3:], float) for line in tcl if line.startswith("geomTransf")]
+    np.testing.assert_array_equal(axes, truss.axes[:, 2])
+
+
+@pytest.mark.parametrize("suffix", [".s2k", ".tcl", ".py"])
+def test_grids_are_refused(suffix: str, tmp_path: Path) -> None:
+    with pytest.raises(st.FormatError, match="holds structures"):
+        st.write(dome(4), tmp_path / f"a{suffix}")
