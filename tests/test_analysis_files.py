@@ -228,8 +228,8 @@ def truss_of_inp(path: Path, material: Material) -> st.Truss:
     blocks: list[tuple[str, dict[str, str], Any]] = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith("*") and not line.startswith("**"):
-            name, *options = line[1:].split(", ")
-            blocks.append((name, dict(option.partition("=")[::2] for option in options), []))
+            name, *words = line[1:].split(", ")
+            blocks.append((name, dict(option.partition("=")[::2] for option in words), []))
         elif not line.startswith("**"):
             blocks[-1][2].append(line.split(", "))
     named: dict[str, list[int]] = {}

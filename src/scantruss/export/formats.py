@@ -19,6 +19,7 @@ from ..scan.cloud import PointCloud
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .abaqus import encode_inp
+from .compas import draw_compas, encode_compas
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
 from .drawing_files import draw_3dm, draw_dxf, draw_ifc, draw_obj, draw_ply
@@ -93,6 +94,7 @@ FORMATS: dict[str, FileFormat] = {
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
     ".3dm": FileFormat("3DM", one(encode_3dm), draw=draw_3dm, loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".compas.json": FileFormat("COMPAS JSON", one(encode_compas), draw=draw_compas, loses_of_structure="loads, releases or results"),
     ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
