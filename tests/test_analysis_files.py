@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -314,6 +315,51 @@ def test_springs_at_ends_are_refused_by_abaqus(tmp_path: Path) -> None:
     with pytest.raises(st.FormatError, match="no springs at the ends"):
         st.write(roof(4, joints=2e5), tmp_path / "a.inp")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("others", [KINDS[0], KINDS[1], KINDS[3]])
+def test_plain_lists_for_karamba_hold_the_structure(others: dict[str, Any], tmp_path: Path) -> None:
+    truss = example(others)
+    rigid = truss.replace(
+        end_stiffness=np.full_like(truss.end_stiffness, np.inf)
+    )  # releases are left out, which is said
+    st.write(rigid, tmp_path / "Dach 屋顶.karamba.json")
+    held = json.loads((tmp_path / "Dach 屋顶.karamba.json").read_text(encoding="utf-8"))
+    assert (held["length"], held["force"]) == ("m", "kN")
+    nodes, rows = np.array(held["points"]), held["elements"]
+    assert np.abs(nodes - truss.nodes - UTM).max() < 1e-6
+    supports = np.where([[*each["fixed"]] for each in held["supports"]], np.inf, 0.0)
+    stiffness = np.zeros((len(nodes), 6))
+    for each, own in zip(held["supports"], supports, strict=True):
+        ways = [1e3 * each.get("springs", {}).get(way, 0) for way in ("ux", "uy", "uz", "rx", "ry", "rz")]
+        stiffness[each["node"]] = np.where(own > 0, own, ways)
+    loads: dict[str, dict[str, Any]] = {
+        each["case"]: {"nodal": np.zeros((len(nodes), 6)), "line": np.zeros((len(rows), 3)), "temperature": np.zeros(len(rows)),
+                       "settlement": np.full((len(nodes), 3), np.nan)}
+        for each in held["loads"]
+    }  # fmt: skip
+    for each in held["loads"]:
+        case = loads[each["case"]]
+        if "gravity" in each:
+            case["self_weight"] = -each["gravity"][2]
+        elif "force" in each:
+            case["nodal"][each["node"]] = 1e3 * np.array(each["force"] + each["moment"])
+        elif "settlement" in each:
+            held_there = np.isinf(stiffness[each["node"], :3])
+            case["settlement"][each["node"]] = np.where(held_there, each["settlement"], np.nan)
+        elif "line" in each:
+            case["line"][each["element"]] = 1e3 * np.array(each["line"])
+        else:
+            case["temperature"][each["element"]] = each["temperature"]
+    names = [each["name"] for each in held["sections"]]
+    back = rigid.replace(
+        nodes=nodes - nodes[0], members=np.array([row["nodes"] for row in rows]), supports=stiffness,
+        member_normals=np.array([row["z"] for row in rows]), section_of=np.array([names.index(row["section"]) for row in rows]),
+        cases=tuple(LoadCase(name, **values) for name, values in loads.items()), combinations=(), node_sets={},
+    )  # fmt: skip
+    for one, other in zip(st.solve(rigid).cases, st.solve(back).cases, strict=True):
+        assert one.name == other.name
+        np.testing.assert_allclose(other.displacements, one.displacements, atol=1e-6 * np.abs(one.displacements).max())
 
 
 @pytest.mark.parametrize("suffix", [".s2k", ".tcl", ".py", ".inp"])

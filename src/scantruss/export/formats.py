@@ -28,6 +28,7 @@ from .dxf import encode_dxf
 from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
+from .karamba import encode_karamba
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .opensees import encode_py, encode_tcl
@@ -100,6 +101,7 @@ FORMATS: dict[str, FileFormat] = {
                        loses_of_structure="supports, loads or forces"),
     ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True, draw=draw_ifc, reads_with="ifcopenshell", extra="bim"),
     ".inp": FileFormat("Abaqus", one(encode_inp), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".karamba.json": FileFormat("JSON for Karamba", one(encode_karamba), loses_of_structure="releases or results"),
     ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".s2k": FileFormat("SAP2000", one(encode_s2k), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
