@@ -1,7 +1,8 @@
-"""Files for SAP2000 and OpenSees: rebuilt by a reader of their text or run by a solver that is not ours, and compared."""
+"""Files for SAP2000, OpenSees and Abaqus: rebuilt by a reader of their text or run by a solver that is not ours, and compared."""
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -9,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 from small_grids import dome
@@ -222,7 +224,145 @@ def test_both_scripts_of_opensees_hold_the_same_commands(tmp_path: Path) -> None
     np.testing.assert_array_equal(axes, truss.axes[:, 2])
 
 
-@pytest.mark.parametrize("suffix", [".s2k", ".tcl", ".py"])
+def truss_of_inp(path: Path, material: Material) -> st.Truss:
+    """Return the structure that a reader of the keywords finds; the names of sections and marks are not there."""
+    blocks: list[tuple[str, dict[str, str], Any]] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("*") and not line.startswith("**"):
+            name, *words = line[1:].split(", ")
+            blocks.append((name, dict(option.partition("=")[::2] for option in words), []))
+        elif not line.startswith("**"):
+            blocks[-1][2].append(line.split(", "))
+    named: dict[str, list[int]] = {}
+    nodes = members = np.zeros((0, 3))
+    sections: list[Section] = []
+    pinned, loads, free, springs = False, dict[str, dict[str, Any]](), np.zeros((0, 2, 2)), dict[str, int]()
+    for name, options, rows in blocks:
+        numbers = [int(word) - 1 for row in rows for word in row] if name in ("ELSET", "NSET") else []
+        if name == "NODE":
+            nodes = np.array(rows, float)[:, 1:]
+            supports = np.zeros((len(nodes), 6))
+        elif name == "ELEMENT" and options["TYPE"] == "SPRING1":
+            springs[options["ELSET"]] = int(rows[0][1]) - 1
+        elif name == "ELEMENT":
+            members, pinned = np.array(rows, int)[:, 1:] - 1, options["TYPE"] == "T3D2"
+            normals, of = np.zeros((len(members), 3)), np.zeros(len(members), int)
+            free = np.full((len(members), 2, 2), np.inf)
+        elif name == "ELSET":
+            named[options["ELSET"]] = numbers
+        elif name == "BEAM GENERAL SECTION":
+            (member,) = named[options["ELSET"]]
+            area, one, _, two, torsion = map(float, rows[0])
+            ends = nodes[members[member]]
+            axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+            normals[member] = np.cross(axis, np.array(rows[1], float))  # its axis 2
+            of[member] = len(sections)
+            sections.append(Section(f"S{member}", "CHS", 1, 1, 0.1, "", area, one, two, torsion, 1, 1, 1, 1))
+            assert [float(word) for word in rows[2]] == [material.young, material.shear]
+        elif name == "SOLID SECTION":
+            of[named[options["ELSET"]]] = len(sections)
+            sections.append(Section(options["ELSET"], "CHS", 1, 1, 0.1, "", float(rows[0][0]), 1, 1, 1, 1, 1, 1, 1))
+        elif name == "SPRING":
+            supports[springs[options["ELSET"]], int(rows[0][0]) - 1] = float(rows[1][0])
+        elif name == "RELEASE":
+            for loose, end, about in rows:
+                free[int(loose) - 1, int(end[1]) - 1, int(about[1]) - 1] = 0
+        elif name == "STEP":
+            last = loads[options["NAME"]] = {"nodal": np.zeros((len(nodes), 6)), "line": np.zeros((len(members), 3)),
+                                             "settlement": np.full((len(nodes), 3), np.nan)}  # fmt: skip
+            assert "PERTURBATION" in options
+        elif name == "BOUNDARY":
+            for node, way, _, *value in rows:
+                if value:
+                    last["settlement"][int(node) - 1, int(way) - 1] = float(value[0])
+                else:
+                    supports[int(node) - 1, int(way) - 1] = np.inf
+        elif name in ("CLOAD", "DLOAD"):
+            for at, way, value in rows:
+                key, column = ("nodal", int(way) - 1) if name == "CLOAD" else ("line", "XYZ".index(way[1]))
+                last[key][int(at) - 1, column] += float(value)
+    return st.Truss(
+        nodes=nodes - nodes[0], members=members, triangles=np.zeros((0, 3), np.int64), node_normals=np.zeros_like(nodes),
+        member_normals=normals, sections=tuple(sections), section_of=of, material=material, supports=supports,
+        end_stiffness=free, pinned=pinned, cases=tuple(LoadCase(key.strip('"'), **values) for key, values in loads.items()),
+        node_marks=tuple(f"N{k}" for k in range(len(nodes))), member_marks=tuple(f"M{k}" for k in range(len(members))),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("others", [*KINDS[:2], {**KINDS[2], "joints": "rigid"}, KINDS[3]])
+def test_a_reader_of_the_keywords_of_abaqus_finds_the_same_structure(others: dict[str, Any], tmp_path: Path) -> None:
+    truss = example(others)
+    if not others:
+        truss = truss.replace(end_stiffness=np.where(np.isfinite(truss.end_stiffness), 0.0, np.inf))
+    st.write(truss, tmp_path / "Dach 屋顶.inp")
+    back = truss_of_inp(tmp_path / "Dach 屋顶.inp", truss.material)
+    if not truss.pinned:
+        np.testing.assert_allclose(back.axes, truss.axes, atol=1e-7)
+    for one, other in zip(st.solve(truss).cases, st.solve(back).cases, strict=True):
+        assert one.name.replace("=", " ") == other.name
+        np.testing.assert_allclose(other.displacements, one.displacements, atol=1e-6 * np.abs(one.displacements).max())
+
+
+def test_meshio_reads_the_trusses_of_abaqus(tmp_path: Path) -> None:
+    truss = roof(4, joints="pinned")
+    st.write(truss, tmp_path / "a.inp")
+    mesh = meshio.read(tmp_path / "a.inp")
+    assert np.abs(mesh.points - truss.nodes - UTM).max() < 1e-6
+    np.testing.assert_array_equal(mesh.cells_dict["line"], truss.members)
+
+
+def test_springs_at_ends_are_refused_by_abaqus(tmp_path: Path) -> None:
+    with pytest.raises(st.FormatError, match="no springs at the ends"):
+        st.write(roof(4, joints=2e5), tmp_path / "a.inp")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("others", [KINDS[0], KINDS[1], KINDS[3]])
+def test_plain_lists_for_karamba_hold_the_structure(others: dict[str, Any], tmp_path: Path) -> None:
+    truss = example(others)
+    rigid = truss.replace(
+        end_stiffness=np.full_like(truss.end_stiffness, np.inf)
+    )  # releases are left out, which is said
+    st.write(rigid, tmp_path / "Dach 屋顶.karamba.json")
+    held = json.loads((tmp_path / "Dach 屋顶.karamba.json").read_text(encoding="utf-8"))
+    assert (held["length"], held["force"]) == ("m", "kN")
+    nodes, rows = np.array(held["points"]), held["elements"]
+    assert np.abs(nodes - truss.nodes - UTM).max() < 1e-6
+    supports = np.where([[*each["fixed"]] for each in held["supports"]], np.inf, 0.0)
+    stiffness = np.zeros((len(nodes), 6))
+    for each, own in zip(held["supports"], supports, strict=True):
+        ways = [1e3 * each.get("springs", {}).get(way, 0) for way in ("ux", "uy", "uz", "rx", "ry", "rz")]
+        stiffness[each["node"]] = np.where(own > 0, own, ways)
+    loads: dict[str, dict[str, Any]] = {
+        each["case"]: {"nodal": np.zeros((len(nodes), 6)), "line": np.zeros((len(rows), 3)), "temperature": np.zeros(len(rows)),
+                       "settlement": np.full((len(nodes), 3), np.nan)}
+        for each in held["loads"]
+    }  # fmt: skip
+    for each in held["loads"]:
+        case = loads[each["case"]]
+        if "gravity" in each:
+            case["self_weight"] = -each["gravity"][2]
+        elif "force" in each:
+            case["nodal"][each["node"]] = 1e3 * np.array(each["force"] + each["moment"])
+        elif "settlement" in each:
+            held_there = np.isinf(stiffness[each["node"], :3])
+            case["settlement"][each["node"]] = np.where(held_there, each["settlement"], np.nan)
+        elif "line" in each:
+            case["line"][each["element"]] = 1e3 * np.array(each["line"])
+        else:
+            case["temperature"][each["element"]] = each["temperature"]
+    names = [each["name"] for each in held["sections"]]
+    back = rigid.replace(
+        nodes=nodes - nodes[0], members=np.array([row["nodes"] for row in rows]), supports=stiffness,
+        member_normals=np.array([row["z"] for row in rows]), section_of=np.array([names.index(row["section"]) for row in rows]),
+        cases=tuple(LoadCase(name, **values) for name, values in loads.items()), combinations=(), node_sets={},
+    )  # fmt: skip
+    for one, other in zip(st.solve(rigid).cases, st.solve(back).cases, strict=True):
+        assert one.name == other.name
+        np.testing.assert_allclose(other.displacements, one.displacements, atol=1e-6 * np.abs(one.displacements).max())
+
+
+@pytest.mark.parametrize("suffix", [".s2k", ".tcl", ".py", ".inp"])
 def test_grids_are_refused(suffix: str, tmp_path: Path) -> None:
     with pytest.raises(st.FormatError, match="holds structures"):
         st.write(dome(4), tmp_path / f"a{suffix}")

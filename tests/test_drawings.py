@@ -12,7 +12,7 @@ import pytest
 import rhino3dm
 import trimesh
 from small_grids import dome, make_grid
-from test_convert import UTM
+from test_convert import UTM, roof
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -43,7 +43,8 @@ def drawn(points: Any, lines: Any = (), faces: Any = ()) -> st.Grid:
 
 @pytest.mark.parametrize(
     ("suffix", "style"),
-    [(".obj", {}), (".obj", {"obj": "lines"}), (".obj", {"obj": "both"}), (".ply", {}), (".dxf", {}), (".3dm", {}), (".ifc", {})],
+    [(".obj", {}), (".obj", {"obj": "lines"}), (".obj", {"obj": "both"}), (".ply", {}), (".dxf", {}), (".3dm", {}), (".ifc", {}),
+     (".compas.json", {})],
 )  # fmt: skip
 def test_what_is_written_is_read_back_as_the_same_grid(suffix: str, style: dict[str, Any], tmp_path: Path) -> None:
     grid = dome(6, origin=UTM, unit="m")
@@ -170,6 +171,39 @@ def test_damaged_files_are_refused_in_one_line(suffix: str, tmp_path: Path, capf
     assert main(["convert", str(path), str(tmp_path / "b.obj")]) == 2
     line = capfd.readouterr().err
     assert "Traceback" not in line and "scantruss: " in line
+
+
+def test_compas_loads_mesh_and_graph(tmp_path: Path) -> None:
+    compas = pytest.importorskip("compas")
+    truss = roof(4)
+    st.write(truss, tmp_path / "Dach 屋顶.compas.json")
+    found = compas.json_load(tmp_path / "Dach 屋顶.compas.json")
+    mesh, graph = found["mesh"], found["graph"]
+    for each, places in ((mesh, mesh.vertices()), (graph, graph.nodes())):
+        method = each.vertex_coordinates if each is mesh else each.node_coordinates
+        assert np.abs(np.array([method(key) for key in places]) - truss.nodes - UTM).max() < 1e-6
+    assert [mesh.face_vertices(face) for face in mesh.faces()] == truss.triangles.tolist()
+    marks = {edge: graph.edge_attribute(edge, "mark") for edge in graph.edges()}
+    assert marks == dict(zip(map(tuple, truss.members.tolist()), truss.member_marks, strict=True))
+    held = [key for key in graph.nodes() if graph.node_attribute(key, "is_support")]
+    assert held == np.flatnonzero(truss.supports.any(axis=1)).tolist()
+    compas.json_dump(graph, tmp_path / "b.compas.json")  # by compas itself
+    grid = read_model(tmp_path / "b.compas.json").grid
+    assert grid is not None and panels(grid) == panels(dome(4, origin=UTM, unit="m"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "cannot be read"),
+        ('{"a": 1}', "no Mesh and no Graph"),
+        ('{"dtype": "compas.datastructures/Mesh", "data": {"vertex": {}, "face": {"0": [1, 2, 3]}}}', "cannot be understood"),
+    ],
+)  # fmt: skip
+def test_damaged_compas_files_are_refused(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "a.compas.json").write_text(text, encoding="utf-8")
+    with pytest.raises(st.FormatError, match=said):
+        read_model(tmp_path / "a.compas.json")
 
 
 @pytest.mark.parametrize(

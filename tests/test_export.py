@@ -220,9 +220,9 @@ def test_a_grid_without_triangles_is_written(suffix: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("a.jsn", 'no format for ".jsn"; use one of .3dm .csv '),
+        ("a.jsn", 'no format for ".jsn"; use one of .3dm .compas.json .csv '),
         ("a.jsn", "the nearest is .json"),
-        ("a", 'no format for "a"; use one of .3dm .csv'),
+        ("a", 'no format for "a"; use one of .3dm .compas.json .csv'),
         ("a.stl", 'no format for ".stl" of a grid'),
         ("a.3mf", "scantruss print"),
         ("none/a.obj", "none does not exist"),

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .options import Parser
 
 HEAD = 200  # bytes of a file in which its format stands
-DRAWN = ".obj .ply .dxf .3dm .ifc"  # that `read_model` reads
+DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
 def add_grid(parser: Parser, said: str, name: str = "grid", metavar: str = "GRID") -> None:
@@ -34,8 +34,9 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     from ..export.formats import FORMATS, read_model
     from ..export.json import read_grid
     from ..report.terminal import print_lines
+    from ..runtime.files import suffix_of
 
-    if (row := FORMATS.get(Path(path).suffix.lower())) is None or row.draw is None:
+    if (row := FORMATS.get(suffix_of(Path(path), FORMATS))) is None or row.draw is None:
         return read_grid(path)
     model = read_model(path, merge)
     for note in model.notes:

@@ -18,6 +18,8 @@ from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from ..settings import UNITS
 from ..structure.truss import Truss
+from .abaqus import encode_inp
+from .compas import draw_compas, encode_compas
 from .csv import encode_csv, nodes_path
 from .drawing.picture import encode_picture
 from .drawing_files import draw_3dm, draw_dxf, draw_ifc, draw_obj, draw_ply
@@ -26,6 +28,7 @@ from .dxf import encode_dxf
 from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
+from .karamba import encode_karamba
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .opensees import encode_py, encode_tcl
@@ -73,7 +76,7 @@ def of_grid(encode: Callable[[Grid, FileStyle], bytes], name: str) -> Encoder:
     return one(lambda model, style: encode(model.as_grid(name), style))
 
 
-NO_OPENSEES = "triangles, marks or results (nodes and members are counted from 1)"
+NO_MARKS = "triangles, marks or results (nodes and members are counted from 1)"
 NO_STRUCTURE = "sections, supports, loads or results"
 
 #: suffix -> format
@@ -92,16 +95,19 @@ FORMATS: dict[str, FileFormat] = {
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
     ".3dm": FileFormat("3DM", one(encode_3dm), draw=draw_3dm, loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".compas.json": FileFormat("COMPAS JSON", one(encode_compas), draw=draw_compas, loses_of_structure="loads, releases or results"),
     ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
     ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True, draw=draw_ifc, reads_with="ifcopenshell", extra="bim"),
-    ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
+    ".inp": FileFormat("Abaqus", one(encode_inp), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".karamba.json": FileFormat("JSON for Karamba", one(encode_karamba), loses_of_structure="releases or results"),
+    ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".s2k": FileFormat("SAP2000", one(encode_s2k), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
-    ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_OPENSEES),
+    ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 

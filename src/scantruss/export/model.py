@@ -164,6 +164,26 @@ def line_loads(truss: Truss, case: LoadCase, *, weight: bool = True) -> np.ndarr
     return line
 
 
+def nodal_loads(truss: Truss, case: LoadCase) -> np.ndarray:
+    """Return the (V, 3 or 6) loads on nodes [N, Nm], with forces E A strain at the ends for strains without force.
+
+    Of a pinned structure these are all loads, those along members at their ends.
+    """
+    nodal = np.zeros((len(truss.nodes), 3 if truss.pinned else 6))
+    if case.nodal is not None:
+        nodal += case.nodal[:, : nodal.shape[1]]
+    strain = np.zeros(len(truss.members))
+    if case.temperature is not None:
+        strain += truss.material.alpha * case.temperature
+    if case.strain is not None:
+        strain += case.strain
+    push = (truss.material.young * truss.of_section("area") * strain)[:, None] * truss.axes[:, 0]
+    half = line_loads(truss, case) * truss.lengths[:, None] / 2 if truss.pinned else np.zeros_like(push)
+    np.add.at(nodal[:, :3], truss.members[:, 0], half - push)
+    np.add.at(nodal[:, :3], truss.members[:, 1], half + push)
+    return nodal
+
+
 def temperatures(truss: Truss, case: LoadCase, what: str) -> np.ndarray:
     """Return the (M,) changes of temperature, with those that lengthen members as strains without force do [K].
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import FormatError
 from ..runtime.ours import MARK
-from .model import Model, line_loads
+from .model import Model, line_loads, nodal_loads
 from .style import FileStyle
 
 if TYPE_CHECKING:
@@ -233,24 +233,12 @@ def _members(model: Model, truss: Truss, made: list[Command], extra: _Extra) -> 
 
 def _loads(truss: Truss, case: LoadCase) -> list[Command]:
     """Return the loads of a case: forces on nodes, lines along members in local axes, imposed displacements."""
-    count = 3 if truss.pinned else 6
-    nodal = np.zeros((len(truss.nodes), count))
-    if case.nodal is not None:
-        nodal += case.nodal[:, :count]
-    strain = np.zeros(len(truss.members))
-    if case.temperature is not None:
-        strain += truss.material.alpha * case.temperature
-    if case.strain is not None:
-        strain += case.strain
-    push = (truss.material.young * truss.of_section("area") * strain)[:, None] * truss.axes[:, 0]
-    line = line_loads(truss, case)
-    half = line * truss.lengths[:, None] / 2 if truss.pinned else np.zeros_like(line)
-    np.add.at(nodal[:, :3], truss.members[:, 0], half - push)
-    np.add.at(nodal[:, :3], truss.members[:, 1], half + push)
+    nodal = nodal_loads(truss, case)
     made: list[Command] = [
         ("load", node + 1, *nodal[node].tolist()) for node in np.flatnonzero(nodal.any(axis=1)).tolist()
     ]
     if not truss.pinned:
+        line = line_loads(truss, case)
         local = np.einsum("mij,mj->mi", truss.axes, line)
         for member in np.flatnonzero(line.any(axis=1)).tolist():
             x, y, z = local[member].tolist()

@@ -8,6 +8,7 @@ those of Euler and Bernoulli, as here.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,10 +43,14 @@ def encode_s2k(model: Model, style: FileStyle) -> bytes:
 
 
 def _text(value: Any) -> str:
-    if isinstance(value, str):
-        value = "".join(letter if letter.isprintable() else " " for letter in value).replace('"', "'")
-        return value if value.isalnum() else f'"{value}"'
-    return repr(value)
+    return _quoted(value) if isinstance(value, str) else repr(value)
+
+
+@lru_cache(maxsize=1 << 16)
+def _quoted(word: str) -> str:
+    """Return a word, in quotes where it has blanks or signs."""
+    word = "".join(letter if letter.isprintable() else " " for letter in word).replace('"', "'")
+    return word if word.isalnum() else f'"{word}"'
 
 
 def frame_angles(axes: np.ndarray) -> np.ndarray:
