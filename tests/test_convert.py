@@ -73,7 +73,7 @@ def test_the_utilization_of_a_structure_goes_along(place: Path, capsys: pytest.C
     Path("one.json").write_text(json.dumps(values), encoding="utf-8")
     capsys.readouterr()
     assert main("convert one.json a.vtu".split()) == 2
-    assert "utilization must be a number for each member" in capsys.readouterr().err
+    assert "utilization and governing need a value for each member" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -102,19 +102,15 @@ def read_json(path: Path) -> Model:
     FormatError
         The file cannot be read, or it is neither.
     """
-    from ..structure.json import STRUCTURE_FORMAT, read_structure
+    from ..structure.json import STRUCTURE_FORMAT, read_checked
 
     with suppress(OSError), path.open("rb") as file:
         if f'"format": "{STRUCTURE_FORMAT}"'.encode() not in file.read(BYTES_WITH_MARK):
             return model_of_grid(read_grid(path))
     from ..structure.statics import solve
 
-    truss = read_structure(path)
-    found = json.loads(path.read_text(encoding="utf-8")).get("utilization")
-    try:
-        used = None if found is None else np.array(found, float).reshape(len(truss.members))  # null is NaN
-    except (TypeError, ValueError):
-        raise FormatError(f"{path} is a damaged structure: utilization must be a number for each member") from None
+    truss, checked = read_checked(path)
+    used = None if checked is None else checked[0]
     return model_of_truss(truss, solve(truss) if truss.cases else None, utilization=used)
 
 
