@@ -26,6 +26,7 @@ from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
+from .page import encode_page
 from .ply import encode_ply
 from .rhino import encode_3dm
 from .saf import encode_saf
@@ -86,6 +87,7 @@ FORMATS: dict[str, FileFormat] = {
     ".dxf": FileFormat("DXF", one(encode_dxf), loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
+    ".html": FileFormat("HTML", one(encode_page), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
     ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True),
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
