@@ -110,11 +110,11 @@ def _guarded(guard: Guard) -> Iterator[None]:
         used.append(True)
         return plain(*arguments, **options | {"process_request": guard.around(options["process_request"])})
 
-    serving.serve = serve  # type: ignore[assignment, misc]
+    serving.serve = serve
     try:
         yield
     finally:
-        serving.serve = plain  # type: ignore[misc]
+        serving.serve = plain
     if not used:
         raise InputError("this version of viser cannot be guarded; install viser 1.1")
 
@@ -150,7 +150,7 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
     guard = Guard(host)
     with _guarded(guard):
         server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
-    server.request_share_url = _no_tunnel  # type: ignore[method-assign] # a page could else ask for a way in from the network
+    server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
     return server, guard
 
 

@@ -52,10 +52,10 @@ class View:
         self.session, self.server, self._lock = session, server, RLock()
         self._drawn: tuple[Any, ...] = ()
         self._scan: Any = None
-        self._filling = False
         self._pins: list[Pin] = []
         server.scene.set_up_direction("+z")
-        server.gui.configure_theme(show_share_button=False, control_layout="fixed", control_width="large")
+        server.gui.main_panel.dock_right()
+        server.gui.configure_theme(show_share_button=False, control_width="large")
         gui = server.gui
         self.message = gui.add_markdown("")
         self.progress = gui.add_progress_bar(0.0, visible=False)
@@ -75,8 +75,8 @@ class View:
         upload = gui.add_upload_button("Open a scan")
         self.about = gui.add_markdown("")
         self.unit = gui.add_dropdown("unit", tuple(name or "not known" for name in UNITS), initial_value="not known")
-        self.slider = gui.add_slider("length", 0, SLIDER_STEPS, 1, 0, hint="a quick grid is made while it moves")
-        self.length = gui.add_text("length", "1")
+        self.slider = gui.add_slider("length", 0.5, 2.0, 0.01, 1.0, hint="a quick grid is made while it moves")
+        self.length = gui.add_text("exactly", "1")
         self.effort = gui.add_dropdown("effort", EFFORTS)
         generate, stop = gui.add_button("Generate", color="blue"), gui.add_button("Stop")
         self.figures = gui.add_markdown("")
@@ -122,10 +122,10 @@ class View:
         self.command = gui.add_markdown("")
 
     def _step(self, step: Callable[[], None]) -> Callable[[Any], None]:
-        """Return what a control calls: errors are shown on the page, and nothing is called while the page is filled in."""
+        """Return what a control calls: errors are shown on the page, and what the server sets calls nothing."""
 
-        def call(_: Any) -> None:
-            if self._filling:
+        def call(event: Any) -> None:
+            if event.client is None:
                 return
             try:
                 step()
@@ -158,9 +158,8 @@ class View:
         self.session.settings = self.session.settings.replace(**changes)
 
     def _slide(self) -> None:
-        low, high = self.session.length_bounds()
-        length = float(f"{low * (high / low) ** (self.slider.value / SLIDER_STEPS):.3g}")
-        self._fill(self.length, f"{length:g}")
+        length = float(f"{self.slider.value:.4g}")
+        self.length.value = f"{length:g}"
         self.session.live(length)
 
     def _typed(self) -> None:
@@ -202,6 +201,8 @@ class View:
             state = (session.cloud, session.grid, session.solution, session.settings.unit)
             if len(self._drawn) == len(state) and all(a is b for a, b in zip(self._drawn, state, strict=True)):
                 return
+            if self._drawn and self._drawn[1] is None and session.grid is not None:
+                self.show_scan.value = False  # it hides the grid
             new_scan = not self._drawn or self._drawn[0] is not session.cloud
             self._drawn = state
             self._say(new_scan)
@@ -213,11 +214,12 @@ class View:
         unit = f" {cloud.unit}" if cloud is not None and cloud.unit else ""
         if new_scan and cloud is not None:
             low, high = session.length_bounds()
-            at = np.log(session.settings.length / low) / np.log(high / low) if high > low else 0.0
-            self._fill(self.slider, round(SLIDER_STEPS * float(np.clip(at, 0.0, 1.0))))
-            self._fill(self.length, f"{session.settings.length:g}")
-            self._fill(self.effort, session.settings.effort)
-            self._fill(self.unit, cloud.unit or "not known")
+            step = float(f"{(high - low) / SLIDER_STEPS or 1.0:.1g}")
+            self.slider.min, self.slider.max, self.slider.step = low, max(high, low + step), step
+            self.slider.value = min(max(session.settings.length, low), high)
+            self.length.value = f"{session.settings.length:g}"
+            self.effort.value = session.settings.effort
+            self.unit.value = cloud.unit or "not known"
             self.about.content = (
                 f"**{cloud.name or 'scan'}**: {len(cloud.points):,} points, {cloud.extent:.4g}{unit} long"
             )
@@ -242,13 +244,9 @@ class View:
             "-",
         )
         kept = self.coloring.value
-        self._filling = True
         self.coloring.options = tuple(choices)
-        self._filling = False
         best = choices[1] if len(choices) > 1 else "plain"
-        self._fill(
-            self.coloring, best if kept not in choices or kept == "plain" or session.solution is not None else kept
-        )
+        self.coloring.value = best if kept not in choices or kept == "plain" or session.solution is not None else kept
         self.results.content = self._structure_words()
         self.command.content = f"```\n{session.command()}\n```"
 
@@ -258,7 +256,8 @@ class View:
         if report is None:
             return ""
         values = report.to_dict()
-        moves = max(report.cases, key=lambda case: case.displacement_max)
+        service = [case for case in report.cases if case.state == "SLS"] or report.cases
+        moves = max(service, key=lambda case: case.displacement_max)
         used = values["utilization_max"]
         rows = [
             f"utilization {'-' if used is None else f'{used:.2f}'}",
@@ -268,14 +267,6 @@ class View:
             *(f"**warning:** {words}" for words in report.warnings),
         ]
         return "\n\n".join(rows)
-
-    def _fill(self, control: Any, value: Any) -> None:
-        """Set the value of a control without a step."""
-        self._filling = True
-        try:
-            control.value = value
-        finally:
-            self._filling = False
 
     @property
     def _factor(self) -> float:
@@ -303,7 +294,7 @@ class View:
                     "/scan", self._in_scene(points + session.cloud.origin).astype(np.float32),
                     ramp(height / (height.max() or 1.0), RISING), point_size=0.02, precision="float32",
                 )  # fmt: skip
-                self.server.initial_camera.position = (0.6 * DRAWN_EXTENT, -0.9 * DRAWN_EXTENT, 0.7 * DRAWN_EXTENT)
+                self.server.initial_camera.position = tuple(DRAWN_EXTENT * share for share in (0.4, -0.75, 0.5))
                 self.server.initial_camera.look_at = (0.0, 0.0, 0.0)
             self._points.visible = self.show_scan.value
             self.legend.content = ""
@@ -332,7 +323,7 @@ class View:
                 side="double",
                 flat_shading=True,
                 visible=self.show_panels.value,
-                opacity=0.6,
+                opacity=0.25,
             )
 
 
