@@ -16,7 +16,7 @@ from scantruss.cli.main import main
 from scantruss.export.page_tables import PageColumn
 from scantruss.studio.server import Guard, start_server
 from scantruss.studio.session import Session
-from scantruss.studio.view import View, colors_of
+from scantruss.studio.view import StudioView, colors_of
 
 
 def free_port() -> int:
@@ -38,7 +38,7 @@ def served(tmp_path: Path) -> Iterator[tuple[str, Session]]:
     session.set_unit("m")
     server, _ = start_server("127.0.0.1", free_port())
     try:
-        View(session, server)
+        StudioView(session, server)
         yield f"http://127.0.0.1:{server.get_port()}/", session
     finally:
         session.stop()

@@ -48,14 +48,14 @@ def studio(values: Namespace) -> None:
     from ..report.terminal import print_lines
     from ..studio.server import start_server
     from ..studio.session import Session
-    from ..studio.view import View
+    from ..studio.view import StudioView
 
     session = Session(project)
     if values.source is not None:
         session.open(Path(values.source))
     server, guard = start_server(values.host, values.port)
     try:
-        View(session, server)
+        StudioView(session, server)
         shown = "localhost" if values.host in LOOPBACK else values.host
         address = f"http://{shown}:{server.get_port()}/" + (f"?token={guard.token}" if guard.token else "")
         saved = f"saved as {project} after each step" if project is not None else "not saved; name a scan or --project"

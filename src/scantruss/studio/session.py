@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, ScanTrussError, words_of_error
-from ..export.formats import GRID, STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
+from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
 from ..export.model import Model
 from ..grid.grid import Grid
 from ..pipeline import grid_from_cloud
@@ -18,7 +18,7 @@ from ..runtime.files import temporary_folder
 from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import exact_range, length_range, suggest_length
-from ..scan.stream.fit import read_to_fit
+from ..scan.stream.fit import read_to_fit, spacing_to_fit, spacing_to_look
 from ..settings import Settings
 from ..structure.options import StructureSettings, loads_of_words, settings_text
 from ..structure.report import StructureReport, report_structure
@@ -71,7 +71,7 @@ class Session:
         if path.suffix.lower() == ".scantruss":
             self._take(read_project(path))
             return
-        cloud, _ = read_to_fit(path, self.settings.replace(length=1.0, unit=""))
+        cloud = read_whole(path)
         self._start(cloud)
         self.save()
 
@@ -88,7 +88,7 @@ class Session:
                 path = folder / (own or "scan")
                 path.write_bytes(content)
                 progress("read", 0.1)
-                cloud, _ = read_to_fit(path, self.settings.replace(length=1.0, unit=""))
+                cloud = read_whole(path)
             self._start(replace(cloud, name=own))
             self.save()
 
@@ -137,7 +137,7 @@ class Session:
             return  # Generate says why
         progress("boundary", 0.0)
         grid = grid_from_cloud(cloud, settings, progress=progress)
-        if live and len(grid.edges) > MOST_LIVE_MEMBERS:
+        if self.cloud is not cloud or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
             return
         self.grid, self.is_live, self.solution, self.report = grid, live, None, None
         if not live:
@@ -173,6 +173,7 @@ class Session:
         def run(progress: Progress) -> None:
             progress("structure", 0.1)
             self._solve()
+            self.is_live = False  # a quick grid with a structure is kept
             self.save()
 
         self.worker.ask(run)
@@ -281,6 +282,15 @@ class Session:
         self.tell()
 
 
+def read_whole(path: Path) -> PointCloud:
+    """Read a scan; one that is larger than memory is thinned while it is read, as for a first look."""
+    settings = Settings(length=1.0)
+    if spacing_to_fit(path, settings):
+        settings = settings.replace(thin_spacing=spacing_to_look(path, settings))
+    cloud, _ = read_to_fit(path, settings)
+    return cloud
+
+
 def words_of(error: Exception) -> str:
     """Return an error in the words of the command line."""
     if isinstance(error, ScanTrussError):
@@ -290,6 +300,3 @@ def words_of(error: Exception) -> str:
     if isinstance(error, OSError):
         return str(error.strerror or error)
     return f"a bug in ScanTruss, {type(error).__name__}: {error}; the studio goes on"
-
-
-__all__ = ["GRID", "STRUCTURE", "Session", "words_of"]

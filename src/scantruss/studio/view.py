@@ -45,7 +45,7 @@ def colors_of(column: PageColumn, middle: float | None) -> tuple[np.ndarray, flo
     return colors, low, high
 
 
-class View:
+class StudioView:
     """Binds a session to the scene and the controls of a server."""
 
     def __init__(self, session: Session, server: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from threading import Condition, Thread
 
@@ -76,7 +77,10 @@ class Worker:
                 pass
             except Exception as error:  # a crash of a run leaves the studio alive; it is shown
                 fault = error
-            self._tell(fault)
+            try:
+                self._tell(fault)
+            except Exception:  # of the page; the worker goes on
+                sys.excepthook(*sys.exc_info())
             with self._change:
                 self._running = None
                 self._change.notify_all()
