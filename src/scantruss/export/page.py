@@ -143,9 +143,10 @@ def _figures(model: Model) -> list[tuple[str, str]]:
         rows.append(("mass without nodes [kg]", f"{model.truss.mass:,.0f}"))
         rows.append(("supports", f"{len(model.supported):,}"))
     if model.solution is not None:
-        moves = [(result.displacement_max, result.name) for result in model.solution.all_results()]
-        if moves:
-            most, name = max(moves)
+        every = list(model.solution.all_results())
+        service = [result for result in every if result.state == "SLS"] or every  # as the report of a structure does
+        if service:
+            most, name = max((result.displacement_max, result.name) for result in service)
             rows.append((f"greatest displacement, {name} [mm]", f"{1e3 * most:.3g}"))
     if model.utilization is not None and np.isfinite(model.utilization).any():
         rows.append(("greatest utilization", f"{np.nanmax(model.utilization):.2f}"))
