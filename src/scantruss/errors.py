@@ -64,3 +64,9 @@ class CertificateError(FrontError):
 
 class FormatError(ScanTrussError):
     """A file cannot be read or written."""
+
+
+def words_of_error(error: ScanTrussError) -> str:
+    """Return what an error says, with its place where it has one."""
+    where = error.where if isinstance(error, FrontError) else None
+    return str(error) if where is None else f"{error} (near {words_of_place(where)})"

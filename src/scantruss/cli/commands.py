@@ -20,6 +20,7 @@ from .schedule import make_schedule, schedule_parser
 from .setout import make_setting_out, setout_parser
 from .splice import splice, splice_parser
 from .structure import structure, structure_parser
+from .studio import studio, studio_parser
 from .sweep import sweep, sweep_parser
 from .thin import thin, thin_parser
 
@@ -43,6 +44,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "setout": (setout_parser, make_setting_out),
     "structure": (structure_parser, structure),
     "convert": (convert_parser, convert),
+    "studio": (studio_parser, studio),
     "splice": (splice_parser, splice),
     "demo": (demo_parser, make_demo),
     "completion": (completion_parser, completion),

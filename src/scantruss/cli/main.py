@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import cast
 
 from .. import __version__
-from ..errors import CertificateError, FrontError, InputError, ScanTrussError, words_of_place
+from ..errors import CertificateError, InputError, ScanTrussError, words_of_error
 from ..runtime.stopping import SIGNAL_STATUS, asked, note_told, signals_heard, words_of_stop
 
 HELP = f"""\
@@ -37,6 +37,7 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss convert FILE OUT [OUT ...]     write a saved grid or structure for other programs: .dxf, .ifc, .saf.xlsx ...
+  scantruss studio [SCAN|PROJECT]          do it in a browser: length, grid, structure, files (extra studio)
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
   scantruss demo  [FOLDER]                 do all of it on a bundled scan, a shell or (--scan bust) a bust
@@ -124,11 +125,8 @@ def end(error: BaseException) -> int:
         return 141
     if isinstance(error, KeyboardInterrupt):
         return refuse(words_of_stop(signal.SIGINT), SIGNAL_STATUS[signal.SIGINT])
-    if isinstance(error, FrontError):
-        place = "" if error.where is None else f" (near {words_of_place(error.where)})"
-        return refuse(f"{error}{place}", 3 if isinstance(error, CertificateError) else 2)
     if isinstance(error, ScanTrussError):
-        return refuse(str(error))
+        return refuse(words_of_error(error), 3 if isinstance(error, CertificateError) else 2)
     if isinstance(error, OSError):
         names = " -> ".join(str(name) for name in (error.filename, error.filename2) if name)
         return refuse(f"{error.strerror or error}{f': {names}' if names else ''}")

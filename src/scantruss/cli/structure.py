@@ -170,11 +170,16 @@ def _encoded(
         from ..export.drawing.structure import encode_structure_picture
 
         return encode_structure_picture(solution.truss, overview_picture(solution, report))
+    from ..export.formats import model_of
+    from ..export.page import encode_page
+    from ..export.style import FileStyle
     from ..report.structural.html import encode_html
     from ..report.structural.pdf import encode_pdf
 
     parts = report_parts(ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report))
-    return (encode_html if out.suffix.lower() == ".html" else encode_pdf)(parts)
+    if out.suffix.lower() == ".pdf":
+        return encode_pdf(parts)
+    return encode_html(parts, encode_page(model_of(solution, report=report), FileStyle()))
 
 
 def _command_line(values: Namespace) -> str:

@@ -32,6 +32,7 @@ from .karamba import encode_karamba
 from .model import Model, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .opensees import encode_py, encode_tcl
+from .page import encode_page
 from .ply import encode_ply
 from .rhino import encode_3dm
 from .s2k import encode_s2k
@@ -99,6 +100,7 @@ FORMATS: dict[str, FileFormat] = {
     ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
+    ".html": FileFormat("HTML", one(encode_page), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
     ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True, draw=draw_ifc, reads_with="ifcopenshell", extra="bim"),
     ".inp": FileFormat("Abaqus", one(encode_inp), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".karamba.json": FileFormat("JSON for Karamba", one(encode_karamba), loses_of_structure="releases or results"),

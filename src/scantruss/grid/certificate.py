@@ -137,6 +137,21 @@ class Certificate:
         own = (part for part in self.left_out if not part.asked and part.kind != "duplicates")
         return sum(part.share for part in own)
 
+    def worst_places(self) -> list[tuple[str, Worst, bool]]:
+        """Return the worst figures that are known: name, figure with its place, whether it is an angle [degree] or a length."""
+        found = (
+            ("shortest member", self.shortest_member, False),
+            ("longest member", self.longest_member, False),
+            ("smallest angle", self.smallest_angle, True),
+            ("largest angle", self.largest_angle, True),
+            ("sharpest fold between triangles", self.sharpest_fold, True),
+            ("node farthest from the scan", _largest(self.node_distance), False),
+            ("triangle farthest from the scan", _largest(self.triangle_distance), False),
+            ("point farthest from the grid", _largest(self.scan_distance), False),
+            ("fixed node farthest from its position", self.fixed_error, False),
+        )
+        return [(name, worst, of_angle) for name, worst, of_angle in found if worst is not None]
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; `passed` first."""
         values = asdict(self)
@@ -182,6 +197,10 @@ class Certificate:
             f"irregular {self.irregular}, forced {self.irregular_forced}",
         ]
         return ", ".join(word for word in said if word)
+
+
+def _largest(spread: Spread | None) -> Worst | None:
+    return None if spread is None else spread.largest
 
 
 def _worst_of(value: dict[str, Any]) -> Worst:

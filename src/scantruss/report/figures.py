@@ -15,7 +15,7 @@ from ..kernels.geometry.components import component_labels
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
-    from ..grid.certificate import Certificate, Spread, Worst
+    from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
 
@@ -195,26 +195,10 @@ def warning_lines(certificate: Certificate) -> list[str]:
 def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
     """Return the worst places of a grid: name, figure, place in the scan's own frame."""
     unit = f" {certificate.unit}" if certificate.unit else ""
-    found = (
-        ("shortest member", certificate.shortest_member, unit),
-        ("longest member", certificate.longest_member, unit),
-        ("smallest angle", certificate.smallest_angle, " degrees"),
-        ("largest angle", certificate.largest_angle, " degrees"),
-        ("sharpest fold between triangles", certificate.sharpest_fold, " degrees"),
-        ("node farthest from the scan", _largest(certificate.node_distance), unit),
-        ("triangle farthest from the scan", _largest(certificate.triangle_distance), unit),
-        ("point farthest from the grid", _largest(certificate.scan_distance), unit),
-        ("fixed node farthest from its position", certificate.fixed_error, unit),
-    )
     return [
-        (name, f"{worst.value:.4g}{words}", words_of_place(worst.where))
-        for name, worst, words in found
-        if worst is not None
+        (name, f"{worst.value:.4g}{' degrees' if of_angle else unit}", words_of_place(worst.where))
+        for name, worst, of_angle in certificate.worst_places()
     ]
-
-
-def _largest(spread: Spread | None) -> Worst | None:
-    return None if spread is None else spread.largest
 
 
 def cloud_lines(cloud: PointCloud) -> list[str]:

@@ -26,16 +26,20 @@ ul { margin: .4rem 0; padding-left: 1.2rem } li { margin: .1rem 0 } .note { colo
 pre { background: #f4f6f7; border: 1px solid #e0e4e7; border-radius: 4px; padding: .8rem 1rem; font-size: .82rem;
   white-space: pre-wrap; overflow-wrap: anywhere }
 figure { margin: 1rem 0 1.6rem } img { width: 100%; height: auto; border: 1px solid #e6e9ec }
+iframe { width: 100%; height: 40rem; border: 1px solid #c9d0d6 } @media print { iframe { display: none } }
 figcaption { color: #38434f; font-size: .92rem; margin-top: .35rem }
 @media print { html { font-size: 10.5px } body { margin: 0; max-width: none; font-size: 1rem }
   figure, tr { break-inside: avoid } h2 { break-after: avoid } }"""
 
 
-def encode_html(parts: Sequence[ReportPart]) -> bytes:
-    """Return the parts of a report as one page."""
+def encode_html(parts: Sequence[ReportPart], view: bytes = b"") -> bytes:
+    """Return the parts of a report as one page, with the page of a 3D view within it."""
     title = next((part.words for part in parts if isinstance(part, Headline)), "Structure")
     with drawing_defaults():
-        body = "\n".join(_html(part) for part in parts)
+        written = [_html(part) for part in parts]
+    if view:
+        written.insert(1, f'<iframe title="3D view" srcdoc="{escape(view.decode())}"></iframe>')
+    body = "\n".join(written)
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n<meta name="generator" content="{MARK}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>\n'

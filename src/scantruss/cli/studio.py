@@ -1,0 +1,100 @@
+"""The command ``scantruss studio``: the road from scan to structure in a browser."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .options import Parser
+
+
+def studio_parser() -> Parser:
+    """Options of ``scantruss studio``."""
+    from .options import Parser, add_force, whole_number
+
+    parser = Parser(
+        "studio",
+        "[SCAN|PROJECT] [options]",
+        "Open a page in the browser: length, grid, structure, files. A project is saved after each step.",
+    )
+    parser.add_argument("source", metavar="SCAN|PROJECT", nargs="?", help="a scan, or a project saved as .scantruss")
+    parser.add_argument(
+        "--project", metavar="FILE.scantruss", help="where the project is saved (default: NAME.scantruss here)"
+    )
+    parser.add_argument("--port", metavar="NUMBER", type=whole_number, default=8080, help="default 8080; 0: a free one")
+    parser.add_argument(
+        "--host", metavar="ADDRESS", default="127.0.0.1", help="address to listen on; beyond this machine a token is asked for"
+    )  # fmt: skip
+    parser.add_argument("--no-open", action="store_true", help="open no browser")
+    add_force(parser)
+    return parser
+
+
+def studio(values: Namespace) -> None:
+    """Serve the page until it is interrupted."""
+    from ..studio.server import LOOPBACK, check_viser
+
+    check_viser()
+    if not 0 <= values.port < 65536:
+        raise InputError(f"--port needs a number from 0 to 65535, got {values.port}")
+    project = project_of(values)
+    import time
+    import webbrowser
+
+    from ..report.terminal import print_lines
+    from ..studio.server import start_server
+    from ..studio.session import Session
+    from ..studio.view import StudioView
+
+    session = Session(project)
+    if values.source is not None:
+        session.open(Path(values.source))
+    server, guard = start_server(values.host, values.port)
+    try:
+        StudioView(session, server)
+        shown = "localhost" if values.host in LOOPBACK else values.host
+        address = f"http://{shown}:{server.get_port()}/" + (f"?token={guard.token}" if guard.token else "")
+        saved = f"saved as {project} after each step" if project is not None else "not saved; name a scan or --project"
+        print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
+        if not values.no_open:
+            webbrowser.open(address)
+        while True:
+            time.sleep(3600.0)
+    finally:
+        session.stop()
+        server.stop()
+
+
+def project_of(values: Namespace) -> Path | None:
+    """Return where the project is saved; nowhere where neither a scan nor a place is named.
+
+    Raises
+    ------
+    FormatError, InputError
+        Nothing can be saved there, or another file is there.
+    """
+    from ..runtime.files import check_place
+    from ..runtime.ours import check_ours
+
+    suffix, source = ".scantruss", None if values.source is None else Path(values.source)
+    opens = source is not None and source.suffix.lower() == suffix
+    if source is not None and not source.is_file():
+        raise InputError(f"there is no file {source}; name a scan or a project saved as {suffix}")
+    if values.project is None:
+        place = source if opens or source is None else Path(source.with_suffix(suffix).name)
+    else:
+        place = Path(values.project)
+    if place is None:
+        return None
+    check_place(place, (suffix,))
+    if place != source and place.exists():
+        if not values.force:
+            raise InputError(
+                f"{place} is there already; open it with: scantruss studio {place}, or save elsewhere with --project"
+            )
+        check_ours(place, "result")
+    return place

@@ -1,0 +1,154 @@
+"""The rows that a page shows of nodes, members and panels, and the places of the certificate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..check.folds import fold_angles
+from ..grid.certificate import Certificate
+from ..grid.grid import Grid
+from ..grid.quality import shape_qualities
+from .model import Model
+
+COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, words, middle of a diverging scale
+    ("members", "utilization", "utilization", None),
+    ("members", "axial force", "axial force of the greatest size, tension positive", 0.0),
+    ("members", "length", "member length", None),
+    ("members", "length / desired", "length over the desired length", 1.0),
+    ("members", "fold", "angle between the panels, 180 where level", None),
+    ("panels", "quality", "quality of triangles, 1 equilateral", None),
+    ("nodes", "members", "members at a node", None),
+    ("nodes", "distance from scan", "distance of nodes from the scan", None),
+)
+
+
+class PageColumn(NamedTuple):
+    """A column of a table in the page."""
+
+    name: str
+    unit: str
+    values: list[Any]  #: one for each node, member or panel; None where it is not known
+
+
+Tables = dict[str, list[PageColumn]]
+
+
+def column(name: str, unit: str, values: Iterable[Any] | np.ndarray) -> PageColumn:
+    """Return a column of plain values; NaN becomes None, and numbers keep six digits."""
+    plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
+    return PageColumn(name, unit, [_short(value) if isinstance(value, float) else value for value in plain])
+
+
+def _short(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+class Pin(NamedTuple):
+    """A place of the certificate."""
+
+    words: str
+    value: str
+    where: tuple[float, float, float]  #: in the scan's own frame [scan unit]
+
+
+def tables_of(model: Model) -> Tables:
+    """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan."""
+    unit, ends, corners = model.unit, model.members, model.triangles
+    valence = np.bincount(ends.ravel(), minlength=len(model.local))
+    nodes = [column("node", "", model.node_marks)]
+    nodes += [column(axis, unit, model.nodes[:, k]) for k, axis in enumerate("xyz")]
+    nodes.append(column("members", "", valence))
+    members = [
+        column("member", "", model.member_marks),
+        *(column(name, "", _marks(model, ends[:, k])) for k, name in enumerate(("start", "end"))),
+        column("group", "", [model.groups[k] for k in model.group_of.tolist()]),
+        column("length", unit, model.lengths),
+    ]
+    sides = np.linalg.norm(model.local[np.roll(corners, -1, axis=1)] - model.local[corners], axis=2)
+    panels = [
+        column("panel", "", model.panel_marks),
+        *(column(f"node {k + 1}", "", _marks(model, corners[:, k])) for k in range(3)),
+        *(column(f"side {k + 1}", unit, sides[:, k]) for k in range(3)),
+        column("quality", "", shape_qualities(model.local, corners)),
+    ]
+    if model.truss is not None:
+        held = np.isin(np.arange(len(model.local)), model.supported)
+        nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))
+        members += _of_structure(model)
+    elif model.grid is not None:
+        nodes += _of_grid(model.grid)
+        members += _members_of_grid(model.grid)
+    return {"nodes": nodes, "members": members, "panels": panels}
+
+
+def _marks(model: Model, ids: np.ndarray) -> list[str]:
+    return [model.node_marks[k] for k in ids.tolist()]
+
+
+def _of_grid(grid: Grid) -> list[PageColumn]:
+    """Return what is known of the nodes of a grid alone."""
+    columns = [column("fixed", "", ["yes" if each else "no" for each in grid.fixed.tolist()])]
+    if grid.deviation is not None:
+        columns.append(column("distance from scan", grid.unit, grid.deviation))
+    return columns
+
+
+def _members_of_grid(grid: Grid) -> list[PageColumn]:
+    """Return what is known of the members of a grid alone."""
+    columns = [column("fold", "degree", fold_angles(grid))] if grid.topology.manifold else []
+    if grid.desired is not None or grid.settings is not None:
+        length = grid.settings.length if grid.settings is not None else 1.0
+        columns.insert(0, column("length / desired", "", grid.stretches(length)))
+    return columns
+
+
+def _of_structure(model: Model) -> list[PageColumn]:
+    """Return sections, forces and checks of the members of a structure."""
+    truss, solution = model.truss, model.solution
+    assert truss is not None
+    columns = [column("section", "", [truss.sections[k].name for k in truss.section_of.tolist()])]
+    if solution is not None:
+        axial = np.stack([result.axial for result in solution.all_results()]) / 1000.0
+        low, high = axial[:, :, 0].min(axis=0), axial[:, :, 1].max(axis=0)
+        columns += [column("force min", "kN", low), column("force max", "kN", high)]
+        columns.append(column("axial force", "kN", np.where(-low > high, low, high)))
+    if model.utilization is not None:
+        columns.append(column("utilization", "", model.utilization))
+    if model.report is not None and model.report.utilization is not None:
+        columns.append(column("governed by", "", model.report.governing))
+    return columns
+
+
+def colorings_of(tables: Tables) -> list[dict[str, Any]]:
+    """Return the colourings for which there are values."""
+    found = []
+    for kind, name, words, middle in COLORINGS:
+        values = next((each.values for each in tables[kind] if each.name == name), ())
+        if any(value is not None for value in values):
+            more = {} if middle is None else {"middle": middle}
+            found.append({"kind": kind, "name": name, "words": words, **more})
+    return found
+
+
+def pins_of(certificate: Certificate) -> list[Pin]:
+    """Return the places of faults, warnings, the worst figures and what is left out."""
+    unit = f" {certificate.unit}" if certificate.unit else ""
+    pins = [
+        Pin(f"{kind}: the grid {fault.words}", "", fault.where)
+        for kind, faults in (("fault", certificate.faults), ("warning", certificate.warnings))
+        for fault in faults
+        if fault.where is not None
+    ]
+    pins += [
+        Pin(name, f"{worst.value:.4g}{' degrees' if of_angle else unit}", worst.where)
+        for name, worst, of_angle in certificate.worst_places()
+    ]
+    return pins + [
+        Pin(f"left out: {part.words}", f"{part.points:,} points" if part.points else "", part.where)
+        for part in certificate.left_out
+        if part.where is not None and part.kind != "far"
+    ]

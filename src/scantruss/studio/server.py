@@ -1,0 +1,158 @@
+"""The server of the studio: viser on one address, behind a guard against other sites and, beyond this machine, a token."""
+
+from __future__ import annotations
+
+import hmac
+import http
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.cookies import CookieError, SimpleCookie
+from importlib.util import find_spec
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from ..errors import InputError
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+COOKIE = "scantruss_studio"
+Handler = Callable[[Any, Any], Any]
+
+
+def check_viser() -> None:
+    """Refuse to start without viser.
+
+    Raises
+    ------
+    InputError
+        It is not installed; the message has the command that installs it.
+    """
+    if find_spec("viser") is None:
+        raise InputError(
+            'the studio needs viser, which is not installed; install it with: python -m pip install "scantruss[studio]"'
+        )
+
+
+class Guard:
+    """Judges requests: whether they come from our own page, and from somebody who has the token.
+
+    Parameters
+    ----------
+    host : str
+        Address that the server listens on.
+    """
+
+    def __init__(self, host: str) -> None:
+        self.token = "" if host in LOOPBACK else secrets.token_urlsafe(24)
+
+    def refusal(self, path: str, headers: Any) -> str:
+        """Return why a request is refused; "" where it is not.
+
+        Parameters
+        ----------
+        path : str
+            Of the request, with its query.
+        headers : mapping
+            Of the request.
+        """
+        host = headers.get("Host", "")
+        if not self.token and urlsplit(f"//{host}").hostname not in LOOPBACK:  # a name that was made to point here
+            return "this studio answers to the machine it runs on only"
+        origin = headers.get("Origin", "")
+        if origin and urlsplit(origin).netloc != host:
+            return "requests of other sites are refused"
+        if headers.get("Upgrade", "").lower() == "websocket" and not origin:
+            return "a page must say where it comes from"
+        if self.token and not hmac.compare_digest(self.token.encode(), self._given(path, headers).encode()):
+            return "the token is missing or wrong; open the address that scantruss studio printed"
+        return ""
+
+    @staticmethod
+    def _given(path: str, headers: Any) -> str:
+        """Return the token of a request: of its address, or of the cookie that the first answer set."""
+        if words := parse_qs(urlsplit(path).query).get("token"):
+            return words[0]
+        try:
+            found = SimpleCookie(headers.get("Cookie", "")).get(COOKIE)
+        except CookieError:
+            return ""
+        return "" if found is None else found.value
+
+    def around(self, inner: Handler) -> Handler:
+        """Return the handler of requests with this guard before it."""
+        from websockets.datastructures import Headers
+        from websockets.http11 import Response
+
+        def handle(connection: Any, request: Any) -> Any:
+            if words := self.refusal(request.path, request.headers):
+                head = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close"})
+                return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", head, f"{words}\n".encode())
+            answer = inner(connection, request)
+            if answer is not None:
+                answer.headers["Referrer-Policy"] = "no-referrer"
+                answer.headers["X-Frame-Options"] = "DENY"
+                if self.token:
+                    answer.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+            return answer
+
+        return handle
+
+
+@contextmanager
+def _guarded(guard: Guard) -> Iterator[None]:
+    """Put the guard before all that viser serves while it starts: it has no place of its own for one."""
+    import websockets.asyncio.server as serving
+
+    plain = serving.serve
+    used: list[bool] = []
+
+    def serve(*arguments: Any, **options: Any) -> Any:
+        used.append(True)
+        return plain(*arguments, **options | {"process_request": guard.around(options["process_request"])})
+
+    serving.serve = serve
+    try:
+        yield
+    finally:
+        serving.serve = plain
+    if not used:
+        raise InputError("this version of viser cannot be guarded; install viser 1.1")
+
+
+def start_server(host: str, port: int) -> tuple[Any, Guard]:
+    """Start the server.
+
+    Returns
+    -------
+    (viser.ViserServer, Guard)
+
+    Raises
+    ------
+    InputError
+        viser is not installed, or nothing can be served there.
+    """
+    check_viser()
+    import socket
+
+    import viser
+
+    with socket.socket(
+        socket.AF_INET6 if ":" in host else socket.AF_INET
+    ) as trial:  # viser takes another port without a word
+        try:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind((host, port))
+        except OSError as error:
+            raise InputError(
+                f"cannot serve on {host} port {port}: {error.strerror or error}; choose another with --port"
+            ) from None
+        port = trial.getsockname()[1]
+    guard = Guard(host)
+    with _guarded(guard):
+        server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
+    server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
+    return server, guard
+
+
+def _no_tunnel(*_: Any, **__: Any) -> None:
+    """Open no tunnel."""

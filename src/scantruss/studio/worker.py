@@ -1,0 +1,86 @@
+"""One thread that does what is asked for: the newest request wins, and what runs can be stopped."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from threading import Condition, Thread
+
+from ..runtime.progress import Progress
+
+Task = Callable[[Progress], None]
+
+
+class StoppedError(Exception):
+    """Raised within a task that was stopped or overtaken."""
+
+
+class Worker:
+    """Runs one task at a time, the newest that waits; `quick` ones give way to any other.
+
+    Parameters
+    ----------
+    tell : callable
+        ``tell(error)`` after every task: None where it was done or stopped.
+    progress : callable
+        ``progress(stage, share)`` while a task runs.
+    """
+
+    def __init__(self, tell: Callable[[Exception | None], None], progress: Progress) -> None:
+        self._tell, self._progress = tell, progress
+        self._waiting: tuple[Task, bool] | None = None
+        self._running: tuple[Task, bool] | None = None
+        self._stop = False
+        self._change = Condition()
+        self._thread: Thread | None = None
+
+    def ask(self, task: Task, *, quick: bool = False) -> bool:
+        """Do a task as soon as may be, in place of what waits; whether it is taken: a quick one is not while another waits or runs."""
+        with self._change:
+            busy = [one for one in (self._running, self._waiting) if one is not None and not one[1]]
+            if quick and busy:
+                return False
+            self._waiting = (task, quick)
+            self._stop = self._running is not None
+            if self._thread is None:
+                self._thread = Thread(target=self._serve, name="scantruss studio", daemon=True)
+                self._thread.start()
+            self._change.notify_all()
+        return True
+
+    def stop(self) -> None:
+        """Stop what runs and forget what waits."""
+        with self._change:
+            self._waiting, self._stop = None, True
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until nothing runs or waits; whether that is so."""
+        with self._change:
+            return self._change.wait_for(lambda: self._running is None and self._waiting is None, seconds)
+
+    def _heard(self, stage: str, share: float) -> None:
+        if self._stop:
+            raise StoppedError
+        self._progress(stage, share)
+
+    def _serve(self) -> None:
+        while True:
+            with self._change:
+                self._change.wait_for(lambda: self._waiting is not None)
+                assert self._waiting is not None
+                self._running, self._waiting, self._stop = self._waiting, None, False
+                task = self._running[0]
+            fault: Exception | None = None
+            try:
+                task(self._heard)
+            except StoppedError:
+                pass
+            except Exception as error:  # a crash of a run leaves the studio alive; it is shown
+                fault = error
+            try:
+                self._tell(fault)
+            except Exception:  # of the page; the worker goes on
+                sys.excepthook(*sys.exc_info())
+            with self._change:
+                self._running = None
+                self._change.notify_all()

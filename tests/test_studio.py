@@ -1,0 +1,172 @@
+"""The studio without a browser: session, worker, project file."""
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss.pipeline import grid_from_cloud
+from scantruss.runtime.progress import Progress
+from scantruss.studio.project import read_project
+from scantruss.studio.session import Session
+from scantruss.studio.worker import Worker
+
+PATIENCE = 120.0
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    """Save a shallow dome of points."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 60), np.linspace(0, 10, 60)))
+    z = 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)
+    path = tmp_path / "dome.xyz"
+    np.savetxt(path, np.stack([x + 4.5e5, y + 5.3e6, z], axis=1), fmt="%.6f")
+    return path
+
+
+def opened(scan: Path, project: Path | None = None) -> Session:
+    """Open a scan in metres."""
+    session = Session(project)
+    session.open(scan)
+    assert session.cloud is not None
+    session.settings = session.settings.replace(length=1.0, unit="m")
+    session.cloud = st.PointCloud.from_array(session.cloud.points + session.cloud.origin, unit="m", name="dome.xyz")
+    return session
+
+
+def made(session: Session) -> Session:
+    """Generate, and wait for the grid."""
+    session.generate()
+    assert session.worker.wait(PATIENCE)
+    assert session.message == "" and session.grid is not None
+    return session
+
+
+def test_the_grid_of_the_studio_is_that_of_the_library(scan: Path) -> None:
+    session = made(opened(scan))
+    assert session.cloud is not None and session.grid is not None
+    grid = grid_from_cloud(session.cloud, session.settings)
+    assert np.array_equal(grid.nodes, session.grid.nodes) and np.array_equal(grid.triangles, session.grid.triangles)
+
+
+def test_the_newest_length_wins_and_a_live_grid_is_never_saved(scan: Path, tmp_path: Path) -> None:
+    session = opened(scan, tmp_path / "a.scantruss")
+    session.save()
+    before = (tmp_path / "a.scantruss").read_bytes()
+    for length in (0.8, 0.9, 1.1, 1.25):
+        assert session.live(length)
+    assert session.worker.wait(PATIENCE)
+    assert session.grid is not None and session.grid.settings is not None
+    assert session.grid.settings.length == 1.25 and session.is_live
+    assert (tmp_path / "a.scantruss").read_bytes() == before
+
+
+def test_a_project_opens_as_it_was(scan: Path, tmp_path: Path) -> None:
+    place = tmp_path / "dome.scantruss"
+    session = made(opened(scan, place))
+    session.set_structure(supports="boundary", section="CHS60.3x4", loads="self,snow:1kN/m2")
+    session.run_structure()
+    assert session.worker.wait(PATIENCE) and session.message == ""
+    again = Session(place)
+    again.open(place)
+    assert session.cloud is not None and again.cloud is not None
+    assert np.array_equal(again.cloud.points, session.cloud.points)
+    assert np.array_equal(again.cloud.origin, session.cloud.origin) and again.cloud.unit == "m"
+    assert again.settings == session.settings and again.structure_settings == session.structure_settings
+    for kind, suffix in (("grid", ".json"), ("grid", ".obj"), ("structure", ".json")):
+        assert again.files(kind, suffix) == session.files(kind, suffix)
+    assert again.command() == session.command()
+    kept = place.read_bytes()
+    again.save()
+    assert place.read_bytes() == kept
+
+
+def test_every_format_of_the_table_comes_out(scan: Path) -> None:
+    session = made(opened(scan))
+    for suffix in (".csv", ".html", ".ifc", ".ply", ".png"):
+        assert all(session.files("grid", suffix).values())
+    with pytest.raises(st.InputError, match="no structure yet"):
+        session.files("structure", ".json")
+
+
+def test_what_is_refused_is_said_and_the_studio_goes_on(scan: Path) -> None:
+    session = opened(scan)
+    session.settings = session.settings.replace(length=50.0)
+    session.generate()
+    assert session.worker.wait(PATIENCE)
+    with pytest.raises(st.ScanTrussError) as refused:
+        assert session.cloud is not None
+        grid_from_cloud(session.cloud, session.settings)
+    assert session.message == " ".join(str(refused.value).split())
+    session.settings = session.settings.replace(length=1.0)
+    made(session)
+
+
+def test_an_upload_is_read_under_its_own_name_and_a_bad_one_is_refused(scan: Path) -> None:
+    session = Session()
+    session.open_upload("../../dome.xyz", scan.read_bytes())
+    assert session.worker.wait(PATIENCE) and session.message == ""
+    assert session.cloud is not None and session.cloud.name == "dome.xyz" and len(session.cloud.points) == 3600
+    session.open_upload("no.xyz", b"no numbers")
+    assert session.worker.wait(PATIENCE)
+    assert "no.xyz" in session.message and session.cloud.name == "dome.xyz"
+
+
+@pytest.mark.parametrize("words", ["own.csv", "own.csv:A", "loads.toml", "/etc/passwd"])
+def test_the_page_reads_no_file(words: str) -> None:
+    for name in ("supports", "section", "material", "loads"):
+        with pytest.raises(st.InputError, match="names a file"):
+            Session().set_structure(**{name: words})
+
+
+def test_a_stopped_run_leaves_the_grid_before_it(scan: Path) -> None:
+    session = made(opened(scan))
+    before = session.grid
+    session.tell = session.stop  # as soon as it has begun
+    session.settings = session.settings.replace(length=0.8)
+    session.generate()
+    assert session.worker.wait(PATIENCE)
+    assert session.grid is before and session.message == ""
+
+
+def test_a_crash_leaves_the_worker_alive() -> None:
+    told: list[Exception | None] = []
+    worker = Worker(told.append, lambda stage, share: None)
+
+    def crash(progress: Progress) -> None:
+        raise ZeroDivisionError
+
+    worker.ask(crash)
+    assert worker.wait(PATIENCE)
+    worker.ask(lambda progress: None)
+    assert worker.wait(PATIENCE)
+    assert [type(one) for one in told] == [ZeroDivisionError, type(None)]
+
+
+def test_a_quick_request_gives_way_to_a_run() -> None:
+    worker = Worker(lambda error: None, lambda stage, share: None)
+    go = threading.Event()
+    done: list[str] = []
+
+    def run(progress: Progress) -> None:
+        go.wait(PATIENCE)
+        done.append("run")
+
+    assert worker.ask(run)
+    time.sleep(0.01)
+    assert not worker.ask(lambda progress: done.append("quick"), quick=True)
+    go.set()
+    assert worker.wait(PATIENCE) and done == ["run"]
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"text"])
+def test_a_damaged_project_is_refused_in_one_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.scantruss"
+    path.write_bytes(content)
+    with pytest.raises(st.FormatError, match="no project of scantruss studio"):
+        read_project(path)
+    with pytest.raises(st.FormatError, match="cannot read"):
+        read_project(tmp_path / "none.scantruss")

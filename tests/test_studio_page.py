@@ -1,0 +1,160 @@
+"""The studio as it is served: who is refused, and what a person sees in a browser."""
+
+import socket
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import open_page
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.export.page_tables import PageColumn
+from scantruss.studio.server import Guard, start_server
+from scantruss.studio.session import Session
+from scantruss.studio.view import StudioView, colors_of
+
+
+def free_port() -> int:
+    """Return a port that nobody uses."""
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[tuple[str, Session]]:
+    """Serve a studio with a shallow dome."""
+    pytest.importorskip("viser", reason="viser is not installed")
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 60), np.linspace(0, 10, 60)))
+    points = np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1)
+    session = Session(tmp_path / "dome.scantruss")
+    np.savetxt(tmp_path / "dome.xyz", points)
+    session.open(tmp_path / "dome.xyz")
+    session.set_unit("m")
+    server, _ = start_server("127.0.0.1", free_port())
+    try:
+        StudioView(session, server)
+        yield f"http://127.0.0.1:{server.get_port()}/", session
+    finally:
+        session.stop()
+        server.stop()
+
+
+def status(address: str, **head: str) -> int:
+    """Return the status that a request gets."""
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=head), timeout=10) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        error.close()
+        return error.code
+
+
+def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
+    address, _ = served
+    assert status(address) == 200
+    assert status(address, Origin="http://example.org") == 403
+    assert status(address, Host="example.org") == 403
+    assert status(address + "../../../../etc/passwd") == 404
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        ({"Host": "127.0.0.1:80"}, ""),
+        ({"Host": "localhost:80", "Origin": "http://localhost:80", "Upgrade": "websocket"}, ""),
+        ({"Host": "localhost:80", "Origin": "http://localhost:81", "Upgrade": "websocket"}, "other sites"),
+        ({"Host": "localhost:80", "Origin": "null", "Upgrade": "websocket"}, "other sites"),
+        ({"Host": "localhost:80", "Upgrade": "websocket"}, "where it comes from"),
+        ({"Host": "evil.example:80"}, "machine it runs on"),
+    ],
+)
+def test_the_guard_of_this_machine(head: dict[str, str], words: str) -> None:
+    refused = Guard("127.0.0.1").refusal("/", head)
+    assert words in refused if words else refused == ""
+
+
+def test_beyond_this_machine_a_token_is_asked_for() -> None:
+    guard = Guard("0.0.0.0")
+    head = {"Host": "office:80"}
+    assert "token" in guard.refusal("/", head) and "token" in guard.refusal("/?token=no", head)
+    assert guard.refusal(f"/?token={guard.token}", head) == ""
+    assert guard.refusal("/", head | {"Cookie": f"scantruss_studio={guard.token}"}) == ""
+    assert "other sites" in guard.refusal(f"/?token={guard.token}", head | {"Origin": "http://evil.example"})
+    assert len(guard.token) > 20 and Guard("0.0.0.0").token != guard.token
+
+
+def test_a_port_that_is_taken_is_refused() -> None:
+    pytest.importorskip("viser", reason="viser is not installed")
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        with pytest.raises(st.InputError, match="choose another with --port"):
+            start_server("127.0.0.1", other.getsockname()[1])
+
+
+def test_without_viser_the_command_names_the_extra(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("scantruss.studio.server.find_spec", lambda name: None)
+    assert main(["studio", "--no-open"]) == 2
+    assert 'python -m pip install "scantruss[studio]"' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("studio none.ply --no-open", "there is no file none.ply"),
+        ("studio a.xyz --no-open", "a.scantruss is there already"),
+        ("studio a.xyz --project b.zip --no-open", "use one of .scantruss"),
+        ("studio --port 99999 --no-open", "--port needs a number"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_line(
+    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("viser", reason="viser is not installed")
+    monkeypatch.chdir(tmp_path)
+    Path("a.xyz").write_text("0 0 0\n")
+    Path("a.scantruss").write_text("somebody's")
+    assert main(words.split()) == 2
+    err = capsys.readouterr().err
+    assert said in err and err.count("\n") == 1
+    assert Path("a.scantruss").read_text() == "somebody's"
+
+
+def test_colours_span_the_values() -> None:
+    column = PageColumn("length", "m", [1.0, None, 3.0])
+    colors, low, high = colors_of(column, None)
+    assert (low, high) == (1.0, 3.0) and len(np.unique(colors, axis=0)) == 3
+    assert colors_of(column, 1.5)[1:] == (0.0, 3.0)
+
+
+def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        asked: list[Any] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.wait_for_selector("text=Generate")
+        page.focus("[role=slider]")
+        page.keyboard.press("ArrowRight")
+        page.wait_for_selector("text=(quick, not saved)")
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=(quick, not saved)", state="detached")
+        page.wait_for_selector("text=certificate: passed")
+        page.click("button:has-text('Fly there')")
+        page.click("[role=tab]:has-text('Structure')")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=kg without nodes")
+        assert session.worker.wait(60) and session.solution is not None
+        page.click("[role=tab]:has-text('Files')")
+        with page.expect_download() as download:
+            page.click("button:has-text('Download the grid')")
+        assert Path(download.value.path()).read_bytes() == session.files("grid", ".json")["grid.json"]
+        assert not [url for url in asked if not url.startswith((address, "data:", "blob:"))]
+        assert errors == []
