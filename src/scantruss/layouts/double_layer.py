@@ -18,7 +18,7 @@ TOP, BOTTOM, WEB = "top", "bottom", "web"  #: groups of members
 LEAST_CHORD = (
     0.25  #: of a chord of the second layer, measured along the first, over the length there; shorter is refused
 )
-LEAST_DEPTH = 0.5  #: of the distance between both layers, measured along the normal of a triangle, over the depth
+LEAST_GAP = 0.5  #: of the distance between both layers, measured along the normal of a triangle, over the depth
 CROSSED = 0.01  #: distance of two members that cross, over the mean length of the first layer
 PLACES_NAMED = 4  #: in a refusal
 
@@ -67,9 +67,7 @@ def double_layer(grid: Grid, depth: float, *, second: str = "dual", along: str =
     down = -normals if along == "normal" else np.tile([0.0, 0.0, -1.0], (count, 1))
     areas = np.cross(*(grid.nodes[triangles[:, k]] - grid.nodes[triangles[:, 0]] for k in (1, 2)))
     level = -(down[triangles].mean(axis=1) * areas).sum(axis=1) / np.linalg.norm(areas, axis=1)
-    _refuse(
-        grid, triangles[level < LEAST_DEPTH].ravel(), depth, f"both layers are less than {LEAST_DEPTH:g} of it apart"
-    )
+    _refuse(grid, triangles[level < LEAST_GAP].ravel(), depth, f"both layers are less than {LEAST_GAP:g} of it apart")
     if second == "same":
         below = grid.nodes + depth * down
         over, chords = np.arange(count), grid.edges

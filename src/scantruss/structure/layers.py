@@ -11,7 +11,7 @@ from ..layouts.clearance import angles_at_nodes, close_pairs
 from ..layouts.double_layer import WEB
 from .truss import Truss
 
-LEAST_ANGLE = 30.0  #: between a web and another member at a node [degree]
+LEAST_WEB_ANGLE = 30.0  #: between a web and another member at a node [degree]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class LayerChecks:
 
     clashes: np.ndarray  #: (P, 2) int64 members without a common node, closer than their diameters
     clearances: np.ndarray  #: (P,) distance of their axes [m]
-    sharp: np.ndarray  #: (A, 2) int64 members at a node, one of them a web, at less than LEAST_ANGLE
+    sharp: np.ndarray  #: (A, 2) int64 members at a node, one of them a web, at less than LEAST_WEB_ANGLE
     angles: np.ndarray  #: (A,) [degree]
 
     def to_dict(self, truss: Truss) -> dict[str, Any]:
@@ -50,7 +50,7 @@ class LayerChecks:
         if len(self.sharp):
             a, b = self.sharp[int(self.angles.argmin())].tolist()
             said.append(
-                f"{len(self.sharp):,} angles of webs to other members are below {LEAST_ANGLE:g} degrees, the least"
+                f"{len(self.sharp):,} angles of webs to other members are below {LEAST_WEB_ANGLE:g} degrees, the least"
                 f" {self.angles.min():.3g} between {truss.member_marks[a]} and {truss.member_marks[b]}"
             )
         return said
@@ -61,7 +61,7 @@ def check_layers(truss: Truss) -> LayerChecks:
     around = [s.width if s.shape == "CHS" else float(np.hypot(s.width, s.depth)) for s in truss.sections]
     clashes, clearances = close_pairs(truss.nodes, truss.members, np.array(around)[truss.section_of] / 2)
     pairs, angles = angles_at_nodes(truss.nodes, truss.members)
-    sharp = (angles < LEAST_ANGLE) & np.isin(pairs, truss.member_sets.get(WEB, np.zeros(0, np.int64))).any(axis=1)
+    sharp = (angles < LEAST_WEB_ANGLE) & np.isin(pairs, truss.member_sets.get(WEB, np.zeros(0, np.int64))).any(axis=1)
     return LayerChecks(clashes, clearances, pairs[sharp], angles[sharp])
 
 
