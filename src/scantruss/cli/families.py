@@ -21,7 +21,7 @@ def families_parser() -> Parser:
 
     parser = Parser(
         "families",
-        "GRID OUT [OUT ...] [--tolerance 1%] [--count 12] [--scan SCAN] [options]",
+        "GRID OUT [OUT ...] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
         "Move the nodes of a saved grid along its surface, so that its members are of few lengths.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
