@@ -13,6 +13,7 @@ from .clean import clean, clean_parser
 from .completion import completion_parser, print_completion
 from .convert import convert, convert_parser
 from .demo import demo_parser, make_demo
+from .families import families, families_parser
 from .grid import grid, grid_parser
 from .info import info, info_parser
 from .print import print_parser, print_solid
@@ -40,6 +41,7 @@ COMMANDS: dict[str, tuple[Callable[[], Parser], Callable[[Namespace], None]]] = 
     "thin": (thin_parser, thin),
     "sweep": (sweep_parser, sweep),
     "print": (print_parser, print_solid),
+    "families": (families_parser, families),
     "schedule": (schedule_parser, make_schedule),
     "setout": (setout_parser, make_setting_out),
     "structure": (structure_parser, structure),

@@ -30,6 +30,7 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            turn a grid saved as .json into one watertight solid, or
                                            (--bed, --sockets) into parts with plug joints, or balls for rods
+  scantruss families GRID OUT [OUT ...]    move the nodes along the surface, so that members are of few lengths
   scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
                                            list nodes, members and panels of a grid or structure as a workshop needs them
   scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv --supports corners

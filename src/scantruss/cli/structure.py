@@ -34,11 +34,16 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      "corners, boundary, lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
      " positions X,Y,Z in the frame of the scan"),
     ("support_type", "TYPE", "pinned (default), fixed, roller or springs:K, with K such as 5MN/m"),
-    ("joints", "TYPE", "rigid (default), pinned (axial forces only) or the stiffness of springs at the member ends in Nm/rad"),
+    ("joints", "TYPE",
+     "rigid (default), pinned (axial forces only; default of double layers) or the stiffness of springs at member ends in Nm/rad"),
     ("loads", "LOAD,...|FILE",
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
     ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
+    ("double_layer", "DEPTH", "a second layer so far below, in metres of the structure or with a unit, and webs between"),
+    ("second_layer", "dual|same", "of a double layer: nodes under the triangles (default) or under the nodes"),
+    ("depth_along", "normal|vertical", "of a double layer: along the smoothed normals (default) or along z"),
+    ("held_layer", "outer|inner", "of a double layer: which one the supports hold (default outer, the grid)"),
     ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
     ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),

@@ -15,6 +15,7 @@ from ..grid.groups import member_groups
 from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.marks import member_marks, node_marks, numbered, panel_marks
 from ..settings import UNITS
+from ..structure.groups import member_groups_of
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -119,6 +120,11 @@ def model_of_truss(
     """Return the model of a structure, in metres."""
     grid = _grid_of(truss)
     model = model_of_grid(grid) if np.array_equal(grid.edges, np.sort(truss.members, axis=1)) else None
+    groups, group_of = (
+        (model.groups, model.group_of) if model else (("members",), np.zeros(len(truss.members), np.int64))
+    )
+    if truss.member_sets:
+        groups, group_of = member_groups_of(truss)
     return Model(
         local=truss.nodes,
         origin=truss.origin,
@@ -128,8 +134,8 @@ def model_of_truss(
         node_marks=truss.node_marks,
         member_marks=truss.member_marks,
         panel_marks=tuple(numbered("P", len(truss.triangles), 4)),
-        groups=model.groups if model else ("members",),
-        group_of=model.group_of if model else np.zeros(len(truss.members), np.int64),
+        groups=groups,
+        group_of=group_of,
         node_sets=truss.node_sets,
         grid=grid if model else None,
         truss=truss,

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..grid.marks import member_marks, node_marks
+from ..grid.marks import member_marks, node_marks, numbered
+from ..layouts.double_layer import DoubleLayer
+from ..layouts.double_layer import double_layer as make_double_layer
 from ..settings import UNITS
 from .catalogue import Material, Section, find_material, find_section
 from .loads import cases_of, usual_combinations
+from .quantities import LENGTH, quantity
 from .supports import node_sets, support_nodes, support_stiffness
-from .truss import Combination, Truss, area_vectors
+from .truss import HELD_LAYERS, Combination, Truss, area_vectors
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -33,12 +36,19 @@ def truss_of_grid(
     joints: str | float,
     node_allowance: float,
     combinations: Sequence[Combination] | None,
+    double_layer: str | float,
+    second_layer: str,
+    depth_along: str,
+    held_layer: str,
 ) -> Truss:
     """Return the structure of a grid; see `Truss.from_grid`."""
     if grid.unit and unit and unit != grid.unit:
         raise InputError(f"the grid is in {grid.unit}, not in {unit}; leave --unit out")
     metres = scale_of(grid.unit or unit, scale)
-    pinned, spring = _joints(joints)
+    layered = double_layer != ""
+    pinned, spring = _joints(joints or ("pinned" if layered else "rigid"))
+    if held_layer not in HELD_LAYERS:
+        raise InputError(f"the held layer must be {' or '.join(HELD_LAYERS)}, got {held_layer!r}")
     nodes = np.ascontiguousarray(grid.nodes, float) * metres
     members, triangles = np.asarray(grid.edges, np.int64), np.asarray(grid.triangles, np.int64)
     if len(members) == 0:
@@ -72,10 +82,36 @@ def truss_of_grid(
         scale=float(scale),
     )
     held = support_nodes(truss, supports)
-    truss = truss.replace(supports=support_stiffness(len(nodes), held, support_type))
+    if layered:
+        depth = quantity(double_layer, LENGTH, "the depth of a double layer", plain=True)
+        outer = grid.replace(nodes=nodes, triangles=triangles, origin=truss.origin, unit="m")
+        layers = make_double_layer(outer, depth, second=second_layer, along=depth_along)
+        truss = _with_layers(truss, layers)
+        held = layers.under[held] if held_layer == "inner" else held
+    truss = truss.replace(supports=support_stiffness(len(truss.nodes), held, support_type))
     cases = cases_of(truss, loads, node_allowance)
     return truss.replace(
         cases=cases, combinations=usual_combinations(cases) if combinations is None else tuple(combinations)
+    )
+
+
+def _with_layers(truss: Truss, layers: DoubleLayer) -> Truss:
+    """Return a structure of one layer with the second and the webs; what the first names stays."""
+    count, members = len(layers.nodes), len(layers.members)
+    spring = truss.end_stiffness[0, 0, 0]
+    normals = _unit(layers.normals[layers.members].sum(axis=1))
+    normals[: len(truss.members)] = truss.member_normals
+    return truss.replace(
+        nodes=layers.nodes,
+        members=layers.members,
+        node_normals=np.concatenate([truss.node_normals, layers.normals[len(truss.nodes) :]]),
+        member_normals=normals,
+        section_of=np.zeros(members, np.int64),
+        supports=np.zeros((count, 6)),
+        end_stiffness=np.full((members, 2, 2), spring),
+        member_sets=layers.groups,
+        node_marks=tuple(numbered("N", count, 3)),
+        member_marks=tuple(numbered("M", members, 4)),
     )
 
 

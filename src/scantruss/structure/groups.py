@@ -21,8 +21,8 @@ def member_groups_of(truss: Truss, by: str = "groups") -> tuple[tuple[str, ...],
     truss : Truss
         Its triangles tell the boundary, its sets of nodes the lines.
     by : str
-        "groups": boundary, the lines of the grid by name, and inner, in each piece. "rings": "ring 0" touches the boundary, "ring 1" is the
-        next towards the middle, and so on; "no ring" where there is none.
+        "groups": boundary, the lines of the grid by name, and inner, in each piece; top, bottom and web of a double layer.
+        "rings": "ring 0" touches the boundary, "ring 1" is the next towards the middle, and so on; "no ring" where there is none.
 
     Raises
     ------
@@ -57,6 +57,8 @@ def _lines(truss: Truss) -> list[str]:
         if name.startswith("line:"):
             words[np.isin(truss.members, nodes).all(axis=1)] = name
     words[boundary_members(truss)] = "boundary"
+    for name, members in truss.member_sets.items():
+        words[members] = name
     return words.tolist()
 
 

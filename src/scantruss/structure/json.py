@@ -46,6 +46,7 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         "node_marks": list(truss.node_marks),
         "member_marks": list(truss.member_marks),
         "node_sets": truss.node_sets,
+        **({"member_sets": truss.member_sets} if truss.member_sets else {}),
         **{name: getattr(truss, name) for name in _ARRAYS},
         "end_stiffness": truss.end_stiffness.reshape(-1, 4),
         "cases": [vars(case) for case in truss.cases],
@@ -170,11 +171,20 @@ def _truss_of(values: dict[str, Any]) -> Truss:
             Combination(each["name"], each["state"], tuple(each["factors"].items())) for each in values["combinations"]
         ),
         node_sets={name: np.array(nodes, np.int64) for name, nodes in values["node_sets"].items()},
+        member_sets={name: _ids(ids, members) for name, ids in values.get("member_sets", {}).items()},
         origin=_array(values["origin"], 1),
         node_marks=marks[0],
         member_marks=marks[1],
         scale=float(values["scale"]),
     )
+
+
+def _ids(values: Any, limit: int) -> np.ndarray:
+    """Return ids of members; ValueError where they are none."""
+    ids = np.array(values, np.int64)
+    if ids.ndim != 1 or (len(ids) and not 0 <= ids.min() <= ids.max() < limit):
+        raise ValueError(f"member_sets must hold ids, 0 to {limit - 1}")
+    return ids
 
 
 def _checked_of(values: dict[str, Any]) -> tuple[np.ndarray, tuple[str, ...]] | None:

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FormatError, InputError
+from ..layouts.double_layer import DEPTH_WAYS, SECOND_LAYERS
 from .checks import MemberChecks
 from .groups import WAYS_TO_GROUP
 from .imperfections import check_imperfection
 from .nonlinear import PATH_STEPS
-from .truss import Combination
+from .truss import HELD_LAYERS, Combination
 
 MOST_PATH_STEPS = 1000  #: of a nonlinear path
 MOST_MODES = 50  #: of buckling or vibration
@@ -40,9 +41,13 @@ class StructureSettings:
     material: str = "S355"
     supports: str = ""
     support_type: str = "pinned"
-    joints: str = "rigid"
+    joints: str = ""  #: "" is rigid, of a double layer pinned
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
+    double_layer: str = ""  #: depth of a double layer [m], or with a unit; "" for a single one
+    second_layer: str = SECOND_LAYERS[0]  #: of `SECOND_LAYERS`
+    depth_along: str = DEPTH_WAYS[0]  #: of `DEPTH_WAYS`
+    held_layer: str = HELD_LAYERS[0]  #: of `HELD_LAYERS`, on which the supports are
     size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
     size_by: str = WAYS_TO_GROUP[0]  #: what has a section of its own in sizing, of `WAYS_TO_GROUP`
     buckling: int = 0  #: buckling factors that are asked for

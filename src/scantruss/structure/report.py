@@ -11,6 +11,7 @@ import numpy as np
 
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .groups import member_groups_of
+from .layers import LayerChecks, check_layers
 from .modes import Modes
 from .nonlinear import Path
 from .path_report import path_figures, path_warnings, path_words
@@ -51,6 +52,7 @@ class StructureReport:
         None  #: mass sized with at most so many different sections, see `weight_curve` [kg]
     )
     path: Path | None = None  #: where it was asked for
+    layers: LayerChecks | None = None  #: of a double layer
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -76,6 +78,8 @@ class StructureReport:
             "groups": self._groups(),
             "warnings": list(self.warnings),
         }
+        if self.layers is not None:
+            values["layers"] = self.layers.to_dict(self.truss)
         if self.buckling is not None:
             values["buckling_factors"] = self.buckling.values.tolist()
             values["buckling_case"] = self.buckling.of
@@ -90,13 +94,16 @@ class StructureReport:
         return values
 
     def _groups(self) -> dict[str, Any]:
-        """Return count, mass [kg], sections and greatest utilization of every group of members."""
+        """Return count, mean length [m], its coefficient of variation, mass [kg], sections and greatest utilization of every group."""
         names, group_of = member_groups_of(self.truss)
         found = {}
         for number, name in enumerate(names):
             mine = group_of == number
+            lengths = self.truss.lengths[mine]
             found[name] = {
                 "members": int(mine.sum()),
+                "length_mean": float(lengths.mean()),
+                "length_cv": float(lengths.std() / lengths.mean()),
                 "mass": float(self.truss.member_mass[mine].sum()),
                 "sections": [self.truss.sections[k].name for k in np.unique(self.truss.section_of[mine])],
                 "utilization_max": None if self.utilization is None else float(self.utilization[mine].max()),
@@ -164,6 +171,8 @@ def report_structure(
             f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
             " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
         )
+    layers = check_layers(truss) if truss.member_sets else None
+    said += layers.warnings(truss) if layers is not None else []
     said += path_warnings(path) if path is not None else []
     return StructureReport(
         truss=truss,
@@ -176,6 +185,7 @@ def report_structure(
         rounds=tuple(rounds),
         weights=weights,
         path=path,
+        layers=layers,
     )
 
 

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..layouts.double_layer import DEPTH_WAYS, SECOND_LAYERS
 from .catalogue import Material, Section
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
 
 GRAVITY = 9.80665  #: standard acceleration of free fall, ISO 80000-3 [m/s2]
+HELD_LAYERS = ("outer", "inner")  #: of a double layer, on which the supports are
 USUAL_MEMBER = (0.1, 30.0)  #: members outside of this length are said to be odd [m]
 
 
@@ -60,6 +62,7 @@ class Truss:
     cases: tuple[LoadCase, ...] = ()
     combinations: tuple[Combination, ...] = ()
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)  #: fixed nodes, boundary loops, lines: int64
+    member_sets: dict[str, np.ndarray] = field(default_factory=dict)  #: top, bottom and web of a double layer: int64
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) [m]
     node_marks: tuple[str, ...] = ()
     member_marks: tuple[str, ...] = ()
@@ -117,9 +120,13 @@ class Truss:
         supports: str | np.ndarray,
         support_type: str = "pinned",
         loads: str | Sequence[Any] = "self",
-        joints: str | float = "rigid",
+        joints: str | float = "",
         node_allowance: float = 0.0,
         combinations: Sequence[Combination] | None = None,
+        double_layer: str | float = "",
+        second_layer: str = SECOND_LAYERS[0],
+        depth_along: str = DEPTH_WAYS[0],
+        held_layer: str = HELD_LAYERS[0],
     ) -> Truss:
         """Return the structure of a grid; the grid's unit is turned into metres here and nowhere else.
 
@@ -140,11 +147,20 @@ class Truss:
         loads : str or sequence of (str, LoadCase or dict)
             Such as "self,cladding:0.5kN/m2,snow:1kN/m2"; see `structure.loads`.
         joints : str or float
-            rigid, pinned (axial forces only), or the stiffness of rotational springs at the member ends [Nm/rad].
+            rigid, pinned (axial forces only), or the stiffness of rotational springs at the member ends [Nm/rad]; by default
+            rigid, of a double layer pinned.
         node_allowance : float
             Share of the members' weight that the nodes add to it.
         combinations : sequence of Combination, optional
             In place of those of EN 1990, equation 6.10.
+        double_layer : str or float
+            Depth of a double layer such as 1.5m, or in metres of the structure; "" for a single layer. The grid is the outer layer.
+        second_layer : str
+            dual (nodes under the triangles) or same (nodes under the nodes); see `layouts.double_layer`.
+        depth_along : str
+            normal or vertical.
+        held_layer : str
+            outer: the supports are on the grid; inner: on the nodes of the second layer that are nearest to them.
 
         Raises
         ------
@@ -164,6 +180,10 @@ class Truss:
             joints=joints,
             node_allowance=node_allowance,
             combinations=combinations,
+            double_layer=double_layer,
+            second_layer=second_layer,
+            depth_along=depth_along,
+            held_layer=held_layer,
         )
         return truss
 

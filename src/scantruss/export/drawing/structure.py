@@ -125,7 +125,8 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     colours = LinearSegmentedColormap.from_list(shown.colours, COLOUR_SCALES[shown.colours])
     mappable = ScalarMappable(_scale(shown), colours.with_extremes(over=OVERUSED) if shown.colours == USED else colours)
     flat, near = camera.project(nodes)
-    view = look(nodes, truss.triangles, camera, (0, 0), mapped=False) if len(truss.triangles) else None
+    shell = len(truss.triangles) > 0 and not truss.member_sets  # it would hide the second layer
+    view = look(nodes, truss.triangles, camera, (0, 0), mapped=False) if shell else None
     step = 0.5 * float(truss.lengths.mean())
     width_of = _widths(truss, camera.zoom)
     lines = _lines(flat, truss.members)

@@ -118,7 +118,8 @@ def _assumptions(truss: Truss, settings: StructureSettings) -> Iterator[str]:
     """Yield what was taken for granted, one sentence each."""
     checks: MemberChecks = settings.checks
     joints = {"rigid": "rigid joints", "pinned": "pinned joints, axial forces only"}.get(
-        settings.joints, f"rotational springs of {settings.joints} Nm/rad at the member ends"
+        settings.joints or ("pinned" if settings.double_layer else "rigid"),
+        f"rotational springs of {settings.joints} Nm/rad at the member ends",
     )
     more = " The nonlinear path is elastic too, of large displacements." if settings.path else ""
     yield f"Linear elastic analysis of small displacements; straight members between nodes, {joints}.{more}"

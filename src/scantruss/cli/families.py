@@ -1,0 +1,131 @@
+"""The command ``scantruss families``: members of few lengths."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from .outputs import claim, outs_of
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from .options import Parser
+
+
+def families_parser() -> Parser:
+    """Options of ``scantruss families``."""
+    from .options import Parser, add_outs, whole_number
+
+    parser = Parser(
+        "families",
+        "GRID OUT [OUT ...] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
+        "Move the nodes of a saved grid along its surface, so that its members are of few lengths.",
+    )
+    parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
+    add_outs(parser, "results; the suffix names the format", "*")
+    parser.add_argument(
+        "--tolerance",
+        metavar="SHARE",
+        type=share,
+        default=0.01,
+        help="largest misfit over the mean member (default 1%%)",
+    )
+    parser.add_argument(
+        "--count", metavar="COUNT", type=whole_number, default=12, help="lengths to aim at (default 12)"
+    )
+    parser.add_argument("--scan", metavar="SCAN", help="scan that the grid is checked against again: its certificate")
+    parser.add_argument(
+        "--report", metavar="FILE", help="families with their members, and lengths before and after, .json"
+    )
+    parser.add_argument("--plot", metavar="FILE.png", help="number of lengths against the largest misfit")
+    parser.add_argument(
+        "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
+    )
+    return parser
+
+
+def share(text: str) -> float:
+    """Return 0.01 of "1%" or "0.01"."""
+    try:
+        return float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs a share such as 1% or 0.01, got {text!r}") from None
+
+
+def families(values: Namespace) -> None:
+    """Write a saved grid with members of few lengths."""
+    from ..export.formats import GRID, check_output
+    from ..report.terminal import Bars, print_lines
+    from ..runtime.files import SaveTogether, check_place
+    from .convert import claim_models, write_models
+
+    outs = [check_output(out, GRID) for out in outs_of(values)]
+    if not Path(values.grid).exists():
+        raise InputError(f"there is no file {values.grid}; families needs a grid saved as .json by scantruss grid")
+    report = None if values.report is None else check_place(values.report, (".json",))
+    plot = None if values.plot is None else check_place(values.plot, (".png",))
+    taken = {Path(name).resolve(): what for name, what in ((values.grid, "grid"), (values.scan, "scan")) if name}
+    claim_models(outs, taken, force=values.force)
+    for place, what in ((report, "report"), (plot, "picture")):
+        if place is not None:
+            claim(place, what, taken, force=values.force)
+    from ..export.drawing.families import encode_families
+    from ..export.json import read_grid
+    from ..export.model import model_of_grid
+    from ..grid.certificate import check_passed
+    from ..layouts.families import family_report, few_lengths
+
+    with Bars() as bars, SaveTogether("" if values.force else "result") as save:
+        bars("read", 0.0)
+        before = read_grid(values.grid)
+        check_passed(before, values.keep_failed)
+        bars("families", 0.1)
+        found = few_lengths(before, values.tolerance, values.count)
+        made = _certified(before, found.grid, values) if values.scan else found.grid
+        figures = family_report(before, found, values.tolerance)
+        wrote = write_models(model_of_grid(made), outs, save, bars)
+        if report is not None:
+            save.json(report, figures)
+        if plot is not None:
+            save.beside(plot).write_bytes(encode_families(before, values.tolerance))
+    wrote += [place for place in (report, plot) if place is not None]
+    print_lines([*_words(figures, values), f"wrote {' '.join(map(str, wrote))}"])
+
+
+def _certified(before: Grid, made: Grid, values: Namespace) -> Grid:
+    """Return the grid with a certificate of the scan."""
+    from ..boundary.find import find_boundary
+    from ..check.certify import certify
+    from ..grid.certificate import check_passed
+    from ..scan.formats.reading import read_points
+    from ..surface.samples import sample_surface
+
+    if (settings := before.settings) is None:
+        raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
+    cloud = read_points(values.scan, settings.unit, settings.selection)
+    samples, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    moved = made.replace(nodes=made.nodes + (made.origin - samples.origin), origin=samples.origin)
+    certificate = certify(moved, samples, boundary, settings)
+    moved = moved.replace(certificate=certificate)
+    check_passed(moved, values.keep_failed)
+    return moved
+
+
+def _words(figures: dict[str, Any], values: Namespace) -> list[str]:
+    """Return what has come out in words."""
+    lines = [
+        f"{what} of the mean member: {each['before']} lengths before, {each['after']} after"
+        for what, each in figures["lengths_needed"].items()
+    ]
+    lines.append(
+        f"{len(figures['families'])} families hold {100 * figures['members_within']:.3g} % of the members,"
+        f" the largest misfit is {100 * figures['misfit_max']:.3g} %, nodes moved by {figures['moved_max']:.2g} members at most"
+    )
+    if figures["members_within"] < 1:
+        lines.append("warning: some members are in no family within the tolerance; use a larger --count or --tolerance")
+    if not values.scan:
+        lines.append("the grid has no certificate now; --scan SCAN checks it again")
+    return lines

@@ -1,0 +1,1 @@
+"""Layouts that are made of a grid: double layers, few lengths."""

@@ -1,0 +1,91 @@
+"""Few lengths: how many are needed, what moves and what stays, and the command."""
+
+import json
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_grids import dome
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.errors import InputError
+from scantruss.layouts.families import least_misfit, lengths_needed
+
+
+def uneven(count: int = 8) -> st.Grid:
+    """A dome whose inner nodes are not quite where they should be."""
+    grid = dome(count, 4.0, unit="m")
+    inner = np.ones(len(grid.nodes), bool)
+    inner[np.concatenate(grid.boundary_loops)] = False
+    x = grid.nodes + 0.15 * inner[:, None] * np.random.default_rng(5).standard_normal(grid.nodes.shape) * [1, 1, 0]
+    x[:, 2] = 0.3 * grid.nodes[:, 0].max() - 0.3 * (x[:, 0] ** 2 + x[:, 1] ** 2) / grid.nodes[:, 0].max()
+    return grid.replace(nodes=x)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.95, 1.0])
+def test_no_fewer_lengths_are_enough(share: float) -> None:
+    lengths = np.random.default_rng(2).random(11)
+    found = lengths_needed(lengths, 0.05, share)
+    within = (np.abs(lengths[:, None] - found).min(axis=1) <= 0.05 + 1e-9).mean()
+    assert within >= share - 1e-9 and (np.diff(found) > 0).all()
+    for fewer in combinations(lengths + 0.05, len(found) - 1):  # the best windows begin at a length
+        held = np.abs(lengths[:, None] - np.array(fewer)).min(axis=1, initial=np.inf) <= 0.05 + 1e-12
+        assert held.mean() < share
+
+
+def test_the_least_misfit_is_that_of_which_as_many_lengths_are_needed() -> None:
+    lengths = np.random.default_rng(4).random(60)
+    for count in (1, 3, 8):
+        misfit = least_misfit(lengths, count)
+        assert len(lengths_needed(lengths, misfit * 1.0001)) <= count < len(lengths_needed(lengths, misfit * 0.99))
+
+
+def test_more_members_are_of_few_lengths_and_nodes_stay_on_the_surface() -> None:
+    grid = uneven()
+    grid = grid.replace(fixed=np.arange(len(grid.nodes)) == 27)
+    mean = float(grid.lengths.mean())
+    found = st.few_lengths(grid, 0.01, 6)
+    before, after = (len(lengths_needed(each.lengths, 0.01 * mean)) for each in (grid, found.grid))
+    assert after < before and len(found.counts) <= 6 and found.counts.sum() == len(grid.edges)
+    nodes = found.grid.nodes
+    assert np.array_equal(nodes[27], grid.nodes[27]) and np.array_equal(found.grid.triangles, grid.triangles)
+    paraboloid = (
+        0.3 * dome(8, 4.0).nodes[:, 0].max()
+        - 0.3 * (nodes[:, 0] ** 2 + nodes[:, 1] ** 2) / dome(8, 4.0).nodes[:, 0].max()
+    )
+    inner = np.setdiff1d(np.arange(len(nodes)), np.concatenate(grid.boundary_loops))
+    assert np.abs(nodes[:, 2] - paraboloid)[inner].max() < 0.05 * mean
+    assert found.moved.max() <= 0.41 * mean and found.misfit == pytest.approx(
+        found.grid.lengths - found.lengths[found.of]
+    )
+
+
+def test_equal_members_stay_as_they_are() -> None:
+    grid = dome(5)
+    flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
+    found = st.few_lengths(flat, 0.01, 1)
+    assert np.array_equal(found.grid.nodes, flat.nodes) and found.counts.tolist() == [len(flat.edges)]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "count", "said"), [(0.0, 3, "tolerance of families"), (0.01, 0, "must be 1 or more")]
+)
+def test_what_cannot_be_used_is_refused(tolerance: float, count: int, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        st.few_lengths(dome(4), tolerance, count)
+
+
+def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    st.write(uneven(), "grid.json")
+    words = "families grid.json out.json --tolerance 1% --count 6 --report report.json"
+    assert main(words.split()) == 0
+    report = json.loads(Path("report.json").read_text())
+    assert sum(each["members"] for each in report["families"]) == len(uneven().edges)
+    first = Path("out.json").read_bytes()
+    assert main([*words.split(), "--force"]) == 0 and Path("out.json").read_bytes() == first
+    assert "--scan SCAN checks it again" in capsys.readouterr().out
+    assert main("families none.json out2.json".split()) == 2 and main("families grid.json grid.json".split()) == 2
+    assert main("families grid.json out2.json --tolerance x".split()) == 2 and not Path("out2.json").exists()
