@@ -75,7 +75,7 @@ def draw_compas(path: Path) -> Drawing:
     return Drawing(np.array(points, float).reshape(-1, 3), pairs, three_corners(path, faces), unit)
 
 
-Parts = tuple[list[tuple[float, ...]], list[tuple[int, int]], list[tuple[int, ...]]]  # points, lines, faces
+CompasParts = tuple[list[tuple[float, ...]], list[tuple[int, int]], list[tuple[int, ...]]]  # points, lines, faces
 
 
 def _typed(held: Any) -> list[dict[str, Any]]:
@@ -86,7 +86,7 @@ def _typed(held: Any) -> list[dict[str, Any]]:
     return [each for each in values if isinstance(each, dict) and isinstance(each.get("dtype"), str)]
 
 
-def _parts(data: dict[str, Any], is_mesh: bool) -> Parts:
+def _parts(data: dict[str, Any], is_mesh: bool) -> CompasParts:
     nodes = data["vertex" if is_mesh else "node"]
     number = {key: k for k, key in enumerate(nodes)}
     points: list[tuple[float, ...]] = [

@@ -11,7 +11,7 @@ from ..runtime.ours import MARK
 from .model import Model, line_loads, temperatures
 from .style import FileStyle
 
-WAYS = ("ux", "uy", "uz", "rx", "ry", "rz")
+KARAMBA_FREEDOMS = ("ux", "uy", "uz", "rx", "ry", "rz")
 
 
 def encode_karamba(model: Model, style: FileStyle) -> bytes:
@@ -47,7 +47,9 @@ def encode_karamba(model: Model, style: FileStyle) -> bytes:
 def _support(model: Model, node: int) -> dict[str, Any]:
     """Return how a node is held, with stiffnesses of springs [kN/m, kNm/rad]."""
     held = np.array([np.inf] * 3 + [0.0] * 3) if model.truss is None else model.truss.supports[node]
-    springs = {way: value / 1e3 for way, value in zip(WAYS, held.tolist(), strict=True) if 0 < value < np.inf}
+    springs = {
+        way: value / 1e3 for way, value in zip(KARAMBA_FREEDOMS, held.tolist(), strict=True) if 0 < value < np.inf
+    }
     return {"node": node, "fixed": np.isinf(held).tolist()} | ({"springs": springs} if springs else {})
 
 

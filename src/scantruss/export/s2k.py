@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 S2K_TYPES = {"steel": "Steel", "aluminium": "Aluminum"}  #: of materials; others are "Other"
 PATTERNS = {"permanent": "Dead", "snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: others are "Live"
 VERTICAL = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
-WAYS = ("U1", "U2", "U3", "R1", "R2", "R3")
+S2K_FREEDOMS = ("U1", "U2", "U3", "R1", "R2", "R3")
 
-Row = dict[str, Any]  # field -> value
+TableRow = dict[str, Any]  # field -> value
 
 
 def encode_s2k(model: Model, style: FileStyle) -> bytes:
@@ -65,7 +65,7 @@ def frame_angles(axes: np.ndarray) -> np.ndarray:
     return angles
 
 
-def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[Row]]]:
+def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow]]]:
     from ..structure.truss import GRAVITY
 
     material, marks, members = truss.material, truss.node_marks, truss.member_marks
@@ -137,14 +137,14 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[Row]]]:
     )
     held = truss.supports[:, :3] if truss.pinned else truss.supports
     yield "JOINT RESTRAINT ASSIGNMENTS", [
-        {"Joint": marks[node]} | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(WAYS, held[node].tolist(), strict=False)}
+        {"Joint": marks[node]} | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(S2K_FREEDOMS, held[node].tolist(), strict=False)}
         for node in np.flatnonzero(np.isinf(held).any(axis=1)).tolist()
     ]  # fmt: skip
     springs = np.where(np.isinf(held), 0.0, held) / 1e3
     yield (
         "JOINT SPRING ASSIGNMENTS 1 - UNCOUPLED",
         [
-            {"Joint": marks[node], "CoordSys": "GLOBAL"} | dict(zip(WAYS, springs[node].tolist(), strict=False))
+            {"Joint": marks[node], "CoordSys": "GLOBAL"} | dict(zip(S2K_FREEDOMS, springs[node].tolist(), strict=False))
             for node in np.flatnonzero(springs.any(axis=1)).tolist()
         ],
     )
@@ -174,7 +174,7 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[Row]]]:
             for mark, group in zip(members, model.group_of.tolist(), strict=True)
         ],
     )
-    loads: dict[str, list[Row]] = {}
+    loads: dict[str, list[TableRow]] = {}
     for case in truss.cases:
         for name, row in _loads(truss, case):
             loads.setdefault(name, []).append(row)
@@ -202,9 +202,9 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[Row]]]:
     )
 
 
-def _ends(mark: str, springs: np.ndarray, kilo: float | None) -> Row:
+def _ends(mark: str, springs: np.ndarray, kilo: float | None) -> TableRow:
     """Return the releases of a member, or with `kilo` their springs; M3 is about our y, M2 about our z."""
-    row: Row = {"Frame": mark}
+    row: TableRow = {"Frame": mark}
     for axis, word in ((1, "M2"), (0, "M3")):
         for end, letter in enumerate("IJ"):
             value = float(springs[end, axis])
@@ -215,12 +215,12 @@ def _ends(mark: str, springs: np.ndarray, kilo: float | None) -> Row:
     return row
 
 
-def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
+def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, TableRow]]:
     """Yield the table and the row of each load; weight is a factor of the load pattern."""
     if case.nodal is not None:
         forces = case.nodal / 1e3
         for node in np.flatnonzero(forces.any(axis=1)).tolist():
-            row: Row = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
+            row: TableRow = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
             yield (
                 "JOINT LOADS - FORCE",
                 row | dict(zip(("F1", "F2", "F3", "M1", "M2", "M3"), forces[node].tolist(), strict=True)),
@@ -240,4 +240,4 @@ def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, Row]]:
         moved = np.nan_to_num(case.settlement)
         for node in np.flatnonzero(moved.any(axis=1)).tolist():
             row = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
-            yield "JOINT LOADS - GROUND DISPLACEMENT", row | dict(zip(WAYS, moved[node].tolist(), strict=False))
+            yield "JOINT LOADS - GROUND DISPLACEMENT", row | dict(zip(S2K_FREEDOMS, moved[node].tolist(), strict=False))
