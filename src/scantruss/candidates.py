@@ -102,13 +102,14 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
-    if settings.method == "default" and not settings.plain_body and _is_body(cloud, settings):
-        yield from _same_scan(settings.replace(plain_body=True))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
-    if not settings.sharp_edges and settings.method == "default" and _has_sharp_edges(cloud, settings):
-        settings = settings.replace(sharp_edges=True)
-        yield from _same_scan(settings)
+    if settings.method == "default":  # opening would cut off sharp edges
+        if not settings.sharp_edges and _has_sharp_edges(cloud, settings):
+            settings = settings.replace(sharp_edges=True)
+            yield from _same_scan(settings)
+        elif not settings.plain_body and not settings.sharp_edges and _is_body(cloud, settings):
+            yield from _same_scan(settings.replace(plain_body=True))
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)

@@ -137,7 +137,8 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow]]]:
     )
     held = truss.supports[:, :3] if truss.pinned else truss.supports
     yield "JOINT RESTRAINT ASSIGNMENTS", [
-        {"Joint": marks[node]} | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(S2K_FREEDOMS, held[node].tolist(), strict=False)}
+        {"Joint": marks[node]}
+        | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(S2K_FREEDOMS, held[node].tolist(), strict=False)}
         for node in np.flatnonzero(np.isinf(held).any(axis=1)).tolist()
     ]  # fmt: skip
     springs = np.where(np.isinf(held), 0.0, held) / 1e3
