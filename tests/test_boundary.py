@@ -11,7 +11,7 @@ from steps import boundary_of
 
 import scantruss as st
 from scantruss.boundary.find import Loop, characteristic_points
-from scantruss.boundary.find import _onwards as onwards
+from scantruss.boundary.touched_points import _onwards as onwards
 
 
 def found(points: np.ndarray, length: float = 1.0, **settings: Any) -> tuple[st.Boundary, np.ndarray]:

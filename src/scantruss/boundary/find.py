@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,18 +13,17 @@ from ..kernels.boundary.curves import Curves
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface, walk
 from ..kernels.surface.size_field import lengths_along
-from ..runtime.parallel import in_parts
 from ..runtime.progress import Progress
 from ..scan.normals import check_two_sided
 from ..settings import Settings
-from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with, with_whole_boundary
-from ..surface.scratch import with_own_scratch
+from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
-from .curves import cut_spikes, length_around, resample, smooth_turns
+from .curves import cut_spikes, length_around, resample
 from .given import cut_along
 from .holes import fill_holes
 from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
+from .touched_points import boundary_points
 
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
 SPIKES = (0.6, 0.3, 0.16)
@@ -34,8 +32,6 @@ LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 NEARLY_CLOSED = 10.0
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
-STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
-PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,70 +262,6 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
             desired = None if desired is None else np.insert(desired, i + 1, desired[i])
             corner_at, line_at = corner_at + (corner_at > i), np.append(line_at + (line_at > i), i + 1)
     return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
-
-
-def boundary_points(
-    samples: SurfaceSamples, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
-) -> list[np.ndarray]:
-    """Return the boundary points (M, 3) along each loop of samples: what a disc slid from outside touches, in order.
-
-    If the surface was thinned, the disc slides once more, against all points near those that it touched first.
-    """
-    along = [_places_along(surface, loop, step) for loop in loops]
-    if samples.smooth:
-        # a loop of larger samples cuts re-entrant corners; on a rough scan its own samples are the ones to trust
-        for places, near in along:
-            kernels.come_nearer(surface, places, near)
-    touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
-    dense = with_whole_boundary(samples, surface, np.concatenate(touched)) if touched else surface
-    if dense is not surface:
-        touched = [_touch_points(dense, places, near, radius, 8) for places, near in along]
-    touched = [
-        _touch_points(dense, smooth_turns(points), near, radius, 4)
-        for points, (_, near) in zip(touched, along, strict=True)
-    ]
-    return [_in_order(points, step) for points in touched]
-
-
-def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (M, 3) one step apart along a loop of samples, and the sample near each (M,)."""
-    turns = smooth_turns(surface.mean[loop])
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1))])
-    places = resample(turns, step)
-    at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
-    return places, loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
-
-
-def _in_order(touched: np.ndarray, step: float) -> np.ndarray:
-    """Return the points that advance along a loop, without those hardly beyond the one before."""
-    touched = touched[_onwards(touched)]
-    forward = np.linalg.norm(touched - np.roll(touched, 1, axis=0), axis=1) > 0.2 * step
-    return touched[forward]
-
-
-def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius: float, reach: int) -> np.ndarray:
-    """Return the points (M, 3) that a disc touches along a loop; its direction is taken from `reach` places before to `reach` after."""
-    touched, ahead = np.empty_like(places), np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
-
-    def touch(part: int, begin: int, end: int) -> None:
-        own = surface if part == 0 else with_own_scratch(surface)
-        kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
-
-    in_parts(len(places), PLACES_PER_THREAD, touch)
-    return touched
-
-
-def _onwards(touched: np.ndarray) -> list[int]:
-    """Which touched points (M, 3) advance along the loop; where one is touched again soon after, those between do not."""
-    ahead = np.zeros(len(touched), np.int64)
-    x, y, z = touched.T.copy()
-    for k in range(1, STEPS_BACK + 1):
-        ahead[:-k][(x[:-k] == x[k:]) & (y[:-k] == y[k:]) & (z[:-k] == z[k:])] = k
-    kept, at = [], 0
-    while at < len(touched):
-        kept.append(at)
-        at += int(ahead[at]) + 1
-    return kept
 
 
 def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface) -> Loop | None:
