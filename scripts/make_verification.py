@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,20 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from small_grids import dome  # noqa: E402
-from small_trusses import EA, EI, FREE, HELD, HINGED, STEEL, TUBE, forces, line_of, make_truss, stiff_along  # noqa: E402
+from small_trusses import (  # noqa: E402
+    EA,
+    EI,
+    FREE,
+    HELD,
+    HINGED,
+    STEEL,
+    TUBE,
+    forces,
+    line_of,
+    make_truss,
+    pynite_model,
+    stiff_along,
+)
 from test_nonlinear import elastica, perfect, toggle, williams  # noqa: E402
 
 from scantruss.structure.catalogue import find_material, find_section  # noqa: E402
@@ -251,28 +265,12 @@ def _checks() -> Iterator[Proof]:
 
 def _shells() -> Iterator[Proof]:
     """Yield shells in an independent solver, where it is installed."""
-    try:
-        from Pynite import FEModel3D
-    except ImportError:
+    if find_spec("Pynite") is None:
         return
     for supports in ("boundary", "corners"):
         truss = Truss.from_grid(dome(6, 40.0), scale=50, supports=supports, support_type="fixed", loads=SHELL)
-        model = FEModel3D()
-        model.add_material("steel", STEEL.young, STEEL.shear, 0.3, STEEL.density)
-        model.add_section("tube", TUBE.area, TUBE.inertia_y, TUBE.inertia_z, TUBE.torsion)
-        for mark, place in zip(truss.node_marks, truss.nodes, strict=True):
-            model.add_node(mark, *map(float, place))
-        for mark, (a, b) in zip(truss.member_marks, truss.members, strict=True):
-            model.add_member(mark, truss.node_marks[a], truss.node_marks[b], "steel", "tube")
-        for node in np.flatnonzero(truss.supports.any(axis=1)):
-            model.def_support(truss.node_marks[node], *[True] * 6)
         solution = solve(truss)
-        for case in solution.cases:
-            for mark, force in zip(truss.node_marks, case.nodal, strict=True):
-                for way, value in zip(("FX", "FY", "FZ"), force, strict=False):
-                    model.add_node_load(mark, way, float(value), case=case.name)
-            model.add_load_combo(case.name, {case.name: 1.0})
-        model.analyze_linear()
+        model = pynite_model(truss, solution.cases)
         for case in solution.cases:
             moves = [
                 [getattr(model.nodes[mark], way)[case.name] for way in ("DX", "DY", "DZ")] for mark in truss.node_marks

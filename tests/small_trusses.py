@@ -1,6 +1,6 @@
 """Structures made by hand, for the tests of statics."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scantruss.structure.catalogue import Section, find_material, find_section
+from scantruss.structure.statics import CaseResult
 from scantruss.structure.truss import LoadCase, Truss
 
 TUBE, STEEL = find_section("CHS114.3x5"), find_material("S355")
@@ -58,3 +59,25 @@ def line_of(length: float, count: int, axis: tuple[float, float, float] = (1, 0,
     """Return nodes along a line, unevenly spaced, and the members between them."""
     place = np.linspace(0, 1, count + 1) ** 1.3 * length
     return place[:, None] * np.asarray(axis, float), np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+
+
+def pynite_model(truss: Truss, results: Iterable[CaseResult]) -> Any:
+    """Return a structure of tubes, held where it is supported, solved by PyNite under the nodal loads of some results."""
+    from Pynite import FEModel3D
+
+    model = FEModel3D()
+    model.add_material("steel", STEEL.young, STEEL.shear, 0.3, STEEL.density)
+    model.add_section("tube", TUBE.area, TUBE.inertia_y, TUBE.inertia_z, TUBE.torsion)
+    for mark, place in zip(truss.node_marks, truss.nodes, strict=True):
+        model.add_node(mark, *map(float, place))
+    for mark, (a, b) in zip(truss.member_marks, truss.members, strict=True):
+        model.add_member(mark, truss.node_marks[a], truss.node_marks[b], "steel", "tube")
+    for node in np.flatnonzero(truss.supports.any(axis=1)):
+        model.def_support(truss.node_marks[node], *[True] * 6)
+    for case in results:
+        for mark, force in zip(truss.node_marks, case.nodal, strict=True):
+            for way, value in zip(("FX", "FY", "FZ"), force, strict=False):
+                model.add_node_load(mark, way, float(value), case=case.name)
+        model.add_load_combo(case.name, {case.name: 1.0})
+    model.analyze_linear()
+    return model

@@ -17,6 +17,7 @@ from test_schedules import numbers, vectors
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.runtime.ours import kind_of_ours
+from scantruss.setout import assembly
 from scantruss.setout.assembly import MOST_MOVE, MOST_TIMES, assembly_steps
 from scantruss.setout.files import _page, encode_dxf, encode_pdf, scale_on, setout_paths
 from scantruss.setout.lines import cut_grid
@@ -82,6 +83,14 @@ def test_a_mechanism_is_propped_at_its_nodes_and_a_stiff_step_is_left_alone() ->
         and props_table["set at step"] == (1,)
         and props_table["released at step"] == (None,)
     )
+
+
+def test_the_search_for_props_ends_though_nothing_that_is_held_helps(monkeypatch: pytest.MonkeyPatch) -> None:
+    none = np.zeros(0, np.int64)
+    for found in ((np.array([0]), none), (none, np.array([0])), (none, none)):
+        monkeypatch.setattr(assembly, "_examine", lambda part, found=found: found)
+        props, moves = assembly._stand(roof(), none, 0.01)
+        assert len(props) == len(roof().nodes) and moves == np.inf
 
 
 def test_what_hangs_out_too_far_is_propped_though_it_is_no_mechanism() -> None:

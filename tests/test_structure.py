@@ -10,7 +10,20 @@ import numpy as np
 import pytest
 from shapes import make
 from small_grids import dome, fan
-from small_trusses import EA, EI, FREE, HELD, HINGED, STEEL, TUBE, forces, line_of, make_truss, stiff_along
+from small_trusses import (
+    EA,
+    EI,
+    FREE,
+    HELD,
+    HINGED,
+    STEEL,
+    TUBE,
+    forces,
+    line_of,
+    make_truss,
+    pynite_model,
+    stiff_along,
+)
 
 import scantruss as st
 from scantruss.grid.grid import Grid
@@ -290,7 +303,7 @@ GRIDS: dict[str, tuple[Callable[[], Grid], str]] = {  # and their supports
 @pytest.mark.parametrize("name", GRIDS)
 def test_pynite_agrees(name: str) -> None:
     """The same nodes, members and forces in an independent solver."""
-    pynite = pytest.importorskip("Pynite")
+    pytest.importorskip("Pynite")
     grid, supports = GRIDS[name][0](), GRIDS[name][1]
     truss = Truss.from_grid(
         grid,
@@ -301,21 +314,7 @@ def test_pynite_agrees(name: str) -> None:
         loads="cladding:0.5kN/m2,wind:0.8kN/m2:0.8/-0.5@30",
     )
     ours = solve(truss)["cladding"], solve(truss)["wind 30"]
-    model = pynite.FEModel3D()
-    model.add_material("steel", STEEL.young, STEEL.shear, 0.3, STEEL.density)
-    model.add_section("tube", TUBE.area, TUBE.inertia_y, TUBE.inertia_z, TUBE.torsion)
-    for mark, place in zip(truss.node_marks, truss.nodes, strict=True):
-        model.add_node(mark, *map(float, place))
-    for mark, (a, b) in zip(truss.member_marks, truss.members, strict=True):
-        model.add_member(mark, truss.node_marks[a], truss.node_marks[b], "steel", "tube")
-    for node in np.flatnonzero(truss.supports.any(axis=1)):
-        model.def_support(truss.node_marks[node], *[True] * 6)
-    for case in ours:
-        for mark, force in zip(truss.node_marks, case.nodal, strict=True):
-            for way, value in zip(("FX", "FY", "FZ"), force, strict=False):
-                model.add_node_load(mark, way, float(value), case=case.name)
-        model.add_load_combo(case.name, {case.name: 1.0})
-    model.analyze_linear()
+    model = pynite_model(truss, ours)
     for case in ours:
         theirs = np.array(
             [[getattr(model.nodes[m], d)[case.name] for d in ("DX", "DY", "DZ")] for m in truss.node_marks]

@@ -62,7 +62,7 @@ def studio(values: Namespace) -> None:
         print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
         if not values.no_open:
             webbrowser.open(address)
-        while True:
+        while True:  # until Ctrl-C or SIGTERM, as servers do
             time.sleep(3600.0)
     finally:
         session.stop()

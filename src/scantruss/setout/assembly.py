@@ -100,10 +100,14 @@ def _stand(part: Truss, props: np.ndarray, limit: float, *, give_up: bool = Fals
     propped = np.zeros(len(part.nodes), bool)
     propped[props] = True
     reach = PROPS_APART * float(np.median(part.lengths))
-    while True:  # each turn holds a node that was not held
+    holds = -1
+    while True:
         held = part.supports.copy()
         held[propped, :3] = np.inf
         part = part.replace(supports=held)
+        if (now := int(np.isinf(held).sum())) <= holds:  # each turn holds more than the one before, or this is the last
+            return np.arange(len(part.nodes)), np.inf
+        holds = now
         if not isinstance(found := _examine(part), Factored):
             moving, turning = found
             if give_up and len(moving):

@@ -199,7 +199,7 @@ class _Walk:
         done = after = 0
         back = here.towards
         self.soft = self._norm(here.towards)
-        while done < self.steps:
+        while done < self.steps:  # each turn takes a step, or the path ends
             for cut in range(CUTS + 1):
                 step = self._step(here, back, arc)
                 if step is not None and (cut >= SMOOTH_CUTS or self._is_smooth(here, step)):

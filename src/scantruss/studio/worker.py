@@ -64,7 +64,7 @@ class Worker:
         self._progress(stage, share)
 
     def _serve(self) -> None:
-        while True:
+        while True:  # in a daemon thread: it ends with the process
             with self._change:
                 self._change.wait_for(lambda: self._waiting is not None)
                 assert self._waiting is not None

@@ -158,8 +158,8 @@ def _discs(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator
     sixth = cKDTree(found.mean).query(middle, k=7)[0][:, 6]
     radius = np.minimum(DISC_RADIUS * sixth, WIDEST_LINK * length)[:, None]
     turn = np.arange(DISC_CORNERS + 1) * (2.0 * np.pi / DISC_CORNERS)
-    rim = [middle + radius * (np.cos(each) * first + np.sin(each) * second) for each in turn]
-    for one, other in pairwise(rim):
+    circle = [middle + radius * (np.cos(each) * first + np.sin(each) * second) for each in turn]
+    for one, other in pairwise(circle):
         yield np.stack([middle, one, other], axis=1)
 
 

@@ -109,7 +109,7 @@ def divide(nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: 
     middles = nodes[edges].mean(axis=1)
     count = 0
     open_sets = [(ids, 0) for ids in reversed(_connected(np.arange(len(nodes)), edges, len(nodes)))]
-    while open_sets:  # a set has fewer nodes than the one that was halved
+    while open_sets:  # a set is a half of the one before it, MOST_HALVINGS times at most
         ids, depth = open_sets.pop()
         inside = np.zeros(len(nodes), bool)
         inside[ids] = True

@@ -76,7 +76,7 @@ def fill_rings(
         if fan[corner] >= 0:
             continue
         at = corner
-        while partner[at] >= 0:  # partners are one to one: the way ends at the rim or comes back
+        while partner[at] >= 0:  # partners are one to one: the way ends at the boundary or comes back
             back = partner[at]
             back = back - back % 3 + (back % 3 + 1) % 3
             if back == corner:

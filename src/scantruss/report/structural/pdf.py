@@ -172,7 +172,7 @@ def _fitting(part: DataTable) -> tuple[float, list[float]]:
     """Return the size of the letters of a table and the widths of its columns [pt]."""
     size = SMALL
     columns = list(zip(part.head, *part.rows, strict=True))
-    while True:
+    while True:  # the letters become smaller, down to LEAST_TABLE
         widths = [
             max(
                 [_width(cell, size) for cell in cells[1:]]

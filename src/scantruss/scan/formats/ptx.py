@@ -22,7 +22,9 @@ def read_ptx(path: Path, wanted: Sequence[str] = ()) -> Content:
         raise wrong_kind(path, head, "a PTX file")
     parts, missing = list[np.ndarray](), 0
     with path.open(encoding="latin-1") as file:
-        while lines := list(islice((line for line in file if not line.isspace()), len(HEAD_LINES))):
+        while lines := list(
+            islice((line for line in file if not line.isspace()), len(HEAD_LINES))
+        ):  # each turn reads lines
             numbers = _numbers(path, lines, len(parts) + 1)
             count = int(numbers[0][0]) * int(numbers[1][0])
             rows = list(islice(file, count))

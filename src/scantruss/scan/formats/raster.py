@@ -27,7 +27,7 @@ def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
         return read_text(path, wanted)
     text = path.read_text(encoding="latin-1")
     said, start = dict[str, float](), 0
-    while found := RASTER_HEAD.match(text, start):
+    while found := RASTER_HEAD.match(text, start):  # a match is not empty
         try:
             said[found[1].lower()] = float(found[2])
         except ValueError:
