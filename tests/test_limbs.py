@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from typed import known
 
 import scantruss as st
+from scantruss.check.left_out import _beyond_cut
 from scantruss.cli.main import main
 from scantruss.kernels.surface.girths import FACING_OPPOSITE, mark_opposite, measure_girths
-from scantruss.surface.chosen_samples import LIMB
+from scantruss.surface.chosen_samples import KEPT, LIMB
 from scantruss.surface.faced_surface import faced_surface
 from scantruss.surface.limbs import SMALLEST_RING
 from scantruss.surface.linked_samples import link_samples
@@ -185,3 +188,18 @@ def test_a_wire_on_a_ball_leaves_no_boundary() -> None:
     samples = samples_of(points)
     (ring,) = samples.rings
     assert not ring.bounds and ring.girth < SMALLEST_RING
+
+
+def test_small_pieces_that_hung_on_a_limb_count_as_that_limb() -> None:
+    """A hoof beyond a fetlock that was cut off, one that lies elsewhere, and a point of a piece that has a grid."""
+    line = np.arange(0.0, 2.0, 0.1)
+    limb, hoof, crumb = (np.column_stack([x + line, 0.0 * line, 0.0 * line]) for x in (0.0, 2.0, 9.0))
+    judged = np.repeat([LIMB, KEPT, KEPT], len(line)).astype(np.uint8)
+    samples: Any = SimpleNamespace(judged=judged, scan=np.concatenate([limb, hoof, crumb]))
+    which = np.arange(len(line), 3 * len(line))
+    piece = np.repeat([4, 7], len(line))
+    members = np.ones(len(judged))
+    assert (_beyond_cut(samples, which, piece, members) == (piece == 4)).all()
+    assert not _beyond_cut(samples, which, np.full(len(which), -1), members).any()
+    samples.judged = np.full(len(judged), KEPT, np.uint8)
+    assert not _beyond_cut(samples, which, piece, members).any()
