@@ -1,16 +1,17 @@
 """The table of formats in which grids and structures are written and read, `write` and `read_model`.
 
-A format is one module with an encoder (and a reader, where it has one) and one row here. Modules import their libraries when they
-are used, and refuse before any work where an extra is not installed.
+A format is one module with an encoder (and a reader, where it has one) and one row here, which names its functions: a module is
+imported when a file of its format is written or read. Where an extra is not installed, that is said before any work.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError
 from ..grid.grid import Grid
@@ -18,32 +19,14 @@ from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from ..settings import UNITS
 from ..structure.truss import Truss
-from .abaqus import encode_inp
-from .compas import draw_compas, encode_compas
 from .csv import encode_csv, nodes_path
-from .drawing.picture import encode_picture
-from .drawing_files import draw_3dm, draw_dxf, draw_ifc, draw_obj, draw_ply
-from .drawing_in import Drawing, grid_of_drawing
-from .dxf import encode_dxf
-from .glb import encode_glb
-from .ifc import encode_ifc
-from .json import encode_model, read_json
-from .karamba import encode_karamba
 from .model import Model, model_of_grid, model_of_truss
-from .obj import encode_obj
-from .opensees import encode_py, encode_tcl
-from .page import encode_page
-from .ply import encode_ply
-from .rhino import encode_3dm
-from .s2k import encode_s2k
-from .saf import encode_saf
-from .step import encode_step
 from .style import FileStyle
-from .vtu import encode_vtu
 
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
+    from .drawing_in import Drawing
 
 Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]
 
@@ -67,14 +50,19 @@ class FileFormat:
     reads_with: str = ""  #: module that must be installed to read; its extra is `extra`
 
 
-def one(encode: Callable[[Model, FileStyle], bytes]) -> Encoder:
-    """Return the encoder of a format with one file."""
-    return lambda model, path, style: {path: encode(model, style)}
+def function(name: str) -> Callable[..., Any]:
+    """Return the function of this package, such as "dxf.encode_dxf", that imports its module when it is called."""
+    module, called = name.rsplit(".", 1)
+
+    def call(*arguments: Any, **options: Any) -> Any:
+        return getattr(import_module(f".{module}", __package__), called)(*arguments, **options)
+
+    return call
 
 
-def of_grid(encode: Callable[[Grid, FileStyle], bytes], name: str) -> Encoder:
-    """Return the encoder of a format that is made of the triangles."""
-    return one(lambda model, style: encode(model.as_grid(name), style))
+def one(encode: str) -> Encoder:
+    """Return the encoder of a format with one file; `encode` is given the model and the style."""
+    return lambda model, path, style: {path: function(encode)(model, style)}
 
 
 NO_MARKS = "triangles, marks or results (nodes and members are counted from 1)"
@@ -87,30 +75,34 @@ FORMATS: dict[str, FileFormat] = {
         lambda model, path, style: encode_csv(model.as_grid("CSV"), path, decimal_comma=style.decimal_comma),
         loses_of_structure=NO_STRUCTURE,
     ),
-    ".json": FileFormat("JSON", one(lambda model, style: encode_model(model)), read=read_json),
-    ".obj": FileFormat("OBJ", of_grid(lambda grid, style: encode_obj(grid, style.obj), "OBJ"), draw=draw_obj,
-                       loses_of_structure=f"marks, {NO_STRUCTURE}"),
-    ".ply": FileFormat("PLY", of_grid(lambda grid, style: encode_ply(grid), "PLY"), draw=draw_ply,
-                       loses_of_structure=f"marks, {NO_STRUCTURE}"),
-    ".png": FileFormat(
-        "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
-    ),
-    ".3dm": FileFormat("3DM", one(encode_3dm), draw=draw_3dm, loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
-    ".compas.json": FileFormat("COMPAS JSON", one(encode_compas), draw=draw_compas, loses_of_structure="loads, releases or results"),
-    ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
-    ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
+    ".json": FileFormat("JSON", lambda model, path, style: {path: function("json.encode_model")(model)},
+                        read=function("json.read_json")),
+    ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(model.as_grid("OBJ"), style.obj)},
+                       draw=function("drawing_files.draw_obj"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(model.as_grid("PLY"))},
+                       draw=function("drawing_files.draw_ply"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+    ".png": FileFormat("PNG", lambda model, path, style: {
+        path: function("drawing.picture.encode_picture")(model.as_grid("PNG"), model.cloud, style=style)}, holds=(GRID,)),
+    ".3dm": FileFormat("3DM", one("rhino.encode_3dm"), draw=function("drawing_files.draw_3dm"),
+                       loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".compas.json": FileFormat("COMPAS JSON", one("compas.encode_compas"), draw=function("compas.draw_compas"),
+                                loses_of_structure="loads, releases or results"),
+    ".dxf": FileFormat("DXF", one("dxf.encode_dxf"), draw=function("drawing_files.draw_dxf"),
+                       loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".glb": FileFormat("GLB", one("glb.encode_glb"), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
-    ".html": FileFormat("HTML", one(encode_page), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
-    ".ifc": FileFormat("IFC", one(encode_ifc), needs_unit=True, draw=draw_ifc, reads_with="ifcopenshell", extra="bim"),
-    ".inp": FileFormat("Abaqus", one(encode_inp), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
-    ".karamba.json": FileFormat("JSON for Karamba", one(encode_karamba), loses_of_structure="releases or results"),
-    ".py": FileFormat("OpenSees", one(encode_py), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
-    ".s2k": FileFormat("SAP2000", one(encode_s2k), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
-    ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
-    ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
-    ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
-    ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
-    ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
+    ".html": FileFormat("HTML", one("page.encode_page"), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
+    ".ifc": FileFormat("IFC", one("ifc.encode_ifc"), needs_unit=True, draw=function("drawing_files.draw_ifc"),
+                       reads_with="ifcopenshell", extra="bim"),
+    ".inp": FileFormat("Abaqus", one("abaqus.encode_inp"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".karamba.json": FileFormat("JSON for Karamba", one("karamba.encode_karamba"), loses_of_structure="releases or results"),
+    ".py": FileFormat("OpenSees", one("opensees.encode_py"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".s2k": FileFormat("SAP2000", one("s2k.encode_s2k"), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
+    ".saf.xlsx": FileFormat("SAF", one("saf.encode_saf"), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
+    ".step": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".stp": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".tcl": FileFormat("OpenSees", one("opensees.encode_tcl"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".vtu": FileFormat("VTU", one("vtu.encode_vtu"), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
 SOLID_SUFFIXES = (".3mf", ".stl")
@@ -276,5 +268,7 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     if row.draw is None:
         assert row.read is not None
         return row.read(path)
+    from .drawing_in import grid_of_drawing
+
     grid, notes = grid_of_drawing(row.draw(path), path.name, merge)
     return replace(model_of_grid(grid), notes=notes)

@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
-from .clearance import close_pairs
 
 SECOND_LAYERS = ("dual", "same")  #: nodes under the triangles, or under the nodes
 DEPTH_WAYS = ("normal", "vertical")  #: along which the depth is measured
@@ -90,6 +89,8 @@ def double_layer(grid: Grid, depth: float, *, second: str = "dual", along: str =
     _refuse(grid, at.ravel(), depth, "the second layer would fold")
     nodes = np.concatenate([grid.nodes, below])
     members = np.concatenate([grid.edges, chords + count, webs])
+    from .clearance import close_pairs
+
     pairs, _ = close_pairs(nodes, members, CROSSED * float(grid.lengths.mean()))
     ends = members[pairs].ravel()
     _refuse(grid, ends[ends < count], depth, "members of both layers would cross")
