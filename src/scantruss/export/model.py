@@ -46,6 +46,7 @@ class Model:
     utilization: np.ndarray | None = None  #: (M,) of the members, where they are checked
     cloud: PointCloud | None = None  #: the scan, which some formats draw
     notes: tuple[str, ...] = ()  #: what a user should know of a file that others made
+    system: str = ""  #: reference system of the coordinates, such as EPSG:25833; "" where it is not known
 
     @cached_property
     def nodes(self) -> np.ndarray:
@@ -108,6 +109,7 @@ def model_of_grid(grid: Grid, cloud: PointCloud | None = None) -> Model:
         node_sets={"fixed": np.flatnonzero(grid.fixed), **lines},
         grid=grid,
         cloud=cloud,
+        system=grid.system,
     )
 
 
@@ -142,6 +144,7 @@ def model_of_truss(
         solution=solution,
         report=report,
         utilization=report.utilization if report is not None else utilization,
+        system=truss.system,
     )
 
 
@@ -225,6 +228,7 @@ def _grid_of(truss: Truss) -> Grid:
         fixed=fixed,
         origin=truss.origin,
         unit="m",
+        system=truss.system,
         lines=np.concatenate([np.zeros((0, 2), np.int64), *pairs]),
         line_sets=tuple(lines),
     )
