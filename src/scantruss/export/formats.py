@@ -25,6 +25,7 @@ from .drawing.picture import encode_picture
 from .drawing_files import draw_3dm, draw_dxf, draw_ifc, draw_obj, draw_ply
 from .drawing_in import Drawing, grid_of_drawing
 from .dxf import encode_dxf
+from .geojson import encode_geojson
 from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
@@ -37,8 +38,10 @@ from .ply import encode_ply
 from .rhino import encode_3dm
 from .s2k import encode_s2k
 from .saf import encode_saf
+from .solid_bodies import encode_3mf_bodies, encode_stl_bodies
 from .step import encode_step
 from .style import FileStyle
+from .tables import encode_xlsx_model
 from .vtu import encode_vtu
 
 if TYPE_CHECKING:
@@ -60,6 +63,7 @@ class FileFormat:
     loses_of_structure: str = ""  #: what it cannot hold of a structure besides
     holds: tuple[str, ...] = (GRID, STRUCTURE)
     needs_unit: bool = False  #: whether a grid without a unit is refused
+    wants_system: bool = False  #: whether programs need the reference system to place it
     read: Callable[[Path], Model] | None = None
     draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces that others drew
     library: str = ""  #: module that must be installed
@@ -96,8 +100,12 @@ FORMATS: dict[str, FileFormat] = {
         "PNG", one(lambda model, style: encode_picture(model.as_grid("PNG"), model.cloud, style=style)), holds=(GRID,)
     ),
     ".3dm": FileFormat("3DM", one(encode_3dm), draw=draw_3dm, loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".3mf": FileFormat("3MF", one(encode_3mf_bodies), holds=(STRUCTURE,),
+                       loses_of_structure="panels or exact coordinates (relative to the origin), supports, loads or results"),
     ".compas.json": FileFormat("COMPAS JSON", one(encode_compas), draw=draw_compas, loses_of_structure="loads, releases or results"),
     ".dxf": FileFormat("DXF", one(encode_dxf), draw=draw_dxf, loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".geojson": FileFormat("GeoJSON", one(encode_geojson), wants_system=True,
+                           loses_of_structure="stiffness, loads, displacements or reactions"),
     ".glb": FileFormat("GLB", one(encode_glb), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
     ".html": FileFormat("HTML", one(encode_page), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
@@ -109,7 +117,10 @@ FORMATS: dict[str, FileFormat] = {
     ".saf.xlsx": FileFormat("SAF", one(encode_saf), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one(encode_step), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".stl": FileFormat("STL", one(encode_stl_bodies), holds=(STRUCTURE,),
+                       loses_of_structure="panels, marks, the unit (mm) or exact coordinates (float32, relative to the origin), supports, loads or results"),
     ".tcl": FileFormat("OpenSees", one(encode_tcl), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".xlsx": FileFormat("XLSX", one(encode_xlsx_model)),
     ".vtu": FileFormat("VTU", one(encode_vtu), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
@@ -192,7 +203,8 @@ def losses(model: Model, path: str | Path) -> list[str]:
     row = FORMATS[suffix_of(Path(path), FORMATS)]
     lost = [row.loses, *([row.loses_of_structure] if model.truss is not None else [])]
     words = ", ".join(each for each in lost if each)
-    return [f"{row.name} holds no {words}"] if words else []
+    unplaced = f"the reference system is not known, so {row.name} names none; give it with --system EPSG:CODE"
+    return [f"{row.name} holds no {words}"] * bool(words) + [unplaced] * (row.wants_system and not model.system)
 
 
 def model_of(
