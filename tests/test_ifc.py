@@ -8,6 +8,7 @@ from typing import Any
 
 import ifcopenshell
 import ifcopenshell.geom
+import ifcopenshell.util.geolocation
 import ifcopenshell.util.placement
 import ifcopenshell.util.shape
 import ifcopenshell.util.unit
@@ -18,6 +19,7 @@ from small_grids import dome, fan
 from test_convert import UTM, roof
 
 import scantruss as st
+from scantruss.export.formats import read_model
 from scantruss.export.style import FileStyle
 from scantruss.structure.catalogue import Section
 from scantruss.structure.truss import LoadCase
@@ -264,3 +266,22 @@ def test_both_views_of_a_structure_belong_together(tmp_path: Path) -> None:
     again = written(moved, tmp_path / "a.ifc")
     assert {root.Name: root.GlobalId for root in again.by_type("IfcMember")} == ids
     assert (tmp_path / "a.ifc").read_bytes() != first_bytes
+
+
+@pytest.mark.parametrize("edition", ["IFC4", "IFC4X3"])
+def test_a_scan_with_a_reference_system_is_placed_by_a_map_conversion(edition: str, tmp_path: Path) -> None:
+    truss = roof(2 if edition == "IFC4X3" else 3).replace(system="EPSG:25833")
+    style = FileStyle(ifc_schema=edition)
+    file = written(st.solve(truss), tmp_path / "a.ifc", style, rules=edition == "IFC4X3")
+    assert file.schema == edition
+    (conversion,) = file.by_type("IfcMapConversion")
+    assert conversion.TargetCRS.Name == "EPSG:25833"
+    xyz = ifcopenshell.util.geolocation.auto_xyz2enh(file, 1.0, 2.0, 3.0)
+    np.testing.assert_allclose(xyz, truss.origin + [1.0, 2.0, 3.0], rtol=0, atol=1e-6)
+    node = file.by_type("IfcDiscreteAccessory")[0]
+    place = ifcopenshell.util.placement.get_local_placement(node.ObjectPlacement)[:3, 3]
+    assert np.abs(place - truss.nodes[0]).max() < 1e-9
+    back = read_model(tmp_path / "a.ifc")
+    assert back.system == "EPSG:25833" and back.grid is not None
+    gaps = np.linalg.norm(back.nodes[:, None] - (truss.nodes + truss.origin)[None], axis=2).min(axis=1)
+    assert gaps.max() < 1e-6

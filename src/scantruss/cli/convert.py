@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def convert_parser() -> Parser:
     """Options of ``scantruss convert``."""
-    from ..export.style import IFC_VIEWS
+    from ..export.style import IFC_EDITIONS, IFC_VIEWS, STEP_PARTS
     from ..settings import UNITS
     from .options import Parser, add_outs, number
     from .schedule import tube
@@ -36,13 +36,18 @@ def convert_parser() -> Parser:
         "--tube",
         metavar="DxT",
         type=tube,
-        help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC",
+        help="diameter and wall of the members of a grid, e.g. 60x3 [mm], for bodies in IFC and STEP",
     )
     parser.add_argument(
         "--ball", metavar="D", type=number, help="diameter of the nodes [mm] (default: twice that of the members)"
     )
     parser.add_argument(
         "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
+    )
+    parser.add_argument("--ifc-schema", metavar="|".join(IFC_EDITIONS), default="IFC4", help="edition of .ifc (default: IFC4)")
+    parser.add_argument("--step", metavar="|".join(STEP_PARTS), default="axes", help="what .step holds (default: axes)")
+    parser.add_argument(
+        "--system", metavar="EPSG:CODE", help="reference system of a scan that names none, for .geojson and .ifc"
     )
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
     return parser
@@ -51,14 +56,14 @@ def convert_parser() -> Parser:
 def convert(values: Namespace) -> None:
     """Write what a file holds in other formats."""
     from ..export.formats import GRID, STRUCTURE, check_output, read_model
-    from ..export.model import with_unit
+    from ..export.model import with_system, with_unit
     from ..export.style import FileStyle
     from ..grid.certificate import check_passed
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 
     outs = [check_output(out, "") for out in outs_of(values)]
-    style = FileStyle(tube=values.tube, ball=values.ball, ifc=values.ifc)
+    style = FileStyle(tube=values.tube, ball=values.ball, ifc=values.ifc, ifc_schema=values.ifc_schema, step=values.step)
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
@@ -68,6 +73,8 @@ def convert(values: Namespace) -> None:
             bars.note(note)
         if values.unit is not None:
             model = with_unit(model, values.unit)
+        if values.system is not None:
+            model = with_system(model, values.system)
         if model.truss is None and model.grid is not None:
             check_passed(model.grid, values.keep_failed)
         for out in outs:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -193,16 +195,32 @@ def draw_ifc(path: Path) -> Drawing:
     with reading_as(path, "an IFC file"):
         file = ifcopenshell.open(str(path))
         scale = float(calculate_unit_scale(file))
+        to_map, system = _map_of(file)
         for kinds, axis_of in ((PHYSICAL, _axis), (ANALYTIC, _edge)):
             for part in (part for kind in kinds for part in file.by_type(kind)):
                 ends = axis_of(part)
                 if ends is None:
                     found.other("members without a straight axis")
                 else:
-                    found.path([tuple((scale * end).tolist()) for end in ends])
+                    found.path([tuple((to_map[:3, :3] @ (scale * end) + to_map[:3, 3]).tolist()) for end in ends])
             if found.lines:
                 break
-    return found.drawing(path, "m")
+    return replace(found.drawing(path, "m"), system=system)
+
+
+def _map_of(file: Any) -> tuple[np.ndarray, str]:
+    """Return the (4, 4) way from metres of an IFC file to its reference system, and that system; without one as they are, and ""."""
+    to_map = np.eye(4)
+    for each in file.by_type("IfcMapConversion") if file.schema != "IFC2X3" else ():
+        unit = each.TargetCRS.MapUnit
+        if each.is_a() != "IfcMapConversion" or unit is not None and unit.Name != "METRE" or each.Scale not in (None, 1.0):
+            continue  # of other scales or units: the numbers stay those of the file
+        x, y = (1.0, 0.0) if each.XAxisAbscissa is None else (each.XAxisAbscissa, each.XAxisOrdinate)
+        size = math.hypot(x, y)
+        to_map[:2, :2] = np.array([[x, -y], [y, x]]) / size
+        to_map[:3, 3] = each.Eastings, each.Northings, each.OrthogonalHeight
+        return to_map, str(each.TargetCRS.Name or "")
+    return to_map, ""
 
 
 def _placed(part: Any, places: list[Any]) -> list[np.ndarray]:

@@ -25,6 +25,7 @@ class Drawing:
     faces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.int64))  #: (F, 3) points
     unit: str = ""
     left: str = ""  #: what else the file holds and is not read, in words
+    system: str = ""  #: reference system of the points
 
 
 def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> tuple[Grid, tuple[str, ...]]:
@@ -69,7 +70,12 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     far = float(np.abs(points).max()) > FAR
     origin = np.round((points.min(axis=0) + points.max(axis=0)) / 2) if far else np.zeros(3)
     grid = Grid(
-        nodes=points - origin, triangles=triangles, fixed=np.zeros(len(points), bool), origin=origin, unit=drawing.unit
+        nodes=points - origin,
+        triangles=triangles,
+        fixed=np.zeros(len(points), bool),
+        origin=origin,
+        unit=drawing.unit,
+        system=drawing.system,
     )
     if not grid.topology.manifold:
         raise FormatError(

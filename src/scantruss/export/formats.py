@@ -43,6 +43,7 @@ class FileFormat:
     loses_of_structure: str = ""  #: what it cannot hold of a structure besides
     holds: tuple[str, ...] = (GRID, STRUCTURE)
     needs_unit: bool = False  #: whether a grid without a unit is refused
+    wants_system: bool = False  #: whether programs need the reference system to place it
     read: Callable[[Path], Model] | None = None
     draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces that others drew
     library: str = ""  #: module that must be installed
@@ -85,10 +86,14 @@ FORMATS: dict[str, FileFormat] = {
         path: function("drawing.picture.encode_picture")(model.as_grid("PNG"), model.cloud, style=style)}, holds=(GRID,)),
     ".3dm": FileFormat("3DM", one("rhino.encode_3dm"), draw=function("drawing_files.draw_3dm"),
                        loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
+    ".3mf": FileFormat("3MF", one("solid_bodies.encode_3mf_bodies"), holds=(STRUCTURE,),
+                       loses_of_structure="panels or exact coordinates (relative to the origin), supports, loads or results"),
     ".compas.json": FileFormat("COMPAS JSON", one("compas.encode_compas"), draw=function("compas.draw_compas"),
                                 loses_of_structure="loads, releases or results"),
     ".dxf": FileFormat("DXF", one("dxf.encode_dxf"), draw=function("drawing_files.draw_dxf"),
                        loses_of_structure="loads or results", library="ezdxf", extra="cad"),
+    ".geojson": FileFormat("GeoJSON", one("geojson.encode_geojson"), wants_system=True,
+                           loses_of_structure="stiffness, loads, displacements or reactions"),
     ".glb": FileFormat("GLB", one("glb.encode_glb"), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
     ".html": FileFormat("HTML", one("page.encode_page"), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
@@ -101,7 +106,11 @@ FORMATS: dict[str, FileFormat] = {
     ".saf.xlsx": FileFormat("SAF", one("saf.encode_saf"), holds=(STRUCTURE,), loses_of_structure="triangles or results"),
     ".step": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
+    ".stl": FileFormat("STL", one("solid_bodies.encode_stl_bodies"), holds=(STRUCTURE,),
+                       loses_of_structure="panels, marks, the unit (mm) or exact coordinates (float32, relative to the origin), "
+                       "supports, loads or results"),
     ".tcl": FileFormat("OpenSees", one("opensees.encode_tcl"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
+    ".xlsx": FileFormat("XLSX", one("tables.encode_xlsx_model")),
     ".vtu": FileFormat("VTU", one("vtu.encode_vtu"), loses="marks (members are counted from 0)", loses_of_structure="loads"),
 }  # fmt: skip
 
@@ -184,7 +193,8 @@ def losses(model: Model, path: str | Path) -> list[str]:
     row = FORMATS[suffix_of(Path(path), FORMATS)]
     lost = [row.loses, *([row.loses_of_structure] if model.truss is not None else [])]
     words = ", ".join(each for each in lost if each)
-    return [f"{row.name} holds no {words}"] if words else []
+    unplaced = f"the reference system is not known, so {row.name} names none; give it with --system EPSG:CODE"
+    return [f"{row.name} holds no {words}"] * bool(words) + [unplaced] * (row.wants_system and not model.system)
 
 
 def model_of(

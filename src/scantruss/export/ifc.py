@@ -13,7 +13,7 @@ from .style import FileStyle
 
 def encode_ifc(model: Model, style: FileStyle) -> bytes:
     """Return an IFC4 file: physical parts of a grid; of a structure these, its analysis model and its results."""
-    ifc = Ifc(model)
+    ifc = Ifc(model, style.ifc_schema)
     bodies = bodies_of(model, style)
     profiles = None if bodies is None else Profiles(ifc, bodies)
     members: list[Ref] = []

@@ -1,7 +1,8 @@
 """What both views of an IFC file share: units, place, sections, material, groups.
 
 All numbers are in m, N, kg and s. Coordinates are
-relative to the placement of the site, which is the origin of the scan. Identifiers follow from the marks and that origin, so a
+relative to the placement of the site, which is the origin of the scan; where the reference system is known, the map conversion holds the origin
+and the site lies at 0. Identifiers follow from the marks and that origin, so a
 part keeps its own when it is written again.
 """
 
@@ -18,6 +19,7 @@ from .part21 import Part21, Ref, Word, ifc_guid, typed
 if TYPE_CHECKING:
     from ..structure.catalogue import Material, Section
 
+IFC_SCHEMAS = {"IFC4": "IFC4", "IFC4X3": "IFC4X3_ADD2"}  #: edition -> word of its schema
 VIEW = "ViewDefinition [notYetAssigned]"
 SI = (  # kind, prefix, unit
     ("LENGTHUNIT", None, "METRE"), ("AREAUNIT", None, "SQUARE_METRE"), ("VOLUMEUNIT", None, "CUBIC_METRE"),
@@ -40,8 +42,8 @@ DERIVED = {  # kind -> powers of units
 class Ifc(Part21):
     """An IFC file under construction."""
 
-    def __init__(self, model: Model) -> None:
-        super().__init__("IFC4", VIEW)
+    def __init__(self, model: Model, schema: str = "IFC4") -> None:
+        super().__init__(IFC_SCHEMAS[schema], VIEW)
         self.model = model
         self.up = self.add("IFCDIRECTION", (0.0, 0.0, 1.0))
         self.x = self.add("IFCDIRECTION", (1.0, 0.0, 0.0))
@@ -54,7 +56,12 @@ class Ifc(Part21):
             "IFCPROJECT", "project", "", "ScanTruss", None, None, None, None, (self.context,), units
         )
         origin = (model.origin * model.metres).tolist()
-        place = self.add("IFCAXIS2PLACEMENT3D", self.add("IFCCARTESIANPOINT", origin), None, None)
+        mapped = bool(model.system) and model.unit == "m"  # the numbers of the file are then those of the system
+        if mapped:
+            system = self.add("IFCPROJECTEDCRS", model.system, *[None] * 6)
+            self.add("IFCMAPCONVERSION", self.context, system, *origin, 1.0, 0.0, 1.0)
+        at = self.zero if mapped else self.add("IFCCARTESIANPOINT", origin)
+        place = self.add("IFCAXIS2PLACEMENT3D", at, None, None)
         self.place = self.add("IFCLOCALPLACEMENT", None, place)  #: of all that is relative to the origin
         self.site = self.root(
             "IFCSITE", "site", "", "Site", None, None, self.place, None, None, Word(".ELEMENT."), *[None] * 5

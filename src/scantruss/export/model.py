@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
     from ..structure.truss import LoadCase, Truss
+
+
+SYSTEM_UNITS = ("m", "foot")  #: of plane reference systems
+SYSTEM_CODE = re.compile(r"EPSG:\d{4,6}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +51,7 @@ class Model:
     utilization: np.ndarray | None = None  #: (M,) of the members, where they are checked
     cloud: PointCloud | None = None  #: the scan, which some formats draw
     notes: tuple[str, ...] = ()  #: what a user should know of a file that others made
+    system: str = ""  #: reference system of the coordinates, such as EPSG:25833; "" where it is not known
 
     @cached_property
     def nodes(self) -> np.ndarray:
@@ -108,6 +114,7 @@ def model_of_grid(grid: Grid, cloud: PointCloud | None = None) -> Model:
         node_sets={"fixed": np.flatnonzero(grid.fixed), **lines},
         grid=grid,
         cloud=cloud,
+        system=grid.system,
     )
 
 
@@ -142,6 +149,7 @@ def model_of_truss(
         solution=solution,
         report=report,
         utilization=report.utilization if report is not None else utilization,
+        system=truss.system,
     )
 
 
@@ -158,6 +166,27 @@ def with_unit(model: Model, unit: str) -> Model:
     if model.unit not in ("", unit):
         raise FormatError(f"the unit is {model.unit}, not {unit}; leave --unit out")
     return replace(model, unit=unit, grid=None if model.grid is None else model.grid.replace(unit=unit))
+
+
+def with_system(model: Model, system: str) -> Model:
+    """Return a model in a reference system, where it had none.
+
+    Raises
+    ------
+    FormatError
+        It has another one, or lengths that no such system has; or this is no code of one.
+    """
+    if not SYSTEM_CODE.fullmatch(system):
+        raise FormatError(f"the reference system must be the code of a plane one such as EPSG:25833, got {system!r}")
+    if model.system not in ("", system):
+        raise FormatError(f"the reference system is {model.system}, not {system}; leave --system out")
+    if model.unit not in SYSTEM_UNITS:
+        raise FormatError(f"a reference system is in metres or feet, and the coordinates are in {model.unit or 'a unit that is not known'}")
+    if model.truss is not None and model.truss.scale != 1.0:
+        raise FormatError(f"the structure is {model.truss.scale:g} times its scan, so its coordinates are of no reference system")
+    grid = None if model.grid is None else model.grid.replace(system=system)
+    truss = None if model.truss is None else model.truss.replace(system=system)
+    return replace(model, system=system, grid=grid, truss=truss)
 
 
 def line_loads(truss: Truss, case: LoadCase, *, weight: bool = True) -> np.ndarray:
@@ -225,6 +254,7 @@ def _grid_of(truss: Truss) -> Grid:
         fixed=fixed,
         origin=truss.origin,
         unit="m",
+        system=truss.system,
         lines=np.concatenate([np.zeros((0, 2), np.int64), *pairs]),
         line_sets=tuple(lines),
     )

@@ -149,13 +149,18 @@ def encode_3mf(*solids: Solid, names: Sequence[str] = ("grid truss",)) -> bytes:
                 triangles="\n".join(f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in solid.triangles.tolist()),
             )
         )
-    parts = {"[Content_Types].xml": CONTENT_TYPES, "_rels/.rels": RELATIONS}
-    parts["3D/3dmodel.model"] = MODEL.format(
+    model = MODEL.format(
         unit=UNIT_NAMES.get(solids[0].unit, "millimeter"),
         version=__version__,
         objects="\n".join(objects),
         items="".join(f'<item objectid="{number + 1}"/>' for number in range(len(solids))),
     )
+    return encode_package(model)
+
+
+def encode_package(model: str) -> bytes:
+    """Return the package of a model in the XML of 3MF."""
+    parts = {"[Content_Types].xml": CONTENT_TYPES, "_rels/.rels": RELATIONS, "3D/3dmodel.model": model}
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as package:
         for name, text in parts.items():
@@ -178,12 +183,16 @@ def encode_stl(solid: Solid) -> bytes:
     vertices, together = put_on_lattice(solid)
     if together:
         raise FormatError(f"STL cannot hold this solid: {together} vertices coincide in float32; write a .3mf instead")
-    corners = vertices[solid.triangles]
+    return stl_of_corners(vertices[solid.triangles], solid.unit)
+
+
+def stl_of_corners(corners: np.ndarray, unit: str) -> bytes:
+    """Return the binary STL file of triangles by their corners (T, 3, 3) float32."""
     wide = corners.astype(np.float64)
     normal = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     table = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]))
     table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     table["corners"] = corners
-    header = f"ScanTruss {__version__}, unit: {solid.unit or 'not known'}".encode("ascii").ljust(80)
+    header = f"ScanTruss {__version__}, unit: {unit or 'not known'}".encode("ascii").ljust(80)
     return header + len(corners).to_bytes(4, "little") + table.tobytes()

@@ -1,11 +1,14 @@
-"""STEP (AP214): the axes of the members as trimmed lines with their marks, on layers by group."""
+"""STEP (AP214): the axes of the members as trimmed lines, or the bodies of members and nodes; with their marks, on layers by group."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..errors import FormatError
+from .bodies import bodies_of
 from .model import Model
 from .part21 import Part21, Ref, Word
+from .step_bodies import add_bodies
 from .style import FileStyle
 
 SCHEMA = "AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }"
@@ -13,7 +16,35 @@ PREFIX = {"mm": ".MILLI.", "cm": ".CENTI.", "m": "$"}
 
 
 def encode_step(model: Model, style: FileStyle) -> bytes:
-    """Return a STEP file in the frame of the scan, in the unit of the grid; inches and feet become metres."""
+    """Return a STEP file: axes in the frame of the scan in the unit of the grid (inches and feet become metres), or bodies.
+
+    Bodies are in metres and relative to the origin, as kernels of CAD programs work to 1e-7 mm near 0; the product tells the origin.
+
+    Raises
+    ------
+    FormatError
+        Bodies are asked for, and nothing says how thick the members of a grid are.
+    """
+    return _encode_bodies(model, style) if style.step == "bodies" else _encode_axes(model)
+
+
+def _encode_bodies(model: Model, style: FileStyle) -> bytes:
+    bodies = bodies_of(model, style)
+    if bodies is None:
+        raise FormatError("STEP bodies need sections, and nothing says how thick the members of a grid are; give --tube")
+    file = Part21(SCHEMA, "ScanTruss")
+    context = _context(file, PREFIX["m"])
+    members, balls = add_bodies(file, model, bodies)
+    name = "members and nodes"
+    shape = file.add("ADVANCED_BREP_SHAPE_REPRESENTATION", name, (_frame(file), *members, *balls), context)
+    _product(file, shape, f"relative to the origin {' '.join(map(repr, (model.origin * model.metres).tolist()))} m")
+    _layers(file, model, members)
+    if balls:
+        file.add("PRESENTATION_LAYER_ASSIGNMENT", "nodes", "", balls)
+    return file.encode()
+
+
+def _encode_axes(model: Model) -> bytes:
     file = Part21(SCHEMA, "ScanTruss")
     unit = model.unit if model.unit in PREFIX else "m"
     size = 1.0 if model.unit == unit else model.metres
@@ -34,21 +65,26 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
             file.add("TRIMMED_CURVE", mark, line, (points[start],), (points[end],), Word(".T."), Word(".CARTESIAN."))
         )
     curves_of = file.add("GEOMETRIC_CURVE_SET", "members", curves or points[:1])
-    zero = file.add("CARTESIAN_POINT", "", (0.0, 0.0, 0.0))
-    frame = file.add(
-        "AXIS2_PLACEMENT_3D",
-        "",
-        zero,
-        file.add("DIRECTION", "", (0.0, 0.0, 1.0)),
-        file.add("DIRECTION", "", (1.0, 0.0, 0.0)),
+    shape = file.add(
+        "GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION", "members", (_frame(file), curves_of), context
     )
-    shape = file.add("GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION", "members", (frame, curves_of), context)
-    _product(file, shape)
+    _product(file, shape, "")
+    _layers(file, model, curves)
+    return file.encode()
+
+
+def _frame(file: Part21) -> Ref:
+    zero = file.add("CARTESIAN_POINT", "", (0.0, 0.0, 0.0))
+    up, x = file.add("DIRECTION", "", (0.0, 0.0, 1.0)), file.add("DIRECTION", "", (1.0, 0.0, 0.0))
+    return file.add("AXIS2_PLACEMENT_3D", "", zero, up, x)
+
+
+def _layers(file: Part21, model: Model, members: list[Ref]) -> None:
+    """Put the members of each group on a layer."""
     for number, name in enumerate(model.groups):
-        mine = [curves[k] for k in np.flatnonzero(model.group_of == number).tolist()]
+        mine = [members[k] for k in np.flatnonzero(model.group_of == number).tolist()]
         if mine:
             file.add("PRESENTATION_LAYER_ASSIGNMENT", f"members {name}", "", mine)
-    return file.encode()
 
 
 def _context(file: Part21, prefix: str) -> Ref:
@@ -67,12 +103,12 @@ def _context(file: Part21, prefix: str) -> Ref:
     )
 
 
-def _product(file: Part21, shape: Ref) -> None:
+def _product(file: Part21, shape: Ref, said: str) -> None:
     """Add what makes a product of a shape."""
     application = file.add("APPLICATION_CONTEXT", "automotive design")
     file.add("APPLICATION_PROTOCOL_DEFINITION", "international standard", "automotive_design", 2000, application)
     product = file.add(
-        "PRODUCT", "ScanTruss", "ScanTruss", "", (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
+        "PRODUCT", "ScanTruss", "ScanTruss", said, (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
     )
     file.add("PRODUCT_RELATED_PRODUCT_CATEGORY", "part", None, (product,))
     version = file.add("PRODUCT_DEFINITION_FORMATION", "", "", product)

@@ -9,6 +9,8 @@ from ..errors import InputError
 from .drawing.style import PictureStyle
 
 OBJ_ELEMENTS = ("faces", "lines", "both")
+STEP_PARTS = ("axes", "bodies")
+IFC_EDITIONS = ("IFC4", "IFC4X3")
 IFC_VIEWS = ("auto", "physical", "analysis", "both")
 
 
@@ -30,6 +32,8 @@ class FileStyle(PictureStyle):
         None  #: diameter of the nodes, 0 for none; None: twice the greatest diameter of the members [mm]
     )
     ifc: str = "auto"  #: what an IFC file holds of a structure: physical parts, the analysis model, or (auto) both
+    ifc_schema: str = "IFC4"  #: edition of IFC: IFC4, or IFC4X3 (4.3 ADD2)
+    step: str = "axes"  #: what a STEP file holds: axes of the members, or bodies of members and nodes
     decimal_comma: bool = False  #: CSV with a decimal comma and semicolons between the columns
 
     def __post_init__(self) -> None:
@@ -39,6 +43,10 @@ class FileStyle(PictureStyle):
             raise InputError(f"an OBJ file holds {', '.join(OBJ_ELEMENTS)}, got {self.obj!r}")
         if self.ifc not in IFC_VIEWS:
             raise InputError(f"an IFC file holds {', '.join(IFC_VIEWS)}, got {self.ifc!r}")
+        if self.ifc_schema not in IFC_EDITIONS:
+            raise InputError(f"the edition of IFC is {' or '.join(IFC_EDITIONS)}, got {self.ifc_schema!r}")
+        if self.step not in STEP_PARTS:
+            raise InputError(f"a STEP file holds {' or '.join(STEP_PARTS)}, got {self.step!r}")
         if self.tube is not None and (self.tube[1] is None or not 0 < 2 * self.tube[1] < self.tube[0]):
             raise InputError("a tube has a diameter and a wall of less than half of it in mm, such as 60x3")
         if self.ball is not None and not 0 <= self.ball < math.inf:

@@ -118,6 +118,7 @@ def advance_front(
         np.zeros(len(used), np.bool_),
         samples.origin,
         samples.unit,
+        system=samples.system,
         desired=desired,
         lines=np.searchsorted(used, members),
         settings=settings,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .certificate import Certificate
 
 
-PROVENANCE = {"settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
+PROVENANCE = {"system", "settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
 }  # fmt: skip
@@ -39,6 +39,7 @@ class Grid(GridTables):
     fixed: np.ndarray  #: (V,) bool, nodes at positions that the user appointed
     origin: np.ndarray  #: (3,) float64 [scan unit]
     unit: str = ""  #: mm, cm, m, inch, foot, or "" where it is not known
+    system: str = ""  #: reference system of the scan, such as EPSG:25833; "" where it is not known
     lines: np.ndarray = field(
         default_factory=lambda: np.zeros((0, 2), np.int64)
     )  #: (K, 2) members along fixed lines, ridges

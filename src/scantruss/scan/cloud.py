@@ -48,6 +48,7 @@ class PointCloud:
     name: str = ""  #: file the points came from
     notes: tuple[str, ...] = ()  #: what a user should know about how it was read
     normals: np.ndarray | None = None  #: (N, 3) that came with the points
+    system: str = ""  #: reference system of the coordinates, such as EPSG:25833; "" where it is not known
 
     def __repr__(self) -> str:
         """Give the number of points and the extent."""

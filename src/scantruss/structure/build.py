@@ -77,6 +77,7 @@ def truss_of_grid(
         pinned=pinned,
         node_sets=node_sets(grid),
         origin=np.asarray(grid.origin, float) * metres,
+        system=grid.system if metres == 1.0 else "",  # at a scale, or in feet, the coordinates are no longer those
         node_marks=tuple(node_marks(grid)),
         member_marks=tuple(marks),
         scale=float(scale),

@@ -64,6 +64,7 @@ class Truss:
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)  #: fixed nodes, boundary loops, lines: int64
     member_sets: dict[str, np.ndarray] = field(default_factory=dict)  #: top, bottom and web of a double layer: int64
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) [m]
+    system: str = ""  #: reference system in metres that the coordinates are in; "" where it is not known
     node_marks: tuple[str, ...] = ()
     member_marks: tuple[str, ...] = ()
     scale: float = 1.0  #: of the structure to the grid

@@ -76,6 +76,7 @@ class SurfaceSamples:
     on_edge: np.ndarray = field(default_factory=lambda: np.zeros(0, np.bool_))
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))  #: (3,) of the cloud [scan unit]
     unit: str = ""  #: unit of the scan
+    system: str = ""  #: reference system of the scan
     given: GivenNormals | None = None  #: normals that came with the scan
     rings: tuple[LimbRing, ...] = ()  #: where limbs too thin for a grid were cut off
 
@@ -143,7 +144,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud))
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
-        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, unread=unread)
+        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread)
     return kept[asked]
 
 
@@ -184,6 +185,7 @@ def samples_with(
         moved=samples.moved,
         origin=samples.origin,
         unit=samples.unit,
+        system=samples.system,
         rings=samples.rings,
     )
 

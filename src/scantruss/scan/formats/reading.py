@@ -13,7 +13,7 @@ from ...errors import FormatError, InputError
 from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
-from ..units import check_unit
+from ..units import check_unit, name_of
 from .choose import check_attributes, choose, describe_points, places_in
 from .columns import NORMAL_COLUMNS
 from .common_unit import to_common_unit
@@ -40,6 +40,7 @@ class Part:
     held: str  #: what could have been selected, if nothing was
     notes: tuple[str, ...]
     normals: np.ndarray | None = None  #: (N, 3)
+    in_system: bool = True  #: whether the points are still in the units of that system
 
 
 def read_points(path: FileNames, unit: str = "", selection: Selection | None = None) -> PointCloud:
@@ -83,7 +84,9 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     given = np.concatenate(normals) if len(normals) == len(parts) else None
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path), normals=given)
     left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
-    return replace(cloud, notes=(*notes, *cloud.notes, *degrees_note(cloud)), left_out=tuple(left_out.items()))
+    said = system_of_all([(part.system, part.in_system) for part in parts])
+    notes = (*notes, *cloud.notes, *degrees_note(cloud))
+    return replace(cloud, notes=notes, left_out=tuple(left_out.items()), system=said)
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
@@ -119,7 +122,7 @@ def select(
         normals = normals if normals is None else normals[kept]
     left_out = add_counts([content.left_out, chosen, content.unread])
     count = len(points) + sum(left_out.values())
-    return Part(points, unit, content.system, count, left_out, held, notes, normals)
+    return Part(points, unit, content.system, count, left_out, held, notes, normals, stays_in_system(content, unit))
 
 
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
@@ -199,6 +202,17 @@ def check_systems(files: Sequence[Path], systems: Sequence[str]) -> None:
                     f"{file} is in {system} and {named[0][0]} in {named[0][1]}; files of one scan must share a reference"
                     " system, so bring them to one first (PDAL filters.reprojection)"
                 )
+
+
+def stays_in_system(content: Content, unit: str) -> bool:
+    """Return whether x and y of a file are still in the unit of its reference system once they are in `unit`."""
+    return not content.degrees and (content.metres is None or name_of(content.metres) == unit)
+
+
+def system_of_all(systems: Sequence[tuple[str, bool]]) -> str:
+    """Return the reference system of a scan by those of its files, each with whether the points are still in it; "" for none."""
+    named = [(system, kept) for system, kept in systems if system]
+    return named[0][0] if named and all(kept for _, kept in named) else ""
 
 
 def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:

@@ -52,7 +52,7 @@ def spacing_to_fit(names: FileNames, settings: Settings, memory: float | None = 
         return 0.0
     memory = MEMORY_SHARE * available_memory() if memory is None else memory
     if points * BYTES_PER_POINT > memory and settings.selection.crop:
-        sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+        sources, reading, *_ = open_scan(names, settings.unit, settings.selection)
         points -= sum(count_unread(source, reading) for source in sources)
     return settings.length / BOXES_PER_MEMBER if points * BYTES_PER_POINT > memory else 0.0
 
@@ -62,7 +62,7 @@ def spacing_to_look(names: FileNames, settings: Settings, progress: Progress | N
 
     Points far from most others do not count.
     """
-    sources, reading, _ = open_scan(names, settings.unit, settings.selection)
+    sources, reading, *_ = open_scan(names, settings.unit, settings.selection)
     some = _sample(sources, reading, ShareDone(progress, "look", sources))
     if not len(some):
         return 1.0  # thinning will report the reason
@@ -109,7 +109,7 @@ def read_thinned(names: FileNames, settings: Settings, progress: Progress | None
     check_enough(thinned, float(settings.thin_spacing or 0.0), "--thin-spacing")
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
     notes = (*thinned.notes, *cloud.notes, *degrees_note(cloud))
-    return replace(cloud, dropped=thinned.dropped, notes=notes), thinned.read
+    return replace(cloud, dropped=thinned.dropped, notes=notes, system=thinned.system), thinned.read
 
 
 def read_to_fit(

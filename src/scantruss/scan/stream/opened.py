@@ -11,7 +11,7 @@ from ..formats.common_unit import to_common_unit
 from ..formats.content import Content
 from ..formats.las import note_on_heights
 from ..formats.paths import FileNames, files_of
-from ..formats.reading import check_systems, joint_notes
+from ..formats.reading import check_systems, joint_notes, stays_in_system, system_of_all
 from ..units import check_unit
 from .chunks import Reading
 from .source import Source
@@ -24,6 +24,7 @@ class OpenScan(NamedTuple):
     sources: list[Source]
     reading: Reading
     notes: tuple[str, ...]  #: notes on their units
+    system: str = ""  #: reference system of the points as they are read
 
 
 def open_scan(names: FileNames, unit: str = "", selection: Selection | None = None) -> OpenScan:
@@ -41,15 +42,16 @@ def open_scan(names: FileNames, unit: str = "", selection: Selection | None = No
     sources = [find_source(path, selection.needs) for path in files]
     check_systems(files, [source.system for source in sources])
     units: list[str] = []
-    said = []
+    said, systems = [], []
     none = Content(np.empty((0, 3)))
     for source in sources:
         common = next((own for own in units if own), "")
         _, own, notes = to_common_unit(source.path, source.said_of(none), unit, selection.z_unit, common)
         units.append(own)
         said.append(notes)
+        systems.append((source.system, stays_in_system(source.said_of(none), own)))
     common, notes = joint_notes(files, units, said)
     airborne = next((source for source in sources if source.kind == "las"), None)
     if airborne and airborne.z_metres is None and common != "foot" and not selection.z_unit:
         notes = (*notes, *filter(None, [note_on_heights(airborne.path)]))
-    return OpenScan(sources, Reading(unit, selection, common), notes)
+    return OpenScan(sources, Reading(unit, selection, common), notes, system_of_all(systems))

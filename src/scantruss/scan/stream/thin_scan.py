@@ -48,6 +48,7 @@ class Thinned:
     boundary: int  #: points that stand for the boundary, the last of `points`
     unit: str = ""  #: of the coordinates; "" if neither a file nor the user says it
     notes: tuple[str, ...] = ()  #: what was left out or converted
+    system: str = ""  #: reference system of the points
 
 
 def check_enough(thinned: Thinned, spacing: float, option: str) -> None:
@@ -116,7 +117,7 @@ def thin_open_scan(
     if keep not in KEEP_CHOICES:
         raise InputError(f"keep must be one of {' '.join(KEEP_CHOICES)}, got {keep!r}")
     workers = workers or Workers()
-    sources, reading, notes = scan
+    sources, reading, notes, system = scan
     rows, summary = _all_rows(sources, reading, spacing, boundary, workers, ShareDone(progress, "read", sources))
     if rows.points == rows.dropped:
         raise _nothing(sources, rows, summary)
@@ -127,7 +128,7 @@ def thin_open_scan(
     added = points_at_boundary(rows, spacing) if boundary else chosen[:0]
     notes = (*dict.fromkeys([*summary.notes, *notes]), *left_out_note([summary.left_out]))
     both = np.concatenate([chosen, added]) if boundary else chosen
-    return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes)
+    return Thinned(both, rows.points, rows.dropped, len(added), reading.common, notes, system)
 
 
 class ShareDone:
