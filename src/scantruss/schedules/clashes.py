@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..layouts.clearance import close_pairs
 from ..scan.clean.nearby import Nearby
 from .bolts import PITCHES, tension_resistance
 from .records import Schedule, Value, column
@@ -26,6 +27,7 @@ def warnings_table(parts: Parts) -> Schedule:
         *_small_angles(parts),
         *_clashes(parts),
         *_touching_balls(parts),
+        *_crossing(parts),
         *_folds(parts),
         *_of_structure(parts),
     ]
@@ -113,6 +115,19 @@ def _touching_balls(parts: Parts) -> list[WarningRow]:
         ("balls touch", parts.node_marks[a], parts.node_marks[b], distance, most, "mm",
          *parts.grid.scan_nodes[[a, b]].mean(axis=0).tolist())
         for (a, b), distance, most in zip(pairs[chosen].tolist(), apart[chosen].tolist(), least[chosen].tolist(), strict=True)
+    ]  # fmt: skip
+
+
+def _crossing(parts: Parts) -> list[WarningRow]:
+    """Members of layers without a common node that come closer than their diameters."""
+    if parts.joints.one_layer:
+        return []
+    width = parts.stock.width
+    pairs, apart = close_pairs(parts.grid.nodes * parts.size, parts.grid.edges, width / 2.0)
+    return [
+        ("members closer than their diameters", parts.member_marks[a], parts.member_marks[b], distance, least, "mm",
+         *parts.grid.scan_nodes[parts.grid.edges[[a, b]]].mean(axis=(0, 1)).tolist())
+        for (a, b), distance, least in zip(pairs.tolist(), apart.tolist(), width[pairs].mean(axis=1).tolist(), strict=True)
     ]  # fmt: skip
 
 

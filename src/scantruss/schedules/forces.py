@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
+from ..layouts.layered_grid import LayeredGrid
 from ..structure.report import report_structure
 from ..structure.statics import solve
 
@@ -57,21 +58,35 @@ def grid_of_structure(truss: Truss) -> tuple[Grid, np.ndarray]:
     Raises
     ------
     InputError
-        Its members are not the sides of its triangles.
+        Its members are neither the sides of its triangles nor those of layers.
     """
-    grid = Grid(
-        nodes=truss.nodes / truss.scale,
-        triangles=truss.triangles,
-        fixed=np.zeros(len(truss.nodes), bool),
-        origin=truss.origin / truss.scale,
-        unit="m",
-    )
+    of_grid = {
+        "nodes": truss.nodes / truss.scale,
+        "triangles": truss.triangles,
+        "fixed": np.zeros(len(truss.nodes), bool),
+        "origin": truss.origin / truss.scale,
+        "unit": "m",
+    }
+    if truss.layers is not None:
+        groups = np.full(len(truss.members), "", object)
+        for name, members in truss.member_sets.items():
+            groups[members] = name
+        layered = LayeredGrid(
+            **of_grid,
+            own_members=truss.members,
+            own_normals=truss.node_normals,
+            own_groups=tuple(groups.tolist()),
+            layers=truss.layers,
+        )
+        return layered, np.arange(len(truss.members))
+    grid = Grid(**of_grid)
     count = len(truss.nodes)
     theirs, mine = np.sort(truss.members, axis=1) @ [count, 1], grid.edges @ [count, 1]
     order = np.argsort(theirs, kind="stable")
     if not np.array_equal(theirs[order], mine):
+        old = "; this one of two layers is of an earlier version, make it again" if truss.member_sets else ""
         raise InputError(
-            "the members of the structure are not the sides of its panels; schedules need a structure made of a grid"
+            f"the members of the structure are not the sides of its panels; schedules need a structure made of a grid{old}"
         )
     return grid, order
 

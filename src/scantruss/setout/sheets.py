@@ -67,7 +67,7 @@ def make_sheets(made: SettingOut) -> list[Sheet]:
 
 def _plan(made: SettingOut, height: float) -> Sheet:
     flat, edges = made.places[:, :2], made.grid.edges
-    on_boundary = made.grid.edge_triangles[:, 1] < 0
+    on_boundary = made.grid.edge_uses == 1
     lines = [
         (BOUNDARY_LINES if outer else MEMBER_LINES, flat[edge])
         for edge, outer in zip(edges, on_boundary.tolist(), strict=True)
