@@ -29,7 +29,7 @@ from .glb import encode_glb
 from .ifc import encode_ifc
 from .json import encode_model, read_json
 from .karamba import encode_karamba
-from .model import Model, model_of_grid, model_of_truss
+from .model import Model, members_of, model_of_grid, model_of_truss
 from .obj import encode_obj
 from .opensees import encode_py, encode_tcl
 from .page import encode_page
@@ -84,11 +84,11 @@ NO_STRUCTURE = "sections, supports, loads or results"
 FORMATS: dict[str, FileFormat] = {
     ".csv": FileFormat(
         "CSV",
-        lambda model, path, style: encode_csv(model.as_grid("CSV"), path, decimal_comma=style.decimal_comma),
+        lambda model, path, style: encode_csv(members_of(model, "CSV"), path, decimal_comma=style.decimal_comma),
         loses_of_structure=NO_STRUCTURE,
     ),
     ".json": FileFormat("JSON", one(lambda model, style: encode_model(model)), read=read_json),
-    ".obj": FileFormat("OBJ", of_grid(lambda grid, style: encode_obj(grid, style.obj), "OBJ"), draw=draw_obj,
+    ".obj": FileFormat("OBJ", one(lambda model, style: encode_obj(members_of(model, "OBJ"), style.obj)), draw=draw_obj,
                        loses_of_structure=f"marks, {NO_STRUCTURE}"),
     ".ply": FileFormat("PLY", of_grid(lambda grid, style: encode_ply(grid), "PLY"), draw=draw_ply,
                        loses_of_structure=f"marks, {NO_STRUCTURE}"),

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
-from ..layouts.layered_grid import LayeredGrid
+from ..structure.layered import grid_of_layers, grid_of_triangles
 from ..structure.report import report_structure
 from ..structure.statics import solve
 
@@ -60,26 +60,9 @@ def grid_of_structure(truss: Truss) -> tuple[Grid, np.ndarray]:
     InputError
         Its members are neither the sides of its triangles nor those of layers.
     """
-    of_grid = {
-        "nodes": truss.nodes / truss.scale,
-        "triangles": truss.triangles,
-        "fixed": np.zeros(len(truss.nodes), bool),
-        "origin": truss.origin / truss.scale,
-        "unit": "m",
-    }
     if truss.layers is not None:
-        groups = np.full(len(truss.members), "", object)
-        for name, members in truss.member_sets.items():
-            groups[members] = name
-        layered = LayeredGrid(
-            **of_grid,
-            own_members=truss.members,
-            own_normals=truss.node_normals,
-            own_groups=tuple(groups.tolist()),
-            layers=truss.layers,
-        )
-        return layered, np.arange(len(truss.members))
-    grid = Grid(**of_grid)
+        return grid_of_layers(truss, truss.scale), np.arange(len(truss.members))
+    grid = grid_of_triangles(truss, truss.scale)
     count = len(truss.nodes)
     theirs, mine = np.sort(truss.members, axis=1) @ [count, 1], grid.edges @ [count, 1]
     order = np.argsort(theirs, kind="stable")
