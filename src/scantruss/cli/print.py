@@ -1,4 +1,4 @@
-"""The command ``scantruss print``: one watertight solid of a saved grid."""
+"""The command ``scantruss print``: watertight solids of a saved grid or structure."""
 
 from __future__ import annotations
 
@@ -27,13 +27,15 @@ def print_parser() -> Parser:
     """Options of ``scantruss print``."""
     from .options import Parser, add_outs, number
 
-    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
+    usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
     said = (
         "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
         "with sockets for rods."
     )
     parser = Parser("print", usage, said)
-    add_grid(parser, "grid or structure saved as .json by scantruss grid or structure; lengths of a structure are metres")
+    add_grid(
+        parser, "grid or structure saved as .json by scantruss grid or structure; lengths of a structure are metres"
+    )
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")

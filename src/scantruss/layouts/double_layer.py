@@ -18,14 +18,12 @@ DEPTH_WAYS = ("normal", "vertical")  #: along which the depth is measured
 BEND_WAYS = ("refuse", "reduce")  #: what is done where the grid bends too sharply for the depth
 TOP, BOTTOM, WEB = "top", "bottom", "web"  #: groups of members
 MOST_LAYERS = 9  #: that a grid can have
-LEAST_CHORD = (
-    0.25  #: of a chord of a lower layer, measured along the first, over the length there; shorter is refused
-)
+LEAST_CHORD = 0.25  #: of a chord of a lower layer, measured along the first, over the length there; shorter is refused
 LEAST_GAP = 0.5  #: of the distance between two layers, measured along the normal of a triangle, over the depth
 CROSSED = 0.01  #: distance of two members that cross, over the mean length of the first layer
 PLACES_NAMED = 4  #: in a refusal
 SHRINKING = 0.8  #: of the depth at a node that is too deep, over that of the round before
-LEAST_SHARE = 0.2  #: of the depth that is asked for, to which it may be reduced
+LEAST_DEPTH_SHARE = 0.2  #: of the depth that is asked for, to which it may be reduced
 STEEPEST_SHARE = 0.15  #: by which the share of the depth may change along a member
 
 
@@ -108,14 +106,14 @@ def double_layer(
     _check_gap(grid, down, sum(depths))
     parts = layer_parts(grid, len(depths) + 1, second, edges or ("tapered" if second == "dual" else "closed"))
     share = np.ones(len(grid.nodes))
-    while True:  # each turn lowers the share of a node to SHRINKING times it; ends below LEAST_SHARE
+    while True:  # each turn lowers the share of a node to SHRINKING times it; ends below LEAST_DEPTH_SHARE
         nodes, shares = _places(parts, grid, down, depths, share)
         found = _too_deep(parts, grid, nodes)
         if found is None:
             break
         at, why = found
         lower = _eased(grid, np.where(np.isin(np.arange(len(share)), at), SHRINKING * share, share))
-        if bends == "refuse" or lower.min() < LEAST_SHARE:
+        if bends == "refuse" or lower.min() < LEAST_DEPTH_SHARE:
             _refuse(grid, at, sum(depths), why, share)
         share = lower
     return _named(parts, nodes, shares, normals, depths)

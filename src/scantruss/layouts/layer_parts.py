@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +17,9 @@ LAYER_EDGES = ("tapered", "closed")  #: how layers end at the boundary of the gr
 class LayerParts:
     """Nodes, members and panels of all layers; those of the grid come first."""
 
-    owners: np.ndarray  #: (N, 3) nodes of the grid over each node: the corners of its triangle, or one of them three times
+    owners: (
+        np.ndarray
+    )  #: (N, 3) nodes of the grid over each node: the corners of its triangle, or one of them three times
     layer: np.ndarray  #: (N,) number of the layer of each node, 0 for the grid
     chords: list[np.ndarray]  #: (K, 2) of each layer
     webs: list[np.ndarray]  #: (K, 2) between each layer and the next
@@ -41,8 +44,8 @@ def layer_parts(grid: Grid, count: int, second: str, edges: str) -> LayerParts:
     meets = _meeting(grid, rim) if edges == "tapered" and second == "same" else np.zeros(nodes, bool)
     none = np.full(triangles, -1)
     layers = [_Layer(np.arange(nodes), none)]
-    owners, layer, panels = [np.repeat(np.arange(nodes)[:, None], 3, axis=1)], [np.zeros(nodes, np.int64)], []
-    chords, webs = [grid.edges], []
+    owners, layer = [np.repeat(np.arange(nodes)[:, None], 3, axis=1)], [np.zeros(nodes, np.int64)]
+    chords, webs, panels = [grid.edges], list[np.ndarray](), list[np.ndarray]()
     made = nodes
     for number in range(1, count):
         dual = second == "dual" and number % 2 == 1
@@ -59,7 +62,7 @@ def layer_parts(grid: Grid, count: int, second: str, edges: str) -> LayerParts:
         layers.append(_Layer(of_node, of_triangle))
         chords.append(_new(_dual_chords(grid, layers[-1]) if dual else of_node[grid.edges], chords + webs, made))
         panels += _cells(grid, layers[-1]) if dual else list(of_node[grid.triangles])
-    for upper, lower in zip(layers, layers[1:], strict=False):
+    for upper, lower in pairwise(layers):
         webs.append(_new(_webs_between(grid, upper, lower), chords + webs, made))
     last = layers[-1]
     under = np.where(last.of_node >= 0, last.of_node, 0)
@@ -116,8 +119,10 @@ def _webs_between(grid: Grid, upper: _Layer, lower: _Layer) -> np.ndarray:
 
 
 def _cells(grid: Grid, layer: _Layer) -> list[np.ndarray]:
-    """Return the panels of a layer under the triangles: one around each inner node, and where there are nodes under the boundary those
-    between it and the others."""
+    """Return the panels of a layer under the triangles.
+
+    One around each inner node, and where there are nodes under the boundary those between it and the others.
+    """
     following: dict[tuple[int, int], tuple[int, int]] = {}  # node and its next corner: the triangle, the corner after
     for number, corners in enumerate(grid.triangles.tolist()):
         for k in range(3):
@@ -125,7 +130,9 @@ def _cells(grid: Grid, layer: _Layer) -> list[np.ndarray]:
     first: dict[int, int] = {}
     for node, corner in sorted(following):
         first.setdefault(node, corner)
-    begins = {a: b for loop in grid.boundary_loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)}
+    begins = {
+        a: b for loop in grid.boundary_loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+    }
     found = []
     for node in sorted(first):
         start = corner = begins.get(node, first[node])

@@ -158,7 +158,9 @@ def _of_structure(parts: Parts) -> list[WarningRow]:
     if parts.bolt is not None:
         most = tension_resistance(max(PITCHES), parts.settings.bolts) / 1000.0
         found.append(("no bolt carries the tension", forces.high / 1000.0, most, "kN", parts.bolt == 0))
-        moment = 0.0 if forces.truss.pinned else float(forces.moment.max()) / 1000.0  # hinges leave moments between nodes only
+        moment = (
+            0.0 if forces.truss.pinned else float(forces.moment.max()) / 1000.0
+        )  # hinges leave moments between nodes only
         if moment > NO_MOMENT * max(1.0, float(forces.high.max()) / 1000.0):
             at = parts.member_marks[int(forces.moment.argmax())]
             rows.append(

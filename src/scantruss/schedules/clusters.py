@@ -201,7 +201,9 @@ def _nearest(joints: Joints, item: int, others: np.ndarray) -> tuple[np.ndarray,
     height = np.take_along_axis(theirs[:, None, :, 2], hole, axis=2)
     chord = np.hypot(np.abs(flat * np.exp(1j * turn)[..., None] - taken), mine[:, 2] - height)
     bolts = joints.bolt[joints.start[item] + np.arange(count)]
-    chord[np.take_along_axis(joints.bolt[holes][:, None, :], hole, axis=2) != bolts] = 2.0  # another thread is another ball
+    chord[np.take_along_axis(joints.bolt[holes][:, None, :], hole, axis=2) != bolts] = (
+        2.0  # another thread is another ball
+    )
     chord[(np.sort(hole, axis=-1) != np.arange(count)).any(axis=-1)] = 2.0
     return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1), hole
 
