@@ -97,12 +97,10 @@ def test_angles_at_nodes_are_those_of_the_triangles() -> None:
     assert len(pairs) == 12 * 10 and np.isclose(angles, 60).sum() == 60 and np.isclose(angles, 108).sum() == 60
 
 
-def fold() -> st.Grid:
-    """A narrow valley turned up: two strips at 40 degrees."""
-    y, side = np.arange(5.0), np.sin(np.radians(20))
-    rows = [
-        np.stack([0 * y + k * side, y, -abs(k) * np.cos(np.radians(20)) + 0 * y], axis=1) for k in (-2, -1, 0, 1, 2)
-    ]
+def fold(half: float = 20.0) -> st.Grid:
+    """A narrow valley turned up: two strips at twice this angle [degree]."""
+    y, side, down = np.arange(5.0), np.sin(np.radians(half)), np.cos(np.radians(half))
+    rows = [np.stack([0 * y + k * side, y, -abs(k) * down + 0 * y], axis=1) for k in (-2, -1, 0, 1, 2)]
     triangles = [t for k in range(4) for j in range(4) for t in (
         (5 * k + j, 5 * k + 5 + j, 5 * k + j + 1), (5 * k + j + 1, 5 * k + 5 + j, 5 * k + 6 + j))]  # fmt: skip
     return make_grid(np.concatenate(rows), triangles, unit="m")

@@ -365,7 +365,8 @@ def test_workbook_and_csv_hold_the_tables_and_the_sums_are_right(tmp_path: Path)
     made = st.schedule(rich(line_sets=(LineSet("=a,b", RIDGE, np.array([0, 1])),), lines=np.array([(0, 1)])), TUBE)
     st.write_schedules(made, tmp_path / "roof.xlsx")
     places = st.write_schedules(made, tmp_path / "roof.csv")
-    assert places == list(schedule_paths(tmp_path / "roof.csv").values())
+    of_name = schedule_paths(tmp_path / "roof.csv")
+    assert places == [of_name[name] for name in made.named] and set(of_name) == {*made.named, "inner_panels"}
     book = openpyxl.load_workbook(tmp_path / "roof.xlsx")
     assert book.sheetnames == [
         "Nodes", "Drilling", "Members", "Panels", "Node types", "Panel types", "Lengths", "Quantities", "Warnings",
@@ -492,7 +493,9 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
     page = (root / "docs" / "schedules.md").read_text(encoding="utf-8")
     truss = st.Truss.from_grid(fan(1000.0), supports="boundary", loads="self,snow:1kN/m2")
     made, of_structure = st.schedule(fan(1000.0), TUBE), st.schedule(truss, st.ScheduleSettings())
-    for table in (*made.tables, *of_structure.tables):
+    layers = st.Truss.from_grid(fan(1000.0), supports="boundary", loads="self", double_layer=300.0)
+    of_layers = st.schedule(layers, st.ScheduleSettings())
+    for table in (*made.tables, *of_structure.tables, *of_layers.tables):
         assert re.search(rf"^### {table.title}$|^\| {table.title} \|", page, re.MULTILINE)
         for each in table.columns:
             name = re.sub(r"\d$", "1", each.name)
@@ -501,4 +504,4 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
         assert f"`{spec.name}`" in page
     source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
     kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
-    assert len(kinds) == 10 and all(f"| {kind} |" in page for kind in kinds), kinds
+    assert len(kinds) == 11 and all(f"| {kind} |" in page for kind in kinds), kinds

@@ -44,7 +44,9 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     return model.as_grid("a command")
 
 
-def read_grid_or_structure(path: str, merge: float | None, bars: Bars) -> tuple[Grid | Truss, Checked | None]:
+def read_grid_or_structure(
+    path: str, merge: float | None, bars: Bars | None = None
+) -> tuple[Grid | Truss, Checked | None]:
     """Return what a file holds, and of a structure what it says of the checks."""
     from ..structure.json import STRUCTURE_FORMAT, read_checked
 

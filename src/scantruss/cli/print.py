@@ -1,4 +1,4 @@
-"""The command ``scantruss print``: one watertight solid of a saved grid."""
+"""The command ``scantruss print``: watertight solids of a saved grid or structure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import InputError
-from .grids import add_grid, read_saved_grid
+from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
@@ -27,13 +27,15 @@ def print_parser() -> Parser:
     """Options of ``scantruss print``."""
     from .options import Parser, add_outs, number
 
-    usage = "GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
+    usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
     said = (
         "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
         "with sockets for rods."
     )
     parser = Parser("print", usage, said)
-    add_grid(parser, "grid saved as .json by scantruss grid")
+    add_grid(
+        parser, "grid or structure saved as .json by scantruss grid or structure; lengths of a structure are metres"
+    )
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
@@ -68,6 +70,8 @@ def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether, check_place
+    from ..structure.layered import grid_in_metres
+    from ..structure.truss import Truss
 
     outs = [check_place(out, (".3mf", ".stl")) for out in outs_of(values)]
     if not Path(values.grid).exists():
@@ -75,7 +79,8 @@ def print_solid(values: Namespace) -> None:
     taken = {Path(values.grid).resolve(): "grid"}
     for out in outs:
         claim(out, "model", taken, force=values.force)
-    result = read_saved_grid(values.grid, values.merge)
+    what, _ = read_grid_or_structure(values.grid, values.merge)
+    result = grid_in_metres(what) if isinstance(what, Truss) else what
     if values.bed is not None or values.sockets:
         _print_parts(result, outs, values)
         return

@@ -40,10 +40,13 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
     ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
-    ("double_layer", "DEPTH", "a second layer so far below, in metres of the structure or with a unit, and webs between"),
+    ("double_layer", "DEPTH,...", "a second layer so far below, in metres of the structure or with a unit, and webs between; more"
+     " layers with more depths, as in 1.2,0.8"),
     ("second_layer", "dual|same", "of a double layer: nodes under the triangles (default) or under the nodes"),
     ("depth_along", "normal|vertical", "of a double layer: along the smoothed normals (default) or along z"),
     ("held_layer", "outer|inner", "of a double layer: which one the supports hold (default outer, the grid)"),
+    ("layer_edges", "tapered|closed", "of a double layer: how it ends at the boundary (default tapered of the dual, else closed)"),
+    ("sharp_bends", "refuse|reduce", "of a double layer: what is done where the grid bends too sharply for its depth (default refuse)"),
     ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
     ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),

@@ -54,7 +54,7 @@ def _members(grid: Grid) -> Table:
     start, end = grid.edges[:, 0], grid.edges[:, 1]
     columns = _with_unit("start_x start_y start_z end_x end_y end_z length", grid.unit)
     places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
-    boundary = (grid.edge_triangles[:, 1] < 0).astype(int)
+    boundary = (grid.edge_uses == 1).astype(int)
     rows = zip(range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), strict=True)
     return (["id", "start", "end", *columns, "boundary"], rows)
 
@@ -63,7 +63,7 @@ def _nodes(grid: Grid) -> Table:
     """Return the table of nodes: place, members there, whether on a boundary, fixed, distance from the scan, fixed lines and ridges."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
-    boundary[grid.edges[grid.edge_triangles[:, 1] < 0].ravel()] = 1
+    boundary[grid.edges[grid.edge_uses == 1].ravel()] = 1
     header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed"]
     columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
     if grid.deviation is not None:

@@ -20,7 +20,7 @@ from ..scan.cloud import PointCloud
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
-from .model import Model, model_of_grid, model_of_truss
+from .model import Model, members_of, model_of_grid, model_of_truss
 from .style import FileStyle
 
 if TYPE_CHECKING:
@@ -73,12 +73,12 @@ NO_STRUCTURE = "sections, supports, loads or results"
 FORMATS: dict[str, FileFormat] = {
     ".csv": FileFormat(
         "CSV",
-        lambda model, path, style: encode_csv(model.as_grid("CSV"), path, decimal_comma=style.decimal_comma),
+        lambda model, path, style: encode_csv(members_of(model, "CSV"), path, decimal_comma=style.decimal_comma),
         loses_of_structure=NO_STRUCTURE,
     ),
     ".json": FileFormat("JSON", lambda model, path, style: {path: function("json.encode_model")(model)},
                         read=function("json.read_json")),
-    ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(model.as_grid("OBJ"), style.obj)},
+    ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(members_of(model, "OBJ"), style.obj)},
                        draw=function("drawing_files.draw_obj"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
     ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(model.as_grid("PLY"))},
                        draw=function("drawing_files.draw_ply"), loses_of_structure=f"marks, {NO_STRUCTURE}"),

@@ -17,6 +17,7 @@ from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.marks import member_marks, node_marks, numbered, panel_marks
 from ..settings import UNITS
 from ..structure.groups import member_groups_of
+from ..structure.layered import grid_of_layers
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -94,6 +95,19 @@ class Model:
         if self.grid is None:
             raise FormatError(f"{what} holds triangles, and this structure has members without; use another format")
         return self.grid
+
+
+def members_of(model: Model, what: str) -> Grid:
+    """Return the grid of a model with all its members, those of layers too.
+
+    Raises
+    ------
+    FormatError
+        Some members belong neither to a triangle nor to a layer.
+    """
+    if model.truss is not None and model.truss.layers is not None:
+        return grid_of_layers(model.truss)
+    return model.as_grid(what)
 
 
 def model_of_grid(grid: Grid, cloud: PointCloud | None = None) -> Model:

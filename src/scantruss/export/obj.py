@@ -27,12 +27,12 @@ def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
     Parameters
     ----------
     grid : Grid
-    elements : faces for the triangles, lines for the members, or both
+    elements : faces for the triangles, lines for the members, or both; members that are sides of no triangle are always there
     """
     lines = [f"# {line}" for line in header_lines(grid)]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in grid.scan_nodes.tolist()]
     if elements in ("faces", "both"):
         lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
-    if elements in ("lines", "both"):
-        lines += [f"l {a} {b}" for a, b in (grid.edges + 1).tolist()]
+    members = grid.edges if elements in ("lines", "both") else grid.edges[grid.edge_uses == 0]
+    lines += [f"l {a} {b}" for a, b in (members + 1).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")

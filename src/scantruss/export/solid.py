@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
+from ..layouts.layered_grid import LayeredGrid
 from ..runtime.files import check_place, write_files
 from .engraving import engraved
 from .solid_files import Solid, encode_3mf, encode_stl
@@ -185,6 +186,8 @@ def balls_of(
 
 def _normals(grid: Grid) -> np.ndarray:
     """Return the unit normal of each node (V, 3); up where it has none."""
+    if isinstance(grid, LayeredGrid):
+        return grid.own_normals
     a, b, c = grid.nodes[grid.triangles].transpose(1, 0, 2)
     total = np.zeros((len(grid.nodes), 3))
     for corner in grid.triangles.T:

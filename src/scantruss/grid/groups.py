@@ -18,5 +18,5 @@ def member_groups(grid: Grid) -> list[str]:
     on_line = np.flatnonzero(grid.edge_on_line)
     for line in reversed(grid.line_sets):  # the first that holds both nodes stands
         groups[on_line[np.isin(grid.edges[on_line], line.nodes).all(axis=1)]] = line.name
-    groups[grid.edge_triangles[:, 1] < 0] = BOUNDARY
+    groups[grid.edge_uses == 1] = BOUNDARY
     return [str(group) for group in groups]

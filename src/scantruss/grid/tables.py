@@ -75,7 +75,8 @@ class GridTables:
         count = self.edge_uses
         start = np.cumsum(count) - count
         table = np.full((len(edges), 2), -1, np.int64)
-        table[:, 0] = triangle[order[start]]
+        used = count > 0
+        table[used, 0] = triangle[order[start[used]]]
         two = count > 1
         table[two, 1] = triangle[order[start[two] + 1]]
         return table

@@ -1,8 +1,9 @@
-"""Double layers: a second layer under a grid, along its smoothed normals, and the webs between."""
+"""Double layers and more: layers under a grid, along its smoothed normals, and the webs between."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,98 +11,184 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
+from .layer_parts import LAYER_EDGES, SECOND_LAYERS, LayerParts, layer_parts
 
-SECOND_LAYERS = ("dual", "same")  #: nodes under the triangles, or under the nodes
 DEPTH_WAYS = ("normal", "vertical")  #: along which the depth is measured
+BEND_WAYS = ("refuse", "reduce")  #: what is done where the grid bends too sharply for the depth
 TOP, BOTTOM, WEB = "top", "bottom", "web"  #: groups of members
-LEAST_CHORD = (
-    0.25  #: of a chord of the second layer, measured along the first, over the length there; shorter is refused
-)
-LEAST_GAP = 0.5  #: of the distance between both layers, measured along the normal of a triangle, over the depth
+MOST_LAYERS = 9  #: that a grid can have
+LEAST_CHORD = 0.25  #: of a chord of a lower layer, measured along the first, over the length there; shorter is refused
+LEAST_GAP = 0.5  #: of the distance between two layers, measured along the normal of a triangle, over the depth
 CROSSED = 0.01  #: distance of two members that cross, over the mean length of the first layer
 PLACES_NAMED = 4  #: in a refusal
+SHRINKING = 0.8  #: of the depth at a node that is too deep, over that of the round before
+LEAST_DEPTH_SHARE = 0.2  #: of the depth that is asked for, to which it may be reduced
+STEEPEST_SHARE = 0.15  #: by which the share of the depth may change along a member
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Which layer each node lies in, and the panels of the layers under the grid."""
+
+    names: tuple[str, ...]  #: from the grid inwards: top, bottom; of more top, layer 2, ..., bottom
+    depths: tuple[float, ...]  #: asked for, from each layer to the next [unit of the grid; m of a structure]
+    of_nodes: np.ndarray  #: (V + W,) int64 number of the layer of each node
+    share: np.ndarray  #: (V + W,) depth at each node over that asked for; 1 where it is not reduced
+    panels: tuple[np.ndarray, ...]  #: nodes of each panel of the lower layers, anticlockwise seen from outside
 
 
 @dataclass(frozen=True, eq=False)
 class DoubleLayer:
-    """Two layers and their webs; the nodes and members of the grid come first, as they were."""
+    """Two layers or more and their webs; the nodes and members of the grid come first, as they were."""
 
-    nodes: np.ndarray  #: (V + W, 3) of the grid, then of the second layer [unit of the grid]
-    members: np.ndarray  #: (M, 2) int64: top, then bottom, then web
+    nodes: np.ndarray  #: (V + W, 3) of the grid, then of the lower layers [unit of the grid]
+    members: np.ndarray  #: (M, 2) int64: the layers from the top to the bottom, then the webs
     normals: np.ndarray  #: (V + W, 3) smoothed unit normals of the nodes
-    groups: dict[str, np.ndarray]  #: TOP, BOTTOM and WEB: ids of their members
-    under: np.ndarray  #: (V,) int64 the node of the second layer that is nearest to each node of the grid
+    groups: dict[str, np.ndarray]  #: TOP, BOTTOM and WEB, of more layers top, layer 2, ..., web 1, ...: ids of members
+    under: np.ndarray  #: (V,) int64 the node of the last layer that is nearest to each node of the grid
+    layers: Layers
 
 
-def double_layer(grid: Grid, depth: float, *, second: str = "dual", along: str = "normal") -> DoubleLayer:
-    """Return a grid as the outer of two layers, `depth` apart.
+def double_layer(
+    grid: Grid,
+    depth: float | Sequence[float],
+    *,
+    second: str = "dual",
+    along: str = "normal",
+    edges: str = "",
+    bends: str = "refuse",
+) -> DoubleLayer:
+    """Return a grid as the outer of two layers, `depth` apart, or of more.
 
     Parameters
     ----------
     grid : Grid
         Its normals point away from the second layer.
-    depth : float
-        From the nodes of the grid, or the middles of its triangles, to the second layer [unit of the grid].
+    depth : float or sequence of float
+        From the nodes of the grid, or the middles of its triangles, to the second layer; of several from each layer to the next
+        [unit of the grid].
     second : str
         "same": a node under each node, joined by a vertical; each member of the grid has one under it, and a diagonal from its lower
         node on the grid to the node under its higher one. The members cut the space into tetrahedra. "dual": a node under each
-        triangle, joined with its corners and with the nodes under its neighbours; edges are tapered.
+        triangle, joined with its corners and with the nodes under its neighbours; a third layer is under the grid again, and so on.
     along : str
         "normal", along the smoothed normals, or "vertical", along z.
+    edges : str
+        "tapered": both layers meet at the boundary; "closed": by verticals at the boundary; "" is tapered of the dual, else closed.
+        Layers that are the same meet in the nodes of the boundary, but for corners of triangles that have no inner node.
+    bends : str
+        "refuse" a depth that is too much where the grid bends, or "reduce" it there, to a fifth at least.
 
     Raises
     ------
     InputError
-        The grid is no oriented manifold, the depth is not positive, or the grid bends more sharply than it allows: the places are named.
+        The grid is no oriented manifold, a depth is not positive, or the grid bends more sharply than it allows: the places are named.
     """
-    for value, known, what in ((second, SECOND_LAYERS, "second layer"), (along, DEPTH_WAYS, "way of the depth")):
+    for value, known, what in (
+        (second, SECOND_LAYERS, "second layer"),
+        (along, DEPTH_WAYS, "way of the depth"),
+        (edges or LAYER_EDGES[0], LAYER_EDGES, "edges of the layers"),
+        (bends, BEND_WAYS, "way with sharp bends"),
+    ):
         if value not in known:
             raise InputError(f"the {what} must be {' or '.join(known)}, got {value!r}")
-    if not (0 < depth < math.inf):
-        raise InputError(f"the depth of a double layer must be positive, got {depth!r}")
+    depths = tuple(float(each) for each in depth) if isinstance(depth, Sequence) else (float(depth),)
+    for each in depths:
+        if not (0 < each < math.inf):
+            raise InputError(f"the depth of a double layer must be positive, got {each!r}")
+    if not 1 <= len(depths) < MOST_LAYERS:
+        raise InputError(f"a grid can have 2 to {MOST_LAYERS} layers, got {len(depths)} depths")
     if len(grid.triangles) == 0 or not (grid.topology.manifold and grid.topology.orientable):
         raise InputError("a double layer needs a manifold, oriented grid with triangles")
-    triangles, count = grid.triangles, len(grid.nodes)
     normals = smoothed_normals(grid)
-    down = -normals if along == "normal" else np.tile([0.0, 0.0, -1.0], (count, 1))
-    areas = np.cross(*(grid.nodes[triangles[:, k]] - grid.nodes[triangles[:, 0]] for k in (1, 2)))
-    level = -(down[triangles].mean(axis=1) * areas).sum(axis=1) / np.linalg.norm(areas, axis=1)
-    _refuse(grid, triangles[level < LEAST_GAP].ravel(), depth, f"both layers are less than {LEAST_GAP:g} of it apart")
-    if second == "same":
-        below = grid.nodes + depth * down
-        over, chords = np.arange(count), grid.edges
-        heights = np.lexsort((np.arange(count), grid.nodes[:, 2]))
-        rank = np.empty(count, np.int64)
-        rank[heights] = np.arange(count)
-        lower = rank[grid.edges].argmin(axis=1)
-        rows = np.arange(len(chords))
-        diagonals = np.stack([grid.edges[rows, lower], grid.edges[rows, 1 - lower] + count], axis=1)
-        webs = np.concatenate([np.stack([over, over + count], axis=1)[np.isin(over, triangles)], diagonals])
-        first, below_normals = grid.nodes, normals
-    else:
-        first, below_normals = grid.nodes[triangles].mean(axis=1), _unit(normals[triangles].mean(axis=1))
-        below = first + depth * _unit(down[triangles].mean(axis=1))
-        chords = grid.edge_triangles[grid.edge_triangles[:, 1] >= 0]
-        webs = np.stack([triangles.ravel(), np.repeat(np.arange(len(triangles)), 3) + count], axis=1)
-    step, under_step = (places[chords[:, 1]] - places[chords[:, 0]] for places in (first, below))
-    turned = (step * under_step).sum(axis=1) < LEAST_CHORD * (step**2).sum(axis=1)
-    at = chords[turned] if second == "same" else triangles[chords[turned]]
-    _refuse(grid, at.ravel(), depth, "the second layer would fold")
-    nodes = np.concatenate([grid.nodes, below])
-    members = np.concatenate([grid.edges, chords + count, webs])
+    down = -normals if along == "normal" else np.tile([0.0, 0.0, -1.0], (len(grid.nodes), 1))
+    _check_gap(grid, down, sum(depths))
+    parts = layer_parts(grid, len(depths) + 1, second, edges or ("tapered" if second == "dual" else "closed"))
+    share = np.ones(len(grid.nodes))
+    while True:  # each turn lowers the share of a node to SHRINKING times it; ends below LEAST_DEPTH_SHARE
+        nodes, shares = _places(parts, grid, down, depths, share)
+        found = _too_deep(parts, grid, nodes)
+        if found is None:
+            break
+        at, why = found
+        lower = _eased(grid, np.where(np.isin(np.arange(len(share)), at), SHRINKING * share, share))
+        if bends == "refuse" or lower.min() < LEAST_DEPTH_SHARE:
+            _refuse(grid, at, sum(depths), why, share)
+        share = lower
+    return _named(parts, nodes, shares, normals, depths)
+
+
+def _named(
+    parts: LayerParts, nodes: np.ndarray, shares: np.ndarray, normals: np.ndarray, depths: tuple[float, ...]
+) -> DoubleLayer:
+    """Return the layers with the names of their members and nodes."""
+    count = len(depths) + 1
+    names = [TOP, *(f"layer {number}" for number in range(2, count)), BOTTOM]
+    webs = [WEB] if count == 2 else [f"{WEB} {number}" for number in range(1, count)]
+    starts = np.cumsum([0, *map(len, parts.chords), *map(len, parts.webs)]).tolist()
+    groups = {name: np.arange(*starts[k : k + 2]) for k, name in enumerate([*names, *webs])}
+    below = _unit(normals[parts.owners].mean(axis=1))
+    below[: len(normals)] = normals
+    return DoubleLayer(
+        nodes=nodes,
+        members=np.concatenate([*parts.chords, *parts.webs]),
+        normals=below,
+        groups=groups,
+        under=parts.under,
+        layers=Layers(tuple(names), depths, parts.layer, shares, parts.panels),
+    )
+
+
+def _places(
+    parts: LayerParts, grid: Grid, down: np.ndarray, depths: tuple[float, ...], share: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of all layers, and which share of the depth each has."""
+    depth = np.cumsum([0.0, *depths])[parts.layer]
+    shares = np.where(parts.layer > 0, share[parts.owners].mean(axis=1), 1.0)
+    way = _unit(down[parts.owners].mean(axis=1))
+    alone = (parts.owners == parts.owners[:, :1]).all(axis=1)
+    base = np.where(alone[:, None], grid.nodes[parts.owners[:, 0]], grid.nodes[parts.owners].mean(axis=1))
+    way[alone] = down[parts.owners[alone, 0]]
+    return base + (depth * shares)[:, None] * way, shares
+
+
+def _too_deep(parts: LayerParts, grid: Grid, nodes: np.ndarray) -> tuple[np.ndarray, str] | None:
+    """Return the nodes of the grid where it bends too sharply for the depth, and what would happen; None where it does not."""
+    base = grid.nodes[parts.owners].mean(axis=1)
+    turned = []
+    for chords in parts.chords[1:]:
+        step, under_step = (places[chords[:, 1]] - places[chords[:, 0]] for places in (base, nodes))
+        turned.append(chords[(step * under_step).sum(axis=1) < LEAST_CHORD * (step**2).sum(axis=1)])
+    if len(at := np.concatenate(turned)):
+        return np.unique(parts.owners[at]), "the second layer would fold" if len(turned) == 1 else "a layer would fold"
+    members = np.concatenate([*parts.chords, *parts.webs])
     from .clearance import close_pairs
 
     pairs, _ = close_pairs(nodes, members, CROSSED * float(grid.lengths.mean()))
-    ends = members[pairs].ravel()
-    _refuse(grid, ends[ends < count], depth, "members of both layers would cross")
-    starts = np.cumsum([0, len(grid.edges), len(chords), len(webs)]).tolist()
-    return DoubleLayer(
-        nodes=nodes,
-        members=members,
-        normals=np.concatenate([normals, below_normals]),
-        groups={name: np.arange(*starts[k : k + 2]) for k, name in enumerate((TOP, BOTTOM, WEB))},
-        under=_under(grid, first, second) + count,
-    )
+    if len(pairs):
+        ends = members[pairs].ravel()
+        own = ends[ends < len(grid.nodes)]
+        return np.unique(own if len(own) else parts.owners[ends]), "members of both layers would cross"
+    return None
+
+
+def _check_gap(grid: Grid, down: np.ndarray, depth: float) -> None:
+    """Refuse a depth along directions that hardly leave the grid; less of it would be no better."""
+    triangles = grid.triangles
+    areas = np.cross(*(grid.nodes[triangles[:, k]] - grid.nodes[triangles[:, 0]] for k in (1, 2)))
+    level = -(down[triangles].mean(axis=1) * areas).sum(axis=1) / np.linalg.norm(areas, axis=1)
+    if (at := np.unique(triangles[level < LEAST_GAP])).size:
+        _refuse(grid, at, depth, f"both layers are less than {LEAST_GAP:g} of it apart", np.ones(len(grid.nodes)))
+
+
+def _eased(grid: Grid, share: np.ndarray) -> np.ndarray:
+    """Return shares of the depth that change along no member by more than STEEPEST_SHARE, none of them greater."""
+    share = share.copy()
+    one, two = grid.edges.T
+    for _ in range(math.ceil(1 / STEEPEST_SHARE)):  # farther no share can be lower by so much
+        np.minimum.at(share, one, share[two] + STEEPEST_SHARE)
+        np.minimum.at(share, two, share[one] + STEEPEST_SHARE)
+    return share
 
 
 def smoothed_normals(grid: Grid) -> np.ndarray:
@@ -119,33 +206,17 @@ def smoothed_normals(grid: Grid) -> np.ndarray:
     return _unit(at + smooth / np.maximum(neighbors, 1.0))
 
 
-def _under(grid: Grid, first: np.ndarray, second: str) -> np.ndarray:
-    """Return (V,) the node of the second layer under each node: its own, or that of the triangle whose middle is nearest."""
-    count = len(grid.nodes)
-    if second == "same":
-        return np.arange(count)
-    node, triangle = grid.triangles.ravel(), np.repeat(np.arange(len(grid.triangles)), 3)
-    apart = np.linalg.norm(grid.nodes[node] - first[triangle], axis=1)
-    order = np.lexsort((triangle, apart, node))
-    found, begin = np.unique(node[order], return_index=True)
-    under = np.zeros(count, np.int64)
-    under[found] = triangle[order[begin]]
-    return under
-
-
-def _refuse(grid: Grid, nodes: np.ndarray, depth: float, why: str) -> None:
-    """Refuse a depth that the places at some nodes do not allow, if there are any."""
-    if len(nodes) == 0:
-        return
-    found = np.unique(nodes)
+def _refuse(grid: Grid, nodes: np.ndarray, depth: float, why: str, share: np.ndarray) -> None:
+    """Refuse a depth that the places at some nodes do not allow."""
     marks = node_marks(grid)
     named = "; ".join(
-        f"{marks[node]} ({', '.join(f'{c:.5g}' for c in grid.scan_nodes[node])})" for node in found[:PLACES_NAMED]
+        f"{marks[node]} ({', '.join(f'{c:.5g}' for c in grid.scan_nodes[node])})" for node in nodes[:PLACES_NAMED]
     )
-    more = f" and {len(found) - PLACES_NAMED:,} more" if len(found) > PLACES_NAMED else ""
+    more = f" and {len(nodes) - PLACES_NAMED:,} more" if len(nodes) > PLACES_NAMED else ""
+    unit = f" {grid.unit}" if grid.unit else ""
+    reduced = f", even reduced to {depth * share.min():.3g}{unit} there," if share.min() < 1 else ""
     raise InputError(
-        f"a depth of {depth:.4g}{' ' + grid.unit if grid.unit else ''} is too much where the grid bends: {why} at {named}{more};"
-        " use a smaller depth"
+        f"a depth of {depth:.4g}{unit}{reduced} is too much where the grid bends: {why} at {named}{more}; use a smaller depth"
     )
 
 

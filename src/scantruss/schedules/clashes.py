@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..layouts.clearance import close_pairs
 from ..scan.clean.nearby import Nearby
 from .bolts import PITCHES, tension_resistance
 from .records import Schedule, Value, column
@@ -26,6 +27,7 @@ def warnings_table(parts: Parts) -> Schedule:
         *_small_angles(parts),
         *_clashes(parts),
         *_touching_balls(parts),
+        *_crossing(parts),
         *_folds(parts),
         *_of_structure(parts),
     ]
@@ -116,6 +118,19 @@ def _touching_balls(parts: Parts) -> list[WarningRow]:
     ]  # fmt: skip
 
 
+def _crossing(parts: Parts) -> list[WarningRow]:
+    """Members of layers without a common node that come closer than their diameters."""
+    if parts.joints.one_layer:
+        return []
+    width = parts.stock.width
+    pairs, apart = close_pairs(parts.grid.nodes * parts.size, parts.grid.edges, width / 2.0)
+    return [
+        ("members closer than their diameters", parts.member_marks[a], parts.member_marks[b], distance, least, "mm",
+         *parts.grid.scan_nodes[parts.grid.edges[[a, b]]].mean(axis=(0, 1)).tolist())
+        for (a, b), distance, least in zip(pairs.tolist(), apart.tolist(), width[pairs].mean(axis=1).tolist(), strict=True)
+    ]  # fmt: skip
+
+
 def _folds(parts: Parts) -> list[WarningRow]:
     """Sharp folds between panels."""
     fold = np.minimum(parts.fold, 360.0 - parts.fold)
@@ -143,7 +158,10 @@ def _of_structure(parts: Parts) -> list[WarningRow]:
     if parts.bolt is not None:
         most = tension_resistance(max(PITCHES), parts.settings.bolts) / 1000.0
         found.append(("no bolt carries the tension", forces.high / 1000.0, most, "kN", parts.bolt == 0))
-        if (moment := float(forces.moment.max()) / 1000.0) > NO_MOMENT * max(1.0, float(forces.high.max()) / 1000.0):
+        moment = (
+            0.0 if forces.truss.pinned else float(forces.moment.max()) / 1000.0
+        )  # hinges leave moments between nodes only
+        if moment > NO_MOMENT * max(1.0, float(forces.high.max()) / 1000.0):
             at = parts.member_marks[int(forces.moment.argmax())]
             rows.append(
                 ("bolts are chosen for tension and carry no moments", at, None, moment, 0.0, "kNm", None, None, None)

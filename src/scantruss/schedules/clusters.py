@@ -122,6 +122,25 @@ def cluster_panels(sides: np.ndarray, tolerance: float) -> Clusters:
     return _cluster(keys, tolerance, misfits, len(sides), np.arange(len(sides)))
 
 
+def cluster_polygons(polygons: list[np.ndarray], tolerance: float) -> Clusters:
+    """Return the types of polygons (K, 3) by the distances of all their corners, anticlockwise, wherever one begins."""
+    apart = [np.linalg.norm(each[:, None] - each, axis=2) for each in polygons]
+
+    def misfits(item: int, others: np.ndarray) -> np.ndarray:
+        count = len(apart[item])
+        turned = np.stack([np.roll(apart[item], (-k, -k), axis=(0, 1)) for k in range(count)])
+        return np.array([np.abs(turned - apart[other]).max(axis=(1, 2)).min() for other in others.tolist()])
+
+    most = max((len(each) for each in polygons), default=3)
+    ranked = np.zeros((len(polygons), most * (most - 1) // 2))
+    for row, each in zip(ranked, apart, strict=True):
+        values = np.sort(each[np.triu_indices(len(each), 1)])
+        row[: len(values)] = values
+    counts = np.array([len(each) for each in polygons])
+    keys = np.column_stack([counts, ranked[:, 0], ranked.max(axis=1, initial=0.0), ranked[:, 1:]])
+    return _cluster(keys, tolerance, misfits, len(polygons), np.arange(len(polygons)))
+
+
 def cluster_nodes(joints: Joints, tolerance: float) -> Clusters:
     """Return the types of nodes by the directions of their members in the frame of the ball, turned about the normal [degree], and bolts.
 
@@ -141,12 +160,56 @@ def cluster_nodes(joints: Joints, tolerance: float) -> Clusters:
     ):  # half an angle: two holes may be off
         table[joints.node, place] = values[np.lexsort((values, joints.node))]
     tilts, angles = ranked[:, used]
+    if not joints.one_layer:
+        angles = _pair_angles(joints)[used]
     keys = np.column_stack([valence, tilts.sum(axis=1) / valence, angles[:, 0], angles.max(axis=1), angles, tilts])
     return _cluster(keys, tolerance, misfits, len(joints.valence), used)
 
 
+def _pair_angles(joints: Joints) -> np.ndarray:
+    """Return half the angles between any two members of each node (V, K), rising, filled up with nil."""
+    node = joints.node[joints.pairs[:, 0]]
+    order = np.lexsort((joints.angle, node))
+    counts = np.bincount(node, minlength=len(joints.valence))
+    table = np.zeros((len(counts), int(counts.max())))
+    table[node[order], np.arange(len(node)) - np.repeat(np.cumsum(counts) - counts, counts)] = joints.angle[order] / 2.0
+    return table
+
+
 def _misfits(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
-    """Return the misfit (C, v) of a node to C others of v members, for each of its members put into their first hole [degree]."""
+    """Return the misfit (C, v) of a node to C others of v members, for v ways to put its members into their holes [degree]."""
+    return _around(joints, item, others) if joints.one_layer else _nearest(joints, item, others)[0]
+
+
+def _nearest(joints: Joints, item: int, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the misfit (C, v) of a node to C others [degree], and the hole (C, v, v) that each of its members is put into.
+
+    Its member most across the normal is turned to each of theirs, every member takes the nearest hole, and the ball is turned to where
+    the sum of squares across the normal is least. Where two members take one hole the misfit is 180.
+    """
+    count = int(joints.valence[item])
+    mine = joints.own[joints.start[item] : joints.start[item + 1]]
+    holes = joints.start[others][:, None] + np.arange(count)
+    theirs = joints.own[holes]  # (C, v, 3)
+    flat, their_flat = mine[:, 0] + 1j * mine[:, 1], theirs[..., 0] + 1j * theirs[..., 1]
+    first = np.conj(flat[np.abs(flat).argmax()])
+    turned = flat * np.exp(1j * np.angle(first * their_flat))[..., None]  # (C, v, v)
+    across = np.abs(turned[..., None] - their_flat[:, None, None, :])
+    hole = np.hypot(across, mine[:, 2, None] - theirs[:, None, None, :, 2]).argmin(axis=-1)  # (C, v, v)
+    taken = np.take_along_axis(their_flat[:, None, :], hole, axis=2)
+    turn = np.angle((np.conj(flat) * taken).sum(axis=-1))
+    height = np.take_along_axis(theirs[:, None, :, 2], hole, axis=2)
+    chord = np.hypot(np.abs(flat * np.exp(1j * turn)[..., None] - taken), mine[:, 2] - height)
+    bolts = joints.bolt[joints.start[item] + np.arange(count)]
+    chord[np.take_along_axis(joints.bolt[holes][:, None, :], hole, axis=2) != bolts] = (
+        2.0  # another thread is another ball
+    )
+    chord[(np.sort(hole, axis=-1) != np.arange(count)).any(axis=-1)] = 2.0
+    return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1), hole
+
+
+def _around(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
+    """Return the misfit (C, v) of a node to C others, for each of its members put into their first hole, the others following [degree]."""
     mine = joints.own[joints.start[item] : joints.start[item + 1]]
     count = len(mine)
     turned = mine[(np.arange(count)[:, None] + np.arange(count)) % count]  # (v, v, 3)
@@ -166,6 +229,11 @@ def holes_of_types(joints: Joints, types: Clusters) -> np.ndarray:
     holes = np.empty(len(joints.node), np.int64)
     for item in np.flatnonzero(types.of >= 0).tolist():
         begin, end = joints.start[item], joints.start[item + 1]
-        misfit = _misfits(joints, item, types.representative[types.of[item]][None])
+        one = types.representative[types.of[item]][None]
+        if not joints.one_layer:
+            misfit, hole = _nearest(joints, item, one)
+            holes[begin:end] = hole[0, int(np.argmin(misfit[0]))]
+            continue
+        misfit = _around(joints, item, one)
         holes[begin:end] = (np.arange(end - begin) - int(np.argmin(misfit[0]))) % (end - begin)
     return holes

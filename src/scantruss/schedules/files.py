@@ -62,7 +62,8 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
                 f"cannot write {path}: a sheet holds {MOST_ROWS:,} rows and {rows:,} are needed; write .csv"
             )
         return write_files({path: encode_xlsx(schedules)})
-    tables: dict[Path, Schedule] = {place: getattr(schedules, name) for name, place in schedule_paths(path).items()}
+    places = schedule_paths(path)
+    tables: dict[Path, Schedule] = {places[name]: table for name, table in schedules.named.items()}
     return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
 
 

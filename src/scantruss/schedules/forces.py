@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
+from ..structure.layered import grid_of_layers, grid_of_triangles
 from ..structure.report import report_structure
 from ..structure.statics import solve
 
@@ -57,21 +58,18 @@ def grid_of_structure(truss: Truss) -> tuple[Grid, np.ndarray]:
     Raises
     ------
     InputError
-        Its members are not the sides of its triangles.
+        Its members are neither the sides of its triangles nor those of layers.
     """
-    grid = Grid(
-        nodes=truss.nodes / truss.scale,
-        triangles=truss.triangles,
-        fixed=np.zeros(len(truss.nodes), bool),
-        origin=truss.origin / truss.scale,
-        unit="m",
-    )
+    if truss.layers is not None:
+        return grid_of_layers(truss, truss.scale), np.arange(len(truss.members))
+    grid = grid_of_triangles(truss, truss.scale)
     count = len(truss.nodes)
     theirs, mine = np.sort(truss.members, axis=1) @ [count, 1], grid.edges @ [count, 1]
     order = np.argsort(theirs, kind="stable")
     if not np.array_equal(theirs[order], mine):
+        old = "; this one of two layers is of an earlier version, make it again" if truss.member_sets else ""
         raise InputError(
-            "the members of the structure are not the sides of its panels; schedules need a structure made of a grid"
+            f"the members of the structure are not the sides of its panels; schedules need a structure made of a grid{old}"
         )
     return grid, order
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, panel_marks
+from ..layouts.layered_grid import LayeredGrid
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -39,6 +40,7 @@ class Joints:
     pairs: np.ndarray  #: (K, 2) any two ends of one node
     angle: np.ndarray  #: (K,) angle between them in space [degree]
     bolt: np.ndarray  #: (2 E,) diameter of its bolt, 0 where there is none [mm]
+    one_layer: bool  #: whether all members lie about the tangent plane, so that their order about the normal is certain
 
     @property
     def valence(self) -> np.ndarray:
@@ -52,11 +54,13 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def node_normals(grid: Grid) -> np.ndarray:
-    """Return the unit normal of each node (V, 3), NaN where there is no triangle.
+    """Return the unit normal of each node (V, 3), NaN where there is no triangle; of layers those of the surface.
 
     The mean of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich, Computing vertex normals from
     polygonal facets, Journal of Graphics Tools 3(1), 1998): it does not depend on how the surface is cut into triangles.
     """
+    if isinstance(grid, LayeredGrid):
+        return grid.own_normals
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
     with np.errstate(invalid="ignore"):  # NaN for a node without triangles
@@ -141,6 +145,7 @@ def find_joints(grid: Grid) -> Joints:
         pairs=pairs,
         angle=angle,
         bolt=np.zeros(len(node), np.int64),
+        one_layer=not isinstance(grid, LayeredGrid),
     )
 
 

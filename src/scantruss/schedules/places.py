@@ -44,7 +44,7 @@ def building_places(grid: Grid, settings: BuildingFrame) -> np.ndarray:
 def boundary_nodes(grid: Grid) -> np.ndarray:
     """(V,) bool, the nodes on the boundary."""
     found = np.zeros(len(grid.nodes), bool)
-    found[grid.edges[grid.edge_triangles[:, 1] < 0]] = True
+    found[grid.edges[grid.edge_uses == 1]] = True
     return found
 
 

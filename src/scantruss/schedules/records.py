@@ -94,8 +94,15 @@ class Schedules:
     lengths: Schedule  #: types of members by their cut length
     quantities: Schedule
     warnings: Schedule
+    inner_panels: Schedule | None = None  #: of the layers under the grid, where there are any
+
+    @property
+    def named(self) -> dict[str, Schedule]:
+        """All tables by name."""
+        found = {spec.name: getattr(self, spec.name) for spec in fields(self)}
+        return {name: table for name, table in found.items() if table is not None}
 
     @property
     def tables(self) -> list[Schedule]:
         """All tables in the order of the sheets of a workbook."""
-        return [getattr(self, spec.name) for spec in fields(self)]
+        return list(self.named.values())

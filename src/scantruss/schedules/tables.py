@@ -13,6 +13,7 @@ from ..grid.marks import numbered
 from .bolts import bolt_mark
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
+from .inner_panels import inner_panels, layer_column, layered_grid
 from .joints import angle_between
 from .places import boundary_nodes, building_places, into_building, rings
 from .records import Column, Schedule, Schedules, Value, column
@@ -21,13 +22,14 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 DEGREE = "degree"
+LEAST_ACROSS = 1e-6  # of a normal across its member, below which nothing tells the twist
 ENOUGH = 1000  # more than any bolt: stands for one that no bolt is large enough for
 
 
 def all_tables(parts: Parts) -> Schedules:
     """Return all schedules."""
     ring = rings(parts.grid, building_places(parts.grid, parts.settings)[:, 2])
-    groups = member_groups(parts.grid)
+    groups = list(layered.own_groups) if (layered := layered_grid(parts)) else member_groups(parts.grid)
     ball, member = _ball_masses(parts), _member_masses(parts)
     return Schedules(
         nodes=_nodes(parts, ring, ball),
@@ -39,6 +41,7 @@ def all_tables(parts: Parts) -> Schedules:
         lengths=_lengths(parts),
         quantities=_quantities(parts, groups, ball, member),
         warnings=warnings_table(parts),
+        inner_panels=inner_panels(parts) if layered else None,
     )
 
 
@@ -127,6 +130,7 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
             column("node", "", _of(parts.node_marks, used)),
             column("node type", "", _of(_type_marks("NT", parts.node_types), parts.node_types.of[used])),
             column("ring", "", ring[used]),
+            *layer_column(parts, used),
             *_xyz("scan", parts.unit, parts.grid.scan_nodes[used]),
             *_xyz("", "mm", building_places(parts.grid, parts.settings)[used] * parts.size),
             column("valence", "", joints.valence[used]),
@@ -169,7 +173,7 @@ def end_angles(parts: Parts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return of each member the angles to the normals of its start and end, towards the other node, and the twist (E,) [degree].
 
     The twist is the angle by which the normal of the start must be turned about the member, right-handed from start to end, to lie in one
-    plane with that of the end.
+    plane with that of the end; NaN of a member along a normal.
     """
     nodes, edges = parts.grid.nodes, parts.grid.edges
     axis = nodes[edges[:, 1]] - nodes[edges[:, 0]]
@@ -177,6 +181,7 @@ def end_angles(parts: Parts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     first, second = parts.joints.normal[edges[:, 0]], parts.joints.normal[edges[:, 1]]
     flat = [normal - (normal * axis).sum(axis=1, keepdims=True) * axis for normal in (first, second)]
     twist = np.degrees(np.arctan2((np.cross(*flat) * axis).sum(axis=1), (flat[0] * flat[1]).sum(axis=1)))
+    twist[np.minimum(*(np.linalg.norm(each, axis=1) for each in flat)) < LEAST_ACROSS] = np.nan
     return angle_between(first, axis), angle_between(second, -axis), twist
 
 
@@ -292,7 +297,9 @@ def _quantities(parts: Parts, groups: list[str], ball: np.ndarray | None, member
         if chosen.any():
             rows.append(("nodes", group, int(chosen.sum()), None, None, None, total(ball, chosen)))
     if parts.forces is not None:
-        groups = parts.forces.sections
+        layered = layered_grid(parts) is not None
+        names_of = zip(groups, parts.forces.sections, strict=True)
+        groups = [f"{group} {section}" if layered else section for group, section in names_of]
     of_member = np.array(groups)
     names = dict.fromkeys(groups)
     for group in [*(name for name in (BOUNDARY, INNER) if name in names), *sorted(names.keys() - {BOUNDARY, INNER})]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
+from ..layouts.layered_grid import LayeredGrid
 from .settings import MOST_SECTIONS, Cut, SetoutSettings
 
 AT_NODE = 1e-9  # share of a member within which a section meets its node
@@ -48,7 +49,7 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
     off = places[:, axis] - plane[1]
     side = off >= 0
     start, end = grid.edges.T
-    cut = np.flatnonzero(side[start] != side[end])
+    cut = np.flatnonzero((side[start] != side[end]) & _set_out(grid))
     share = off[start[cut]] / (off[start[cut]] - off[end[cut]])
     node = np.where(share < AT_NODE, start[cut], np.where(share > 1 - AT_NODE, end[cut], -1))
     points = places[start[cut]] + share[:, None] * (places[end[cut]] - places[start[cut]])
@@ -64,7 +65,28 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
         first[rank] = number < 0 or number not in seen
         seen.add(number)
     order = order[first]
-    return SectionLine(name, axis, plane[1], cut[order], node[order], points[order], points[crossed])
+    segments = np.concatenate([points[crossed], _inner_segments(grid, places, axis, plane[1])])
+    return SectionLine(name, axis, plane[1], cut[order], node[order], points[order], segments)
+
+
+def _set_out(grid: Grid) -> np.ndarray:
+    """Return of which members (E,) the heights are told: all but webs."""
+    return grid.is_chord() if isinstance(grid, LayeredGrid) else np.ones(len(grid.edges), bool)
+
+
+def _inner_segments(grid: Grid, places: np.ndarray, axis: int, place: float) -> np.ndarray:
+    """Return the segments (S, 2, 3) in which a plane cuts the panels of lower layers."""
+    found = [np.zeros((0, 2, 3))]
+    panels = grid.layers.panels if isinstance(grid, LayeredGrid) and grid.layers is not None else ()
+    for panel in panels:
+        corners = places[panel]
+        off, following = corners[:, axis] - place, np.roll(corners, -1, axis=0)
+        beyond = following[:, axis] - place
+        cut = np.flatnonzero((off >= 0) != (beyond >= 0))
+        if len(cut) == 2:
+            share = (off[cut] / (off[cut] - beyond[cut]))[:, None]
+            found.append((corners[cut] + share * (following[cut] - corners[cut]))[None])
+    return np.concatenate(found)
 
 
 def unroll(grid: Grid, places: np.ndarray) -> list[Unrolled]:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..layouts.layered_grid import LayeredGrid
+
 if TYPE_CHECKING:
     from .make import SettingOut
 
@@ -54,25 +56,34 @@ class Sheet:
 
 
 def make_sheets(made: SettingOut) -> list[Sheet]:
-    """Return the plan, a sheet for each section and one for each boundary."""
+    """Return the plan, of layers one of each and of the webs between, a sheet for each section and one for each boundary."""
     flat = made.places[:, :2]
     spans = np.linalg.norm(np.diff(flat[made.grid.edges], axis=1)[:, 0], axis=1)
     height = WORD * float(np.median(spans))
     return [
-        _plan(made, height),
+        *(_plan(made, height, title, members) for title, members in _plans(made)),
         *(_section(made, number, height) for number in range(len(made.section_lines))),
         *(_unrolled(made, number, height) for number in range(len(made.boundaries))),
     ]
 
 
-def _plan(made: SettingOut, height: float) -> Sheet:
-    flat, edges = made.places[:, :2], made.grid.edges
-    on_boundary = made.grid.edge_triangles[:, 1] < 0
+def _plans(made: SettingOut) -> list[tuple[str, np.ndarray]]:
+    """Return the titles of the plans and their members."""
+    if not isinstance(made.grid, LayeredGrid):
+        return [("Plan", np.arange(len(made.grid.edges)))]
+    groups = np.array(made.grid.own_groups)
+    return [(f"Plan, {name}", np.flatnonzero(groups == name)) for name in dict.fromkeys(made.grid.own_groups)]
+
+
+def _plan(made: SettingOut, height: float, title: str, members: np.ndarray) -> Sheet:
+    flat, edges = made.places[:, :2], made.grid.edges[members]
+    on_boundary = (made.grid.edge_uses == 1)[members]
     lines = [
         (BOUNDARY_LINES if outer else MEMBER_LINES, flat[edge])
         for edge, outer in zip(edges, on_boundary.tolist(), strict=True)
     ]
-    lines += [(SUPPORT_MARKS, _diamond(flat[node], height)) for node in np.flatnonzero(made.held.any(axis=1))]
+    held = np.intersect1d(np.flatnonzero(made.held.any(axis=1)), edges)
+    lines += [(SUPPORT_MARKS, _diamond(flat[node], height)) for node in held]
     low, high = flat[np.unique(edges)].min(axis=0) - 3 * height, flat[np.unique(edges)].max(axis=0) + 3 * height
     words = []
     for section in made.section_lines:
@@ -85,11 +96,11 @@ def _plan(made: SettingOut, height: float) -> Sheet:
         Words(NODE_MARKS, made.node_marks[k], (x, y + 0.9 * height))
         for k, (x, y) in zip(used.tolist(), flat[used].tolist(), strict=True)
     ]
-    for mark, (a, b) in zip(made.member_marks, flat[edges], strict=True):
+    for mark, (a, b) in zip([made.member_marks[k] for k in members.tolist()], flat[edges], strict=True):
         x, y = ((a + b) / 2).tolist()
         angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
         words.append(Words(MEMBER_MARKS, mark, (x, y), (angle + 90.0) % 180.0 - 90.0))
-    return Sheet("Plan", lines, words, height)
+    return Sheet(title, _with_room(lines, height), words, height)
 
 
 def _section(made: SettingOut, number: int, height: float) -> Sheet:
@@ -136,7 +147,7 @@ def _unrolled(made: SettingOut, number: int, height: float) -> Sheet:
 
 
 def _with_room(lines: list[tuple[str, np.ndarray]], height: float) -> list[tuple[str, np.ndarray]]:
-    """Return lines of which none has no length: heights of nodes on the ground."""
+    """Return lines of which none has no length: heights of nodes on the ground, members that stand upright."""
     return [(layer, line) for layer, line in lines if np.ptp(line, axis=0).max() > 1e-3 * height]
 
 

@@ -36,10 +36,12 @@ def truss_of_grid(
     joints: str | float,
     node_allowance: float,
     combinations: Sequence[Combination] | None,
-    double_layer: str | float,
+    double_layer: str | float | Sequence[float],
     second_layer: str,
     depth_along: str,
     held_layer: str,
+    layer_edges: str,
+    sharp_bends: str,
 ) -> Truss:
     """Return the structure of a grid; see `Truss.from_grid`."""
     if grid.unit and unit and unit != grid.unit:
@@ -84,9 +86,10 @@ def truss_of_grid(
     )
     held = support_nodes(truss, supports)
     if layered:
-        depth = quantity(double_layer, LENGTH, "the depth of a double layer", plain=True)
         outer = grid.replace(nodes=nodes, triangles=triangles, origin=truss.origin, unit="m")
-        layers = make_double_layer(outer, depth, second=second_layer, along=depth_along)
+        layers = make_double_layer(
+            outer, _depths(double_layer), second=second_layer, along=depth_along, edges=layer_edges, bends=sharp_bends
+        )
         truss = _with_layers(truss, layers)
         held = layers.under[held] if held_layer == "inner" else held
     truss = truss.replace(supports=support_stiffness(len(truss.nodes), held, support_type))
@@ -111,9 +114,16 @@ def _with_layers(truss: Truss, layers: DoubleLayer) -> Truss:
         supports=np.zeros((count, 6)),
         end_stiffness=np.full((members, 2, 2), spring),
         member_sets=layers.groups,
+        layers=layers.layers,
         node_marks=tuple(numbered("N", count, 3)),
         member_marks=tuple(numbered("M", members, 4)),
     )
+
+
+def _depths(words: str | float | Sequence[float]) -> list[float]:
+    """Return the depths of layers such as "0.8m" or "1.2,800mm", or in metres [m]."""
+    each = words.split(",") if isinstance(words, str) else words if isinstance(words, Sequence) else [words]
+    return [quantity(word, LENGTH, "the depth of a double layer", plain=True) for word in each]
 
 
 def scale_of(unit: str, scale: float) -> float:

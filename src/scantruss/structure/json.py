@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
+from ..layouts.double_layer import Layers
 from ..runtime.ours import MARK
 from .catalogue import Material, Section
 from .report import StructureReport
@@ -48,6 +49,7 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         "member_marks": list(truss.member_marks),
         "node_sets": truss.node_sets,
         **({"member_sets": truss.member_sets} if truss.member_sets else {}),
+        **({"layers": vars(truss.layers)} if truss.layers else {}),
         **{name: getattr(truss, name) for name in _ARRAYS},
         "end_stiffness": truss.end_stiffness.reshape(-1, 4),
         "cases": [vars(case) for case in truss.cases],
@@ -178,7 +180,20 @@ def _truss_of(values: dict[str, Any]) -> Truss:
         node_marks=marks[0],
         member_marks=marks[1],
         scale=float(values["scale"]),
+        layers=_layers(values["layers"], count) if values.get("layers") else None,
     )
+
+
+def _layers(values: dict[str, Any], count: int) -> Layers:
+    """Return the layers that plain values describe; ValueError, TypeError or KeyError where they do not."""
+    of_nodes, share = np.array(values["of_nodes"], np.int64), _array(values["share"], 1)
+    panels = tuple(np.array(each, np.int64) for each in values["panels"])
+    names = tuple(map(str, values["names"]))
+    if of_nodes.shape != (count,) or share.shape != (count,) or not 0 <= of_nodes.min() <= of_nodes.max() < len(names):
+        raise ValueError("layers need the layer of each node and its share of the depth")
+    if any(len(each) < 3 or not 0 <= each.min() <= each.max() < count for each in panels):
+        raise ValueError(f"panels of layers must be ids of three nodes or more, 0 to {count - 1}")
+    return Layers(names, tuple(map(float, values["depths"])), of_nodes, share, panels)
 
 
 def _ids(values: Any, limit: int) -> np.ndarray:

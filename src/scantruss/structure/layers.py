@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..layouts.clearance import angles_at_nodes, close_pairs
-from ..layouts.double_layer import WEB
+from ..layouts.double_layer import PLACES_NAMED, WEB
 from .truss import Truss
 
 LEAST_WEB_ANGLE = 30.0  #: between a web and another member at a node [degree]
@@ -22,6 +22,7 @@ class LayerChecks:
     clearances: np.ndarray  #: (P,) distance of their axes [m]
     sharp: np.ndarray  #: (A, 2) int64 members at a node, one of them a web, at less than LEAST_WEB_ANGLE
     angles: np.ndarray  #: (A,) [degree]
+    shallow: np.ndarray  #: (S,) int64 nodes of the grid under which the depth is reduced, since it bends sharply
 
     def to_dict(self, truss: Truss) -> dict[str, Any]:
         """Return plain values, ready for JSON."""
@@ -35,6 +36,7 @@ class LayerChecks:
                 {"members": [marks[a], marks[b]], "angle": angle}
                 for (a, b), angle in zip(self.sharp.tolist(), self.angles.tolist(), strict=True)
             ],
+            "reduced_depth": [truss.node_marks[node] for node in self.shallow.tolist()],
         }
 
     def warnings(self, truss: Truss) -> list[str]:
@@ -53,6 +55,16 @@ class LayerChecks:
                 f"{len(self.sharp):,} angles of webs to other members are below {LEAST_WEB_ANGLE:g} degrees, the least"
                 f" {self.angles.min():.3g} between {truss.member_marks[a]} and {truss.member_marks[b]}"
             )
+        if len(self.shallow) and truss.layers is not None:
+            named = "; ".join(
+                f"{truss.node_marks[node]} ({', '.join(f'{c:.5g}' for c in truss.nodes[node] + truss.origin)})"
+                for node in self.shallow[:PLACES_NAMED].tolist()
+            )
+            more = f" and {len(self.shallow) - PLACES_NAMED:,} more" if len(self.shallow) > PLACES_NAMED else ""
+            said.append(
+                f"the depth is reduced where the grid bends sharply, to {truss.layers.share.min():.2g} of it at the least, at"
+                f" {named}{more}"
+            )
         return said
 
 
@@ -61,8 +73,19 @@ def check_layers(truss: Truss) -> LayerChecks:
     around = [s.width if s.shape == "CHS" else float(np.hypot(s.width, s.depth)) for s in truss.sections]
     clashes, clearances = close_pairs(truss.nodes, truss.members, np.array(around)[truss.section_of] / 2)
     pairs, angles = angles_at_nodes(truss.nodes, truss.members)
-    sharp = (angles < LEAST_WEB_ANGLE) & np.isin(pairs, truss.member_sets.get(WEB, np.zeros(0, np.int64))).any(axis=1)
-    return LayerChecks(clashes, clearances, pairs[sharp], angles[sharp])
+    webs = [ids for name, ids in truss.member_sets.items() if name.startswith(WEB)]
+    sharp = (angles < LEAST_WEB_ANGLE) & np.isin(pairs, np.concatenate([np.zeros(0, np.int64), *webs])).any(axis=1)
+    return LayerChecks(clashes, clearances, pairs[sharp], angles[sharp], _shallow(truss))
+
+
+def _shallow(truss: Truss) -> np.ndarray:
+    """Return the nodes of the grid at which the depth is reduced: those over a node of the second layer that is less deep."""
+    if truss.layers is None:
+        return np.zeros(0, np.int64)
+    less = truss.layers.share < 1.0
+    one, two = truss.members.T
+    over = np.concatenate([one[less[two]], two[less[one]]])
+    return np.unique(over[truss.layers.of_nodes[over] == 0])
 
 
 def _between(truss: Truss, one: int, two: int) -> list[float]:

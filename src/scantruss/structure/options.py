@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FormatError, InputError
-from ..layouts.double_layer import DEPTH_WAYS, SECOND_LAYERS
+from ..layouts.double_layer import BEND_WAYS, DEPTH_WAYS
+from ..layouts.layer_parts import SECOND_LAYERS
 from .checks import MemberChecks
 from .groups import WAYS_TO_GROUP
 from .imperfections import check_imperfection
@@ -44,10 +45,12 @@ class StructureSettings:
     joints: str = ""  #: "" is rigid, of a double layer pinned
     loads: tuple[Any, ...] = ("self",)
     node_allowance: float = 0.0
-    double_layer: str = ""  #: depth of a double layer [m], or with a unit; "" for a single one
+    double_layer: str = ""  #: depth of a double layer [m], or with a unit, of more with commas; "" for a single one
     second_layer: str = SECOND_LAYERS[0]  #: of `SECOND_LAYERS`
     depth_along: str = DEPTH_WAYS[0]  #: of `DEPTH_WAYS`
     held_layer: str = HELD_LAYERS[0]  #: of `HELD_LAYERS`, on which the supports are
+    layer_edges: str = ""  #: tapered or closed; "" is tapered of the dual, else closed
+    sharp_bends: str = BEND_WAYS[0]  #: of `BEND_WAYS`, where the grid bends too sharply for the depth
     size: int = 0  #: different sections that are chosen at most; 0 keeps `section`
     size_by: str = WAYS_TO_GROUP[0]  #: what has a section of its own in sizing, of `WAYS_TO_GROUP`
     buckling: int = 0  #: buckling factors that are asked for

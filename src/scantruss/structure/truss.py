@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..layouts.double_layer import DEPTH_WAYS, SECOND_LAYERS
+from ..layouts.double_layer import BEND_WAYS, DEPTH_WAYS, Layers
+from ..layouts.layer_parts import SECOND_LAYERS
 from .catalogue import Material, Section
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ class Truss:
     node_marks: tuple[str, ...] = ()
     member_marks: tuple[str, ...] = ()
     scale: float = 1.0  #: of the structure to the grid
+    layers: Layers | None = None  #: of a double layer or more
 
     def __repr__(self) -> str:
         """Say what it is made of."""
@@ -124,10 +126,12 @@ class Truss:
         joints: str | float = "",
         node_allowance: float = 0.0,
         combinations: Sequence[Combination] | None = None,
-        double_layer: str | float = "",
+        double_layer: str | float | Sequence[float] = "",
         second_layer: str = SECOND_LAYERS[0],
         depth_along: str = DEPTH_WAYS[0],
         held_layer: str = HELD_LAYERS[0],
+        layer_edges: str = "",
+        sharp_bends: str = BEND_WAYS[0],
     ) -> Truss:
         """Return the structure of a grid; the grid's unit is turned into metres here and nowhere else.
 
@@ -154,14 +158,19 @@ class Truss:
             Share of the members' weight that the nodes add to it.
         combinations : sequence of Combination, optional
             In place of those of EN 1990, equation 6.10.
-        double_layer : str or float
+        double_layer : str, float or sequence of float
             Depth of a double layer such as 1.5m, or in metres of the structure; "" for a single layer. The grid is the outer layer.
+            Several, as in "1.2,0.8", make more layers, each so far below the one before.
         second_layer : str
             dual (nodes under the triangles) or same (nodes under the nodes); see `layouts.double_layer`.
         depth_along : str
             normal or vertical.
         held_layer : str
-            outer: the supports are on the grid; inner: on the nodes of the second layer that are nearest to them.
+            outer: the supports are on the grid; inner: on the nodes of the last layer that are nearest to them.
+        layer_edges : str
+            tapered or closed; "" is tapered of the dual, else closed.
+        sharp_bends : str
+            refuse a depth where the grid bends too sharply, or reduce it there.
 
         Raises
         ------
@@ -185,6 +194,8 @@ class Truss:
             second_layer=second_layer,
             depth_along=depth_along,
             held_layer=held_layer,
+            layer_edges=layer_edges,
+            sharp_bends=sharp_bends,
         )
         return truss
 
