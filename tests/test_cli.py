@@ -344,6 +344,17 @@ def test_help_and_version_import_nothing_heavy() -> None:
     assert f"scantruss {st.__version__}\n" in done.stdout
 
 
+def test_a_grid_is_made_without_what_other_commands_and_formats_load(ready: Path) -> None:
+    others = "scipy.sparse scipy.spatial matplotlib openpyxl ezdxf rhino3dm viser dask"
+    code = (
+        "import sys, scantruss.cli.main as cli\n"
+        f"assert cli.main('grid scan.xyz light.json --length {LENGTH} --effort quick -q'.split()) == 0\n"
+        f"print(sorted(set('{others}'.split()) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ready)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_grid_writes_all_it_was_asked_for_and_its_settings(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fixed = "20,15,8"
     words = [
