@@ -31,11 +31,13 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
         objects = {each.get("id", ""): each for each in root.iter(f"{space}object")}
         meshes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         parts: Parts = []
-        items = [(item.get("objectid", ""), _frame(item)) for item in root.iter(f"{space}item")]
-        waiting = items or [(name, np.vstack([np.eye(3), np.zeros(3)])) for name in objects]
-        while waiting:  # parts that are within each other are counted and refused
-            name, frame = waiting.pop()
-            if len(parts) + len(waiting) > MOST_PARTS_3MF:
+        items = [(item.get("objectid", ""), _frame(item), 0) for item in root.iter(f"{space}item")]
+        waiting = items or [(name, np.vstack([np.eye(3), np.zeros(3)]), 0) for name in objects]
+        visits = 0
+        while waiting:  # each turn is counted
+            name, frame, depth = waiting.pop()
+            visits += 1
+            if depth > len(objects) or visits > MOST_PARTS_3MF:
                 raise FormatError(f"{path} has objects within each other without end; export it again")
             each = objects[name]
             mesh = each.find(f"{space}mesh")
@@ -46,7 +48,7 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
                 parts.append((points @ frame[:3] + frame[3], triangles))
             for inner in each.iter(f"{space}component"):
                 own = _frame(inner)
-                waiting.append((inner.get("objectid", ""), np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]])))
+                waiting.append((inner.get("objectid", ""), np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]]), depth + 1))
         if not parts or not sum(len(points) for points, _ in parts):
             raise FormatError(f"{path} holds no mesh")
         together = np.concatenate([points for points, _ in reversed(parts)])
