@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
 import io
+import json
 import struct
 import tempfile
+import warnings
+import zlib
 from pathlib import Path
+from typing import Any
 
+import ezdxf
 import laspy
 import lzf
+import meshio
 import numpy as np
+import rasterio
+import rasterio.errors
+import trimesh
 from copc_file import copc
 from e57_file import Column, write_scans
 from numpy.lib import recfunctions
@@ -147,9 +157,94 @@ def whole_files() -> dict[str, bytes]:
         "a.obj": b"".join(b"v " + line + b"\n" for line in text(p).splitlines()) + b"f 1 2 3\n",
         "a.off": text(p, f"OFF\n{len(p)} 1 0\n") + b"3 0 1 2\n",
     }  # fmt: skip
+    files |= {
+        "a.glb": glb(p), "a.gltf": gltf(p), "a.3mf": threemf(p), "a.tif": geotiff(p), "a.dxf": dxf(p), "a.vtu": vtu(p),
+        "a.vtp": vtp(p, "ascii"), "b.vtp": vtp(p, "binary"), "c.vtp": vtp(p, "raw"), "d.vtp": vtp(p, "zlib"),
+    }  # fmt: skip
     if parquet := parquet_file(p):
         files["a.parquet"] = parquet
     return files
+
+
+def glb(points: np.ndarray) -> bytes:
+    """A cloud as trimesh writes it; y is up."""
+    return bytes(trimesh.Scene(trimesh.PointCloud(points[:, [0, 2, 1]] * [1, 1, -1])).export(file_type="glb"))
+
+
+def gltf(points: np.ndarray) -> bytes:
+    """The same as text, with its buffer within."""
+    held = trimesh.Scene(trimesh.PointCloud(points[:, [0, 2, 1]] * [1, 1, -1])).export(file_type="gltf")
+    model = json.loads(held.pop("model.gltf"))
+    for buffer in model["buffers"]:
+        buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(held[buffer["uri"]]).decode()
+    return json.dumps(model).encode()
+
+
+def threemf(points: np.ndarray) -> bytes:
+    """A mesh as trimesh writes it."""
+    faces = np.arange(len(points) // 3 * 3).reshape(-1, 3)
+    mesh = trimesh.Trimesh(points, faces, process=False)
+    mesh.units = "meter"
+    return bytes(mesh.export(file_type="3mf"))
+
+
+def geotiff(points: np.ndarray, **others: Any) -> bytes:
+    """A raster of 12 x 10 heights as GDAL writes it, in UTM zone 33."""
+    profile = {"driver": "GTiff", "width": 12, "height": len(points) // 12, "count": 1, "dtype": "float64", "crs": "EPSG:25833",
+               "transform": rasterio.Affine(3.0, 0, 380_000.0, 0, -3.0, 5_810_000.0)} | others  # fmt: skip
+    heights = points[: 12 * (len(points) // 12), 2].reshape(1, -1, 12).repeat(profile["count"], 0)
+    with rasterio.MemoryFile() as memory:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+            with memory.open(**profile) as file:
+                if "width" not in others:  # else it is left empty
+                    file.write(heights.astype(profile["dtype"]))
+        return bytes(memory.read())
+
+
+def dxf(points: np.ndarray, unit: int = 6) -> bytes:
+    """Points as ezdxf writes them."""
+    drawing = ezdxf.new(units=unit)
+    for place in points.tolist():
+        drawing.modelspace().add_point(place)
+    stream = io.StringIO()
+    drawing.write(stream)
+    return stream.getvalue().encode()
+
+
+def vtu(points: np.ndarray) -> bytes:
+    """Points as meshio writes them, packed by zlib."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.vtu"
+        meshio.Mesh(points, [("vertex", np.arange(len(points)).reshape(-1, 1))]).write(path)
+        return path.read_bytes()
+
+
+def vtp(points: np.ndarray, form: str) -> bytes:
+    """Points with normals by the description of the format: ascii, binary, raw (appended) or packed by zlib."""
+    arrays, appended = [], b""
+    for name, values in (("Points", points), ("N", np.tile([0.0, 0, 1], (len(points), 1)))):
+        data = values.astype("<f8").tobytes()
+        said = f'<DataArray type="Float64" Name="{name}" NumberOfComponents="3" format='
+        if form == "ascii":
+            arrays.append(f'{said}"ascii">{" ".join(map(repr, values.ravel().tolist()))}</DataArray>')
+        elif form == "raw":
+            arrays.append(f'{said}"appended" offset="{len(appended)}"/>')
+            appended += struct.pack("<Q", len(data)) + data
+        elif form == "binary":
+            arrays.append(f'{said}"binary">{base64.b64encode(struct.pack("<Q", len(data)) + data).decode()}</DataArray>')
+        else:
+            blocks = [data[k : k + 1024] for k in range(0, len(data), 1024)]
+            packed = [zlib.compress(block) for block in blocks]
+            heads = struct.pack(f"<{3 + len(blocks)}Q", len(blocks), 1024, len(blocks[-1]) % 1024, *map(len, packed))
+            words = base64.b64encode(heads) + base64.b64encode(b"".join(packed))
+            arrays.append(f'{said}"binary">{words.decode()}</DataArray>')
+    packer = ' compressor="vtkZLibDataCompressor"' if form == "zlib" else ""
+    head = f'<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"{packer}>'
+    body = f'<PolyData><Piece NumberOfPoints="{len(points)}"><PointData Normals="N">{arrays[1]}</PointData>'
+    tail = f"<Points>{arrays[0]}</Points></Piece></PolyData>"
+    more = b'<AppendedData encoding="raw">\n_' + appended + b"\n</AppendedData>" if form == "raw" else b""
+    return (head + body + tail).encode() + more + b"</VTKFile>\n"
 
 
 def parquet_file(points: np.ndarray) -> bytes | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import gzip
 import io
 import re
@@ -10,15 +11,18 @@ import subprocess
 import sys
 import warnings
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import numpy as np
 import pytest
+import rasterio
 from e57_file import to_pages
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scan_files import axes, e57, npy, pcd, plate, text, whole_files
+from scan_files import axes, e57, geotiff, npy, pcd, plate, text, whole_files
 
 from scantruss.cli.main import main
 from scantruss.errors import FormatError, InputError, ScanTrussError
@@ -80,6 +84,31 @@ BODY = plate().astype("<f8").tobytes()
 THREE = list(zip("xyz", ["f8"] * 3, plate().T, strict=True))
 COMPRESSED = FILES["c.pcd"]
 START = COMPRESSED.index(b"DATA binary_compressed\n") + 23
+
+
+
+def packed_model(model: bytes) -> bytes:
+    """A 3MF package."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as zipped:
+        zipped.writestr("3D/3dmodel.model", model)
+    return file.getvalue()
+
+
+def packed_numbers(packed: bytes) -> tuple[bytes, bytes]:
+    """The numbers of the points in d.vtp, and others that unpack to far more than they say."""
+    found = re.search(rb'Name="Points"[^>]*>([^<]*)<', FILES["d.vtp"])
+    assert found
+    return found[1], base64.b64encode(struct.pack("<4Q", 1, 1024, 0, len(packed))) + base64.b64encode(packed)
+
+
+def dxf_of_lines() -> bytes:
+    """A drawing without points."""
+    drawing, stream = ezdxf.new(), io.StringIO()
+    drawing.modelspace().add_line((0, 0), (1, 1))
+    drawing.write(stream)
+    return stream.getvalue().encode()
+
 
 #: broken files by the name they get
 BROKEN: dict[str, bytes] = {
@@ -152,6 +181,27 @@ BROKEN: dict[str, bytes] = {
     "damaged.xyz.gz": FILES["a.xyz.gz"][:60] + bytes(9) + FILES["a.xyz.gz"][69:],
     "plain.xyz.gz": text(plate()),
     "bomb.npz": archive(points=npy_claiming("(30000000, 3)", "|u1")[:128] + bytes(90_000_000)),
+    "bomb.3mf": packed_model(b"<model>" + b" " * (80 << 20) + b"</model>"),
+    "bomb.vtp": FILES["d.vtp"].replace(*packed_numbers(zlib.compress(bytes(80 << 20)))),
+    "bomb.tif": geotiff(plate(), width=30_000, height=30_000, sparse_ok=True, compress="deflate"),
+    # scenes, models and rasters that hold no scan
+    "huge.glb": FILES["a.glb"].replace(b'"count":120', b'"count":999'),
+    "huge.gltf": re.sub(rb'"count": 120', b'"count": 1000000000000', FILES["a.gltf"]),
+    "beside.gltf": re.sub(rb'"uri": "[^"]*"', b'"uri": "missing.bin"', FILES["a.gltf"]),
+    "draco.gltf": FILES["a.gltf"].replace(b'"asset"', b'"extensionsUsed": ["KHR_draco_mesh_compression"], "asset"'),
+    "ring.gltf": b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"children": [0]}]}',
+    "ring.3mf": packed_model(b'<model><resources><object id="1"><components><component objectid="1"/></components></object></resources>'
+                             b'<build><item objectid="1"/></build></model>'),
+    "entities.3mf": packed_model(b'<!DOCTYPE a [<!ENTITY b "c">]><model/>'),
+    "entities.vtp": FILES["a.vtp"].replace(b"<VTKFile", b'<!DOCTYPE a [<!ENTITY b "c">]><VTKFile', 1),
+    "image.vtp": FILES["a.vtp"].replace(b"PolyData", b"ImageData"),
+    "less.vtp": FILES["a.vtp"].replace(b'NumberOfPoints="120"', b'NumberOfPoints="121"'),
+    "picture.tif": geotiff(plate() * 5, count=3, dtype="uint8"),
+    "complex.tif": geotiff(plate(), dtype="complex64"),
+    "no-place.tif": geotiff(plate(), transform=rasterio.Affine.identity()),
+    "no-heights.tif": geotiff(np.full((120, 3), -9999.0), nodata=-9999.0),
+    "degrees.tif": geotiff(plate(), crs="EPSG:4326", transform=rasterio.Affine(1e-4, 0, 13.0, 0, -1e-4, 52.0)),
+    "lines.dxf": dxf_of_lines(),
     # points that are none
     "nan.xyz": b"nan nan nan\n" * 50,
     "nan.pcd": pcd([(a, "f4", np.full(50, np.nan)) for a in "xyz"], "binary"),
@@ -169,7 +219,7 @@ BROKEN |= {f"noise{suffix}": np.random.default_rng(4).bytes(5000) for suffix in 
 BROKEN |= {
     f"noise-behind-{name}": data[:64] + np.random.default_rng(5).bytes(len(data))
     for name, data in FILES.items()
-    if Path(name).suffix in (".ply", ".laz", ".las", ".pcd", ".e57", ".npy", ".npz", ".parquet", ".gz")
+    if Path(name).suffix in (".ply", ".laz", ".las", ".pcd", ".e57", ".npy", ".npz", ".parquet", ".gz", ".glb", ".3mf", ".vtp", ".tif")
 }
 
 

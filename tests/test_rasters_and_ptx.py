@@ -1,15 +1,25 @@
-"""ESRI ASCII grids and PTX files."""
+"""Rasters (ESRI ASCII grids, GeoTIFF), scenes and models (glTF, 3MF, VTK, DXF), and PTX files."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import rasterio
+import trimesh
+from scan_files import dxf, geotiff, plate
+from test_convert import roof
 
 import scantruss as st
+from scantruss.scan.formats.geotiff import read_geotiff, terrain_chunks
+from scantruss.scan.formats.gltf import read_gltf
 from scantruss.scan.formats.ptx import read_ptx
 from scantruss.scan.formats.raster import read_asc
+from scantruss.scan.formats.reading import read_content
+from scantruss.scan.formats.vtk_xml import read_vtk_xml
+from scantruss.scan.stream.thin_scan import thin_scan
 
 HEIGHTS = np.array([[1.5, 2, 3, 4], [5, -9999, 7, 8], [9, 10, 11, 12.25]])
 
@@ -103,3 +113,109 @@ def test_damaged_ptx_files_are_refused(change: str, tmp_path: Path) -> None:
     (tmp_path / "a.ptx").write_text("\n".join(lines) + "\n", encoding="ascii")
     with pytest.raises(st.FormatError, match=r"a\.ptx"):
         st.read_points(tmp_path / "a.ptx")
+
+
+def test_a_geotiff_gives_the_centres_of_its_cells_with_unit_and_system(tmp_path: Path) -> None:
+    heights = np.where(np.arange(120) % 7 == 0, -9999.0, plate()[:, 2])
+    points = np.column_stack([plate()[:, :2], heights])
+    turned = rasterio.Affine.translation(380_000.0, 5_810_000.0) @ rasterio.Affine.rotation(30) @ rasterio.Affine.scale(3.0, -3.0)
+    (tmp_path / "a.tif").write_bytes(geotiff(points, nodata=-9999.0, transform=turned, tiled=True, blockxsize=16, blockysize=16))
+    cloud = st.read_points(tmp_path / "a.tif")
+    slow = [(*(turned @ (k % 12 + 0.5, k // 12 + 0.5)), heights[k]) for k in range(120) if heights[k] != -9999.0]
+    np.testing.assert_allclose(cloud.points + cloud.origin, slow, rtol=0, atol=1e-9)
+    assert (cloud.unit, cloud.system) == ("m", "EPSG:25833") and cloud.left_out == (("in cells without data", 18),)
+    thinned = thin_scan(tmp_path / "a.tif", 0.01)
+    np.testing.assert_allclose(np.sort(thinned.points, axis=0), np.sort(slow, axis=0), rtol=0, atol=1e-9)
+    assert (thinned.unit, thinned.system) == ("m", "EPSG:25833")
+
+
+def test_heights_of_a_geotiff_have_their_own_unit(tmp_path: Path) -> None:
+    (tmp_path / "a.tif").write_bytes(geotiff(plate(), crs="EPSG:2263+6360", dtype="float32"))  # feet, heights in feet
+    cloud = st.read_points(tmp_path / "a.tif")
+    assert cloud.unit == "foot" and np.ptp(cloud.points[:, 2]) == pytest.approx(np.ptp(plate()[:, 2]), rel=1e-4)
+
+
+def test_a_large_raster_is_read_some_rows_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.tif").write_bytes(geotiff(plate()))
+    whole = read_geotiff(tmp_path / "a.tif").points
+    monkeypatch.setattr("scantruss.scan.formats.geotiff.CELLS_PER_CHUNK", 30)
+    parts = [content.points for content in terrain_chunks(tmp_path / "a.tif")]
+    assert len(parts) == 5
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_a_missing_extra_of_a_reader_is_one_line_with_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.tif").write_bytes(geotiff(plate()))
+    monkeypatch.setattr("scantruss.scan.formats.extras.find_spec", lambda name: None)
+    with pytest.raises(st.FormatError, match=r'rasterio.*pip install "scantruss\[terrain\]"'):
+        st.read_points(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+def test_a_scene_is_placed_by_its_nodes_and_turned_upright(suffix: str, tmp_path: Path) -> None:
+    """Against trimesh: nodes within nodes, one of them turned and stretched."""
+    body = trimesh.creation.icosphere(subdivisions=1)
+    scene = trimesh.Scene()
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [4, 5, 6]) @ np.diag([1.0, 2.0, 3.0, 1.0])
+    scene.add_geometry(body, node_name="a", transform=trimesh.transformations.translation_matrix([10, 20, 30]))
+    scene.add_geometry(body, node_name="b", parent_node_name="a", transform=turn)
+    scene.add_geometry(trimesh.PointCloud(body.vertices[:5] + 50.0), node_name="c")
+    held = scene.export(file_type=suffix[1:])
+    for name, data in held.items() if isinstance(held, dict) else [(f"model{suffix}", held)]:
+        (tmp_path / name).write_bytes(data)
+    found = read_gltf(tmp_path / f"model{suffix}")
+    there = np.concatenate([trimesh.transform_points(scene.geometry[shape].vertices, matrix)
+                            for matrix, shape in (scene.graph[node] for node in "abc")])  # fmt: skip
+    upright = np.stack([there[:, 0], -there[:, 2], there[:, 1]], axis=1)
+    order = [np.lexsort(np.round(each, 3).T) for each in (found.points, upright)]
+    np.testing.assert_allclose(found.points[order[0]], upright[order[1]], rtol=0, atol=1e-4)
+    assert found.metres == 1.0 and found.normals is None  # a part without faces
+
+
+def test_a_mesh_of_a_scene_has_the_normals_of_its_faces(tmp_path: Path) -> None:
+    body = trimesh.creation.icosphere(subdivisions=2)
+    for suffix in (".glb", ".3mf"):
+        body.export(tmp_path / f"a{suffix}")
+        content = read_content(tmp_path / f"a{suffix}")
+        assert content.normals is not None and len(content.points) == len(body.vertices)
+        outward = content.points / np.linalg.norm(content.points, axis=1, keepdims=True)
+        assert (content.normals * outward).sum(axis=1).min() > 0.99
+
+
+def test_objects_of_a_3mf_file_are_placed_in_its_unit(tmp_path: Path) -> None:
+    truss = roof(3)
+    st.write(truss, tmp_path / "a.3mf")
+    content = read_content(tmp_path / "a.3mf")
+    scene: Any = trimesh.load(tmp_path / "a.3mf")
+    assert content.metres == 1.0 and len(content.points) == len(scene.to_geometry().vertices)
+    np.testing.assert_allclose([content.points.min(axis=0), content.points.max(axis=0)], scene.bounds, atol=1e-6)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary", "raw", "zlib"])
+def test_vtp_and_vtu_files_of_vtk_itself_are_read(form: str, tmp_path: Path) -> None:
+    vtk = pytest.importorskip("vtk", exc_type=ImportError)
+    from vtk.util.numpy_support import numpy_to_vtk
+
+    for grid, writer in ((vtk.vtkPolyData(), vtk.vtkXMLPolyDataWriter()), (vtk.vtkUnstructuredGrid(), vtk.vtkXMLUnstructuredGridWriter())):
+        places = vtk.vtkPoints()
+        places.SetData(numpy_to_vtk(plate(9000), deep=True))
+        grid.SetPoints(places)
+        grid.GetPointData().SetNormals(numpy_to_vtk(np.tile([0.0, 0.6, 0.8], (9000, 1)), deep=True))
+        writer.SetFileName(str(tmp_path / "a"))
+        writer.SetInputData(grid)
+        {"ascii": writer.SetDataModeToAscii, "binary": writer.SetDataModeToBinary}.get(form, writer.SetDataModeToAppended)()
+        if form == "raw":
+            writer.EncodeAppendedDataOff()
+        (writer.SetCompressorTypeToZLib if form == "zlib" else writer.SetCompressorTypeToNone)()
+        writer.Write()
+        content = read_vtk_xml(tmp_path / "a")
+        np.testing.assert_allclose(content.points, plate(9000), rtol=1e-5 if form == "ascii" else 0)
+        assert content.normals is not None and np.allclose(content.normals, [0.0, 0.6, 0.8])
+
+
+@pytest.mark.parametrize(("code", "unit"), [(0, ""), (1, "inch"), (2, "foot"), (4, "mm"), (5, "cm"), (6, "m")])
+def test_points_of_a_drawing_have_its_unit(code: int, unit: str, tmp_path: Path) -> None:
+    (tmp_path / "a.dxf").write_bytes(dxf(plate(), code))
+    cloud = st.read_points(tmp_path / "a.dxf")
+    np.testing.assert_array_equal(cloud.points + cloud.origin, plate())
+    assert cloud.unit == thin_scan(tmp_path / "a.dxf", 1e-3).unit == unit

@@ -279,4 +279,4 @@ def test_a_grid_has_no_sections_and_is_refused(tmp_path: Path) -> None:
     with pytest.raises(st.FormatError, match="SAF holds structures"):
         st.write(dome(4), tmp_path / "a.saf.xlsx")
     with pytest.raises(st.FormatError, match="the nearest is"):
-        st.write(roof(), tmp_path / "a.xlsx")
+        st.write(roof(), tmp_path / "a.saf.xls")

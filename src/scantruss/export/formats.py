@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from ..errors import FormatError
 from ..grid.grid import Grid
 from ..runtime.files import check_place, suffix_of, write_files
 from ..scan.cloud import PointCloud
+from ..scan.formats.extras import need_library
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
@@ -182,10 +182,7 @@ def check_library(row: FileFormat, *, reading: bool = False) -> None:
         It is missing; the message has the command that installs it.
     """
     library = row.reads_with or row.library if reading else row.library
-    if library and find_spec(library) is None:
-        raise FormatError(
-            f'{row.name} needs {library}, which is not installed; install it with: python -m pip install "scantruss[{row.extra}]"'
-        )
+    need_library(row.name, library, row.extra)
 
 
 def losses(model: Model, path: str | Path) -> list[str]:

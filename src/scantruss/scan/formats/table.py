@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .content import Cloud, Content
+from .dxf_points import read_dxf_points
 from .e57 import read_e57
+from .geotiff import read_geotiff
+from .gltf import read_gltf
 from .las import read_las, write_las
 from .mesh import read_obj, read_off, read_stl
 from .numpy_ import read_npy, read_npz, write_npy, write_npz
@@ -17,6 +20,8 @@ from .ply import read_ply, write_ply
 from .ptx import read_ptx
 from .raster import read_asc
 from .text import read_text, write_text
+from .threemf import read_3mf
+from .vtk_xml import read_vtk_xml
 
 Reader = Callable[[Path, Sequence[str]], Content]  # path and wanted attributes
 Writer = Callable[[Path, Cloud], None]
@@ -46,6 +51,14 @@ SCAN_FORMATS = {
     ".parquet": Format(read_parquet),
     ".obj": Format(read_obj),
     ".stl": Format(read_stl),
+    ".glb": Format(read_gltf),
+    ".gltf": Format(read_gltf),
+    ".3mf": Format(read_3mf),
+    ".vtp": Format(read_vtk_xml),
+    ".vtu": Format(read_vtk_xml),
+    ".tif": Format(read_geotiff),
+    ".tiff": Format(read_geotiff),
+    ".dxf": Format(read_dxf_points),
     ".off": Format(read_off),
 }
 READERS = {suffix: own.read for suffix, own in SCAN_FORMATS.items()}

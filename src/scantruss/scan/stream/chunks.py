@@ -14,6 +14,7 @@ from ...selection import Selection
 from ..formats.columns import find_attributes
 from ..formats.content import Content
 from ..formats.copc import WantedBox
+from ..formats.geotiff import terrain_chunks
 from ..formats.kinds import reading_as
 from ..formats.las import POINTS_PER_CHUNK, check_count, content_of_records, fields_for, fields_of, records_near
 from ..formats.reading import places_in_file, read_content, select
@@ -75,6 +76,8 @@ def read_chunks(
         contents = _las(tile, reading, size, alone)
     elif kind == "rows":
         contents = _fixed_rows(tile, wanted, size)
+    elif kind == "terrain":
+        contents = terrain_chunks(tile.source.path)
     else:
         contents = _text(tile, counts) if kind == "text" else _whole(tile, wanted)
     for content in contents:

@@ -16,7 +16,7 @@ class Source:
     """A file of points as its header describes it."""
 
     path: Path
-    kind: str  #: las, rows (of fixed size), text, or whole
+    kind: str  #: las, rows (of fixed size), text, terrain (a raster), or whole
     points: int  #: points that the header promises; a guess for text, or for a file that is read whole
     begin: int = 0  #: byte at which points begin: rows, text
     end: int = 0  #: byte after the points: text

@@ -15,6 +15,8 @@ import numpy as np
 
 from ...errors import FormatError
 from ..formats.columns import COLUMN_NAMES, find_attributes
+from ..formats.dxf_points import metres_of_dxf
+from ..formats.geotiff import terrain_head
 from ..formats.kinds import kind_of, read_head, reading_as, wrong_kind
 from ..formats.las_header import LASZIP, check_header
 from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
@@ -28,6 +30,7 @@ from ..formats.table import PACKED, READERS
 from ..formats.text import first_column_note, is_number_of_point, read_lines
 from ..formats.text_fields import ANY_SEPARATOR
 from ..formats.text_layout import Layout, find_layout
+from ..formats.threemf import metres_of_3mf
 from ..units import metres_of
 from .source import Source, Tile
 
@@ -53,6 +56,8 @@ def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
     try:
         if suffix in (".las", ".laz"):
             return _las(path, head)
+        if suffix in (".tif", ".tiff"):
+            return _terrain(path)
         if suffix == ".ply" and (source := _ply(path)) is not None:
             return source
         if suffix == ".npy" and (source := _npy(path)) is not None:
@@ -83,7 +88,13 @@ def _metres(path: Path) -> tuple[float | None, float | None]:
     if suffix in TEXTS:
         layout = find_layout(path)
         return layout.metres, layout.z_metres
-    return (1.0, 1.0) if suffix == ".e57" else (None, None)
+    if suffix == ".3mf":
+        return metres_of_3mf(path), None
+    if suffix == ".dxf":
+        return metres_of_dxf(path), None
+    if suffix == ".ptx":
+        return 1.0, None
+    return (1.0, 1.0) if suffix in (".e57", ".glb", ".gltf") else (None, None)
 
 
 def tiles_of(sources: Sequence[Source], points: int = POINTS_PER_TILE) -> Iterator[Tile]:
@@ -121,6 +132,20 @@ def _las(path: Path, head: bytes) -> Source:
                 in_one=_has_uneven_chunks(header),
                 notes=notes,
             )
+
+
+def _terrain(path: Path) -> Source:
+    head = terrain_head(path)
+    return Source(
+        path,
+        "terrain",
+        head.cells,
+        metres=head.system.metres,
+        z_metres=head.z_metres,
+        system=head.system.name,
+        degrees=head.system.degrees,
+        in_one=True,
+    )
 
 
 def _has_uneven_chunks(header: Any) -> bool:
