@@ -77,6 +77,8 @@ def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
         assert sum(pair <= set(on.tolist()) for pair in members) >= len(on) - 1 >= 4  # rows of members on the plane
     distinct = len(np.unique(np.round(grid.lengths, 9)))
     assert distinct < (0.4 if lean == 0 else 0.65) * len(grid.lengths)
+    made = st.schedule(grid.replace(unit="m"), st.ScheduleSettings(tube=100.0))
+    assert None not in made.panel_types["mirror image"] and None not in made.node_types["mirror image"]
     again = st.grid_from_points(vault(0.3, lean=lean), grid.settings)
     assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
 
@@ -101,9 +103,9 @@ def test_the_command_takes_planes_of_a_file(
     assert main([*words.split(), "planes.txt"]) == 0
     said = capsys.readouterr()
     assert "symmetric in 1 mirror plane, as point and normal: 500, -200, 0, 0, 1, 0" in said.out + said.err
-    assert '"symmetry": [[500.0, -200.0, 0.0, 0.0, 1.0, 0.0]]' in " ".join(Path("shell.settings.json").read_text().split()).replace(
-        "[ ", "["
-    ).replace(" ]", "]")
+    assert '"symmetry": [[500.0, -200.0, 0.0, 0.0, 1.0, 0.0]]' in " ".join(
+        Path("shell.settings.json").read_text().split()
+    ).replace("[ ", "[").replace(" ]", "]")
     for text, reason in (
         ("500,-200,0", "line 1: a mirror plane needs six numbers"),
         ("0,0,0,0,0,0", "a mirror plane needs a point and a normal"),

@@ -46,7 +46,9 @@ def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
         lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         words = getattr(error, "strerror", None) or "it is no text"
-        raise FormatError(f"cannot read mirror planes {path}: {words}; --symmetry needs auto or a file of planes") from None
+        raise FormatError(
+            f"cannot read mirror planes {path}: {words}; --symmetry needs auto or a file of planes"
+        ) from None
     rows = []
     for number, line in enumerate(lines, 1):
         if not (words := line.partition("#")[0].replace(",", " ").replace(";", " ").split()):
@@ -56,7 +58,9 @@ def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
         except ValueError:
             row = ()
         if len(row) != 6:
-            raise FormatError(f"{path}, line {number}: a mirror plane needs six numbers, x y z nx ny nz, got {line.strip()!r}")
+            raise FormatError(
+                f"{path}, line {number}: a mirror plane needs six numbers, x y z nx ny nz, got {line.strip()!r}"
+            )
         rows.append(row)
     if not rows:
         raise FormatError(f"{path} holds no mirror plane; it needs lines of six numbers, x y z nx ny nz")

@@ -69,7 +69,9 @@ def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> li
     for (normal, offset), ray in zip(wedge.walls, wedge.rays, strict=True):
         for line in _section(grid, normal, offset):
             pieces = [line] if ray is None else _beyond(line, wedge.centre, ray)
-            long = [each for each in pieces if np.linalg.norm(np.diff(each, axis=0), axis=1).sum() >= LEAST_PIECE * length]
+            long = [
+                each for each in pieces if np.linalg.norm(np.diff(each, axis=0), axis=1).sum() >= LEAST_PIECE * length
+            ]
             found += [each + grid.origin for each in long]
     if wedge.axis is None:
         return found
@@ -103,7 +105,7 @@ def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> G
     if len(bad := np.concatenate([beyond, flat.ravel()])):
         _refuse(grid, bad[0])
     at_wall = np.where(on[0], 0, np.where(on[-1], 1, -1)) if len(on) > 1 else np.where(on[0], 0, -1)
-    on_axis = on.all(axis=0) if len(on) > 1 else np.zeros(len(nodes), bool)
+    on_axis = np.asarray(on.all(axis=0)) & (len(on) > 1)
     return _united(grid, nodes, kept, at_wall, on_axis, wedge)
 
 
@@ -127,7 +129,8 @@ def check_lines_kept(before: Grid, made: Grid, length: float) -> None:
             if np.linalg.norm(away - share[:, None] * along, axis=1).min(initial=math.inf) > ON_PLANE * length:
                 where = ", ".join(f"{c:.5g}" for c in before.scan_nodes[node])
                 raise FrontError(
-                    f"the fixed line {line.name} is not symmetric in the mirror planes, near ({where}); give its image too", made
+                    f"the fixed line {line.name} is not symmetric in the mirror planes, near ({where}); give its image too",
+                    made,
                 )
 
 
@@ -153,9 +156,7 @@ def _united(
     places = nodes[source] - wedge.centre
     made = np.einsum("vij,vj->vi", np.array(matrices)[image_of], places) + wedge.centre
     made[image_of == 0] = nodes[source[image_of == 0]]
-    triangles = np.concatenate(
-        [number_of[k][kept if k % 2 == 0 else kept[:, [0, 2, 1]]] for k in range(len(matrices))]
-    )
+    triangles = np.concatenate([number_of[k][kept if k % 2 == 0 else kept[:, [0, 2, 1]]] for k in range(len(matrices))])
     return grid.replace(
         nodes=made,
         triangles=triangles,
@@ -226,7 +227,13 @@ def _section(grid: Grid, normal: np.ndarray, offset: float) -> list[np.ndarray]:
     start, end = grid.edges.T
     cut = np.flatnonzero(side[start] != side[end])
     share = above[start[cut]] / (above[start[cut]] - above[end[cut]])
-    place = dict(zip(cut.tolist(), grid.nodes[start[cut]] + share[:, None] * (grid.nodes[end[cut]] - grid.nodes[start[cut]]), strict=True))
+    place = dict(
+        zip(
+            cut.tolist(),
+            grid.nodes[start[cut]] + share[:, None] * (grid.nodes[end[cut]] - grid.nodes[start[cut]]),
+            strict=True,
+        )
+    )
     near: dict[int, list[int]] = {edge: [] for edge in place}
     for edges in grid.half_edge_edges.reshape(3, -1).T.tolist():
         crossed = [edge for edge in edges if edge in place]
@@ -239,7 +246,7 @@ def _section(grid: Grid, normal: np.ndarray, offset: float) -> list[np.ndarray]:
             continue
         line, edge = [first], first
         left.discard(first)
-        while (following := [each for each in near[edge] if each in left]):  # each turn takes an edge
+        while following := [each for each in near[edge] if each in left]:  # each turn takes an edge
             edge = following[0]
             left.discard(edge)
             line.append(edge)
@@ -278,4 +285,6 @@ def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 def _refuse(grid: Grid, node: int) -> None:
     """Refuse a grid of which the rows do not follow the planes."""
     where = ", ".join(f"{c:.5g}" for c in grid.scan_nodes[node])
-    raise FrontError(f"the rows do not follow the mirror planes at ({where}); try another --length, or leave --symmetry out", grid)
+    raise FrontError(
+        f"the rows do not follow the mirror planes at ({where}); try another --length, or leave --symmetry out", grid
+    )

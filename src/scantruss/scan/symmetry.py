@@ -87,7 +87,9 @@ def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlan
     return _through_one_axis(places, good)
 
 
-def check_mirror_planes(points: np.ndarray, rows: Sequence[Sequence[float]], tolerance: float) -> tuple[MirrorPlane, ...]:
+def check_mirror_planes(
+    points: np.ndarray, rows: Sequence[Sequence[float]], tolerance: float
+) -> tuple[MirrorPlane, ...]:
     """Return planes that the user gives, if the scan is symmetric in each of them; see `find_mirror_planes`."""
     places = _places(points)
     planes = []
@@ -116,7 +118,7 @@ def _places(points: np.ndarray) -> _Places:
     low, size = points.min(axis=0), float(np.ptp(points, axis=0).max())
     cell = size / CELLS_ACROSS
     keys = np.floor((points - low) / max(cell, 1e-300)).astype(np.int64)
-    _, first, inverse = np.unique(keys @ [1, 1 << 20, 1 << 40], return_index=True, return_inverse=True)
+    _, inverse = np.unique(keys @ [1, 1 << 20, 1 << 40], return_inverse=True)
     counts = np.bincount(inverse.ravel())
     at = np.stack([np.bincount(inverse.ravel(), points[:, k] - low[k]) / counts for k in range(3)], axis=1)
     if len(at) < FEWEST_PLACES:
@@ -135,7 +137,10 @@ def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
     _, axes = np.linalg.eigh(places.at.T @ places.at)
     turns = np.radians(np.arange(0.0, 180.0, TURN_STEP))
     normals = np.concatenate(
-        [np.outer(np.cos(turns), axes[:, (k + 1) % 3]) + np.outer(np.sin(turns), axes[:, (k + 2) % 3]) for k in range(3)]
+        [
+            np.outer(np.cos(turns), axes[:, (k + 1) % 3]) + np.outer(np.sin(turns), axes[:, (k + 2) % 3])
+            for k in range(3)
+        ]
     )
     tried = np.unique(np.linspace(0, len(places.at) - 1, TRIED).astype(np.int64))
     score = np.array([np.minimum(places.misfits(n, 0.0, tried)[0], 3 * places.cell).mean() for n in normals])

@@ -27,9 +27,9 @@ from .values import (
     check_line,
     check_names,
     check_piece,
-    check_symmetry,
     check_positions,
     check_ring,
+    check_symmetry,
     shortest_and_longest,
 )
 
