@@ -10,16 +10,19 @@ import numpy as np
 
 from .boundary.find import find_boundary
 from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
+from .check.certify import certified
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .hope import Hope
+from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid
 from .runtime.progress import Progress
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
+from .scan.symmetry import SYMMETRY_TOLERANCE, check_mirror_planes, find_mirror_planes
 from .settings import Settings
 from .surface.samples import sample_surface
 
@@ -95,6 +98,9 @@ def grid_from_cloud(
     """
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
+    if settings.symmetry:
+        made = symmetric_grid(cloud, settings, progress=watch, keep_failed=keep_failed)
+        return made.replace(seconds=watch.seconds())
     refused: FrontError | None = None
     for effort in dict.fromkeys((settings.effort, LEAST_EFFORT)):  # more effort never gives less
         tried = settings.replace(effort=effort)
@@ -107,6 +113,46 @@ def grid_from_cloud(
     if not keep_failed or not isinstance(refused, CertificateError) or not len(refused.grid.triangles):
         raise refused
     return refused.grid.replace(settings=settings, seconds=watch.seconds())
+
+
+def symmetric_grid(
+    cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
+    """Return a grid that keeps mirror planes exactly: one part with rows on the planes, and its images.
+
+    A first grid tells where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
+
+    Raises
+    ------
+    InputError
+        The scan is not symmetric within a tenth of a member.
+    FrontError
+        No grid passes the checks, or the rows do not follow the planes.
+    """
+    points, tolerance = np.asarray(cloud.points) + cloud.origin, SYMMETRY_TOLERANCE * settings.length
+    if isinstance(settings.symmetry, str):
+        planes = find_mirror_planes(points, tolerance)
+    else:
+        planes = check_mirror_planes(points, settings.symmetry, tolerance)
+    plain = settings.replace(symmetry="")
+    lines = mirror_lines(grid_from_cloud(cloud, plain, progress=progress), planes, settings.length)
+    names = plain.line_names or [f"line {number}" for number in range(1, len(plain.fixed_lines) + 1)]
+    lined = plain.replace(
+        fixed_lines=[*plain.fixed_lines, *(line.tolist() for line in lines)],
+        line_names=[*names, *(f"{MIRROR_LINE} {number}" for number in range(1, len(lines) + 1))],
+    )
+    half = grid_from_cloud(cloud, lined, progress=progress)
+    own = (half.settings or lined).replace(fixed_lines=plain.fixed_lines, line_names=plain.line_names)
+    made = mirrored_grid(half, planes, settings.length)
+    check_lines_kept(half, made, settings.length)
+    samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
+    kept = made.replace(settings=own.replace(symmetry=[plane.row for plane in planes]))
+    try:
+        return certified(kept, samples, boundary, own)
+    except CertificateError as error:
+        if not keep_failed:
+            raise
+        return error.grid if isinstance(error.grid, Grid) else kept
 
 
 def first_that_passes(

@@ -176,6 +176,11 @@ def grid_with_notes(
     }.items():
         if getattr(made, name) != getattr(settings, name) and not (smoothed and name == "ridge_angle"):
             bars.note(words)
+    if settings.symmetry:
+        planes = [", ".join(f"{c:.4g}" for c in row) for row in made.symmetry if not isinstance(row, str)]
+        bars.note(
+            f"symmetric in {len(planes)} mirror plane{'s' * (len(planes) != 1)}, as point and normal: {'; '.join(planes)}"
+        )
     note_outliers(bars, cloud, made)
     note_layers(bars, cloud, made)
     note_pieces(bars, cloud, made)

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from ..errors import InputError
 from ..selection import Selection, read_crop
 from ..settings import CURVATURE, RECORDS, Settings
-from .positions import position, read_polylines, read_positions
+from .positions import position, read_planes, read_polylines, read_positions
 
 
 class UsageError(InputError):
@@ -213,6 +213,8 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
             options["help"] += (
                 "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
             )
+        elif spec.name == "symmetry":
+            options["metavar"] = "auto|FILE"
         elif spec.name == "classes":
             options |= {"action": "append", "metavar": "NUMBER,..."}
             options["help"] += "; repeatable"
@@ -270,6 +272,8 @@ def settings_of(values: argparse.Namespace) -> Settings:
         named_lines = [line for path in explicit["fixed_lines"] for line in read_polylines(path)]
         explicit["fixed_lines"] = tuple(points for _, points in named_lines)
         explicit["line_names"] = tuple(name for name, _ in named_lines)
+    if explicit.get("symmetry", "auto") != "auto":
+        explicit["symmetry"] = read_planes(explicit["symmetry"])
     if "boundary" in explicit:
         explicit["boundary"] = tuple(
             ring for path in explicit["boundary"] for _, ring in read_polylines(path, "boundary")

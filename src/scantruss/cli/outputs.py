@@ -28,6 +28,7 @@ def inputs_of(values: Namespace) -> Taken:
     named += [(given.get(name) or "", what) for name, what in single]
     named += [(name, "file of lengths") for name in _lengths(given.get("length")) if not name.startswith(CURVATURE)]
     named += [(name, "fixed line") for name in given.get("fixed_lines", ())]
+    named += [(name, "mirror planes") for name in [given.get("symmetry")] if name and name != "auto"]
     named += [(name, "boundary") for name in given.get("boundary", ())]
     named += [(name, "polygon") for name in given.get("crop", ()) if Path(name).is_file()]
     return {Path(name).resolve(): what for name, what in named if name}

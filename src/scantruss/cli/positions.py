@@ -34,6 +34,39 @@ def read_positions(path: str | Path) -> list[Position]:
     return [place for _, part in _read_parts(path, "fixed nodes") for place in part]
 
 
+def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
+    """Return the mirror planes in a text file: a point and a normal, six numbers a line, any separator, `#` before comments.
+
+    Raises
+    ------
+    FormatError
+        The file cannot be read, or a line holds no plane.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        words = getattr(error, "strerror", None) or "it is no text"
+        raise FormatError(
+            f"cannot read mirror planes {path}: {words}; --symmetry needs auto or a file of planes"
+        ) from None
+    rows = []
+    for number, line in enumerate(lines, 1):
+        if not (words := line.partition("#")[0].replace(",", " ").replace(";", " ").split()):
+            continue
+        try:
+            row = tuple(map(float, words))
+        except ValueError:
+            row = ()
+        if len(row) != 6:
+            raise FormatError(
+                f"{path}, line {number}: a mirror plane needs six numbers, x y z nx ny nz, got {line.strip()!r}"
+            )
+        rows.append(row)
+    if not rows:
+        raise FormatError(f"{path} holds no mirror plane; it needs lines of six numbers, x y z nx ny nz")
+    return tuple(rows)
+
+
 def read_polylines(path: str | Path, what: str = "fixed line") -> list[NamedPart]:
     """Return the polylines in a text file with their names: points as `read_positions` takes them, an empty line between two of them.
 

@@ -151,11 +151,24 @@ def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
     """Say how much there is of what, and what is warned of."""
     cut = sum(value for value in made.lengths["total"] if isinstance(value, float))
     lines = [
-        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {settings.angle_tolerance:g} degrees",
+        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {settings.angle_tolerance:g} degrees"
+        + mirrored_words(made.node_types),
         f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {cut:,.4g} m",
-        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm",
+        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm"
+        + mirrored_words(made.panel_types),
     ]
     return [*lines, *warning_lines(made.warnings)]
+
+
+def mirrored_words(types: Schedule) -> str:
+    """Say how many types there are if mirror images count once; nothing where there are as many."""
+    first = types.columns[0].values
+    seen = {
+        frozenset((own, image)) for own, image in zip(first, types["mirror image"], strict=True) if image is not None
+    }
+    alone = sum(image is None for image in types["mirror image"])
+    once = len(seen) + alone
+    return f", {once:,} if mirror images count once" if once < len(first) else ""
 
 
 def warning_lines(warnings: Schedule) -> list[str]:

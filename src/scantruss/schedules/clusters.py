@@ -149,7 +149,7 @@ def cluster_nodes(joints: Joints, tolerance: float) -> Clusters:
     """
 
     def misfits(item: int, others: np.ndarray) -> np.ndarray:
-        return _misfits(joints, item, others).min(axis=1)
+        return misfits_of_node(joints, item, others).min(axis=1)
 
     used = np.flatnonzero(joints.valence)
     valence = joints.valence[used]
@@ -176,7 +176,7 @@ def _pair_angles(joints: Joints) -> np.ndarray:
     return table
 
 
-def _misfits(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
+def misfits_of_node(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
     """Return the misfit (C, v) of a node to C others of v members, for v ways to put its members into their holes [degree]."""
     return _around(joints, item, others) if joints.one_layer else _nearest(joints, item, others)[0]
 

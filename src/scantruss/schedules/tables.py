@@ -15,6 +15,7 @@ from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
 from .inner_panels import inner_panels, layer_column, layered_grid
 from .joints import angle_between
+from .mirror_images import NO_IMAGE, node_images, panel_images
 from .places import boundary_nodes, building_places, into_building, rings
 from .records import Column, Schedule, Schedules, Value, column
 
@@ -254,6 +255,12 @@ def _types(title: str, letters: str, types: Clusters, marks: Sequence[str], unit
     )
 
 
+def _images(letters: str, types: Clusters, image: np.ndarray) -> Column:
+    """Return the column of the types that are mirror images; nothing where there is none."""
+    marks = _type_marks(letters, types)
+    return column("mirror image", "", [None if k == NO_IMAGE else marks[k] for k in image.tolist()])
+
+
 def _node_types(parts: Parts, mass: np.ndarray | None) -> Schedule:
     """One row for each type of node; how it is drilled stands at its representative."""
     types, one = parts.node_types, parts.node_types.representative
@@ -261,6 +268,7 @@ def _node_types(parts: Parts, mass: np.ndarray | None) -> Schedule:
     return _types(
         "Node types", "NT", types, parts.node_marks, DEGREE,
         column("valence", "", parts.joints.valence[one]), column("ball", "mm", 2.0 * parts.radius[one]), *more,
+        _images("NT", types, node_images(types, parts.joints, parts.settings.angle_tolerance)),
     )  # fmt: skip
 
 
@@ -270,6 +278,7 @@ def _panel_types(parts: Parts) -> Schedule:
     return _types(
         "Panel types", "PT", types, parts.panel_marks, "mm",
         *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(3)), column("area of one", "m2", _areas(parts)[one]),
+        _images("PT", types, panel_images(types, parts.sides, parts.settings.tolerance)),
     )  # fmt: skip
 
 

@@ -240,6 +240,12 @@ class ConstraintSettings(_Checked):
     line_names: Sequence[str] = _setting(
         (), "names of the fixed lines in their order, and so of the sets of their nodes; none: line 1, line 2, ..."
     )
+    symmetry: str | Sequence[Sequence[float]] = _setting(
+        "",
+        "mirror planes that the grid keeps exactly: auto finds them in the scan, or rows of a point and a normal, x y z nx ny nz;"
+        " several meet in one line at equal angles",
+        unit="scan unit",
+    )
     ridge_angle: float = _setting(
         40.0,
         "a fold by more than this, sharp or rounded over up to half a member, becomes a chain of members; 0: no ridges"

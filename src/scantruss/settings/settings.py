@@ -29,6 +29,7 @@ from .values import (
     check_piece,
     check_positions,
     check_ring,
+    check_symmetry,
     shortest_and_longest,
 )
 
@@ -63,6 +64,7 @@ class Settings(
         super().__post_init__()
         object.__setattr__(self, "fixed", check_positions(self.fixed))
         object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
+        object.__setattr__(self, "symmetry", check_symmetry(self.symmetry))
         object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))
         object.__setattr__(self, "line_names", check_names(self.line_names, len(self.fixed_lines)))
 

@@ -68,6 +68,23 @@ def _coordinates(given: Any, refusal: str, needs: str) -> tuple[tuple[float, ...
     return found
 
 
+def check_symmetry(given: Any) -> str | tuple[tuple[float, ...], ...]:
+    """Return mirror planes as the settings hold them: "" for none, "auto", or rows of a point and a normal, or refuse them."""
+    if given is None or (isinstance(given, str) and given in ("", "auto")):
+        return given or ""
+    refusal = f"symmetry must be auto or rows of six numbers, a point and a normal, got {given!r}"
+    if isinstance(given, str):
+        raise InputError(refusal)
+    try:
+        rows = tuple(tuple(float(c) for c in row) for row in given)
+    except (TypeError, ValueError):
+        raise InputError(refusal) from None
+    for row in rows:
+        if len(row) != 6 or not all(map(math.isfinite, row)) or not any(row[3:]):
+            raise InputError(f"a mirror plane needs a point and a normal, six finite numbers, got {row}")
+    return rows or ""
+
+
 def check_length_field(given: Any) -> str | Lengths:
     """Return a length field as the settings hold it: "" for none, "curvature:MIN:MAX", or rows of x, y, z, length.
 

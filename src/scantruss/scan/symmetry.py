@@ -1,0 +1,243 @@
+"""Mirror planes of a scan: found by reflecting it onto itself, or checked where the user gives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import InputError
+
+SYMMETRY_TOLERANCE = 0.1  #: by how far 95 % of a scan may lie off its mirror image [member lengths]
+CELLS_ACROSS = 60  #: of the cells in each of which one place stands for the scan, along its longest side
+FEWEST_PLACES = 50  #: from which a symmetry can be told
+TRIED = 400  #: places with which a plane is tried first
+TURN_STEP = 2.0  #: between the directions tried about each principal axis [degree]
+REFINED = 12  #: planes that are refined
+APART = 5.0  #: of two planes [degree]
+REFINEMENTS = 15  #: Gauss-Newton steps of a plane
+NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
+QUANTILE = 0.95  #: of the places, which the misfit holds for
+MOST_FOLD = 6  #: mirror planes through one axis that are kept
+CONFORMING = 2.0  #: by how far planes through one axis may be off equal angles [degree]
+
+
+@dataclass(frozen=True)
+class MirrorPlane:
+    """A plane in which a scan is its own mirror image."""
+
+    point: tuple[float, float, float]  #: on the plane, in the frame of the scan [scan unit]
+    normal: tuple[float, float, float]  #: unit; its largest component is positive
+    misfit: float  #: distance within which 95 % of the scan lie from its mirror image [scan unit]
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """Point and normal, as settings hold it."""
+        return (*self.point, *self.normal)
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Places that stand for a scan, evenly, with normals."""
+
+    at: np.ndarray  #: (Q, 3) relative to their middle
+    normals: np.ndarray  #: (Q, 3)
+    tree: cKDTree
+    cell: float
+    origin: np.ndarray  #: (3,)
+
+    def misfits(self, normal: np.ndarray, offset: float, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how far some places, reflected, are off the surface, and the nearest place to each."""
+        image = self.at[tried] - 2.0 * np.outer(self.at[tried] @ normal - offset, normal)
+        apart, nearest = self.tree.query(image)
+        off = np.abs(((image - self.at[nearest]) * self.normals[nearest]).sum(axis=1))
+        return np.where(apart > NEAR_CELLS * self.cell, apart, off), nearest
+
+
+def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlane, ...]:
+    """Return the mirror planes of a scan: one, or several through one axis at equal angles, exactly so.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 [scan unit]
+    tolerance : float
+        Within which 95 % of the scan must lie from its mirror image [scan unit].
+
+    Raises
+    ------
+    InputError
+        The scan has no mirror plane within the tolerance.
+    """
+    places = _places(points)
+    planes = _candidates(places)
+    found = sorted((_refined(places, normal, offset) for normal, offset in planes), key=lambda each: each[2])
+    good: list[tuple[np.ndarray, float, float]] = []
+    for each in found:
+        alone = all(abs(float(each[0] @ other[0])) < math.cos(math.radians(APART)) for other in good)
+        if each[2] <= tolerance and alone:
+            good.append(each)
+    if not good:
+        raise InputError(
+            f"the scan has no mirror plane within {tolerance:.4g}, a tenth of a member: the best leaves 95 % of it within"
+            f" {found[0][2]:.4g} of its image; leave --symmetry out"
+        )
+    return _through_one_axis(places, good)
+
+
+def check_mirror_planes(
+    points: np.ndarray, rows: Sequence[Sequence[float]], tolerance: float
+) -> tuple[MirrorPlane, ...]:
+    """Return planes that the user gives, if the scan is symmetric in each of them; see `find_mirror_planes`."""
+    places = _places(points)
+    planes = []
+    for number, row in enumerate(rows, 1):
+        point, normal = np.array(row[:3], float), np.array(row[3:], float)
+        normal = _oriented(normal / np.linalg.norm(normal))
+        off, _ = places.misfits(normal, float((point - places.origin) @ normal), np.arange(len(places.at)))
+        misfit = float(np.quantile(off, QUANTILE))
+        if misfit > tolerance:
+            raise InputError(
+                f"the scan is not symmetric in mirror plane {number}: 95 % of it lie within {misfit:.4g} of its image, and"
+                f" {tolerance:.4g}, a tenth of a member, is needed"
+            )
+        planes.append(MirrorPlane(_three(point), _three(normal), misfit))
+    normals = np.array([plane.normal for plane in planes])
+    for k in range(1, len(planes)):
+        if np.abs(normals[:k] @ normals[k]).max() > math.cos(math.radians(APART)):
+            raise InputError(f"mirror plane {k + 1} is nearly one of those before; give each once")
+    if len(planes) > 1 and _axis_of(normals) is None:
+        raise InputError("several mirror planes must meet in one line at equal angles, such as two that are square")
+    return tuple(planes)
+
+
+def _places(points: np.ndarray) -> _Places:
+    """Return the means of the points in even cells, with normals from their neighbours."""
+    low, size = points.min(axis=0), float(np.ptp(points, axis=0).max())
+    cell = size / CELLS_ACROSS
+    keys = np.floor((points - low) / max(cell, 1e-300)).astype(np.int64)
+    _, inverse = np.unique(keys @ [1, 1 << 20, 1 << 40], return_inverse=True)
+    counts = np.bincount(inverse.ravel())
+    at = np.stack([np.bincount(inverse.ravel(), points[:, k] - low[k]) / counts for k in range(3)], axis=1)
+    if len(at) < FEWEST_PLACES:
+        raise InputError(f"the scan has too few points for its symmetry to be told: {len(points):,}")
+    middle = at.mean(axis=0)
+    at -= middle
+    tree = cKDTree(at)
+    _, near = tree.query(at, k=9)
+    around = at[near] - at[near].mean(axis=1, keepdims=True)
+    normals = np.linalg.eigh(np.einsum("qki,qkj->qij", around, around))[1][:, :, 0]
+    return _Places(at, normals, tree, cell, low + middle)
+
+
+def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
+    """Return planes through the middle that leave the scan nearest to itself: among those square to or along a principal axis."""
+    _, axes = np.linalg.eigh(places.at.T @ places.at)
+    turns = np.radians(np.arange(0.0, 180.0, TURN_STEP))
+    normals = np.concatenate(
+        [
+            np.outer(np.cos(turns), axes[:, (k + 1) % 3]) + np.outer(np.sin(turns), axes[:, (k + 2) % 3])
+            for k in range(3)
+        ]
+    )
+    tried = np.unique(np.linspace(0, len(places.at) - 1, TRIED).astype(np.int64))
+    score = np.array([np.minimum(places.misfits(n, 0.0, tried)[0], 3 * places.cell).mean() for n in normals])
+    chosen: list[int] = []
+    for k in np.argsort(score, kind="stable").tolist():
+        if all(abs(float(normals[k] @ normals[j])) < math.cos(math.radians(2 * APART)) for j in chosen):
+            chosen.append(k)
+    return [(normals[k], 0.0) for k in chosen[:REFINED]]
+
+
+def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float, float]:
+    """Return a plane moved to where the scan is nearest to its image, and its misfit: iterated closest points to planes."""
+    everything = np.arange(len(places.at))
+    for _ in range(REFINEMENTS):
+        off, nearest = places.misfits(normal, offset, everything)
+        use = off < NEAR_CELLS * places.cell
+        if use.sum() < FEWEST_PLACES:
+            break
+        at, target, across = places.at[use], places.at[nearest[use]], places.normals[nearest[use]]
+        height = at @ normal - offset
+        residual = ((at - 2.0 * np.outer(height, normal) - target) * across).sum(axis=1)
+        axes = np.linalg.svd(normal[None])[2][1:]  # two directions across the normal
+        along = across @ normal
+        slopes = [-2.0 * ((at @ axis) * along + height * (across @ axis)) for axis in axes]
+        table = np.stack([*slopes, 2.0 * along], axis=1)
+        step = np.linalg.lstsq(table, -residual, rcond=None)[0]
+        turned = normal + step[0] * axes[0] + step[1] * axes[1]
+        offset += float(step[2])
+        normal = turned / np.linalg.norm(turned)
+    off, _ = places.misfits(normal, offset, everything)
+    sign = 1.0 if np.array_equal(_oriented(normal), normal) else -1.0
+    return sign * normal, sign * offset, float(np.quantile(off, QUANTILE))
+
+
+def _through_one_axis(places: _Places, good: list[tuple[np.ndarray, float, float]]) -> tuple[MirrorPlane, ...]:
+    """Return the largest set of planes through one axis at equal angles, the best of them as it is; else the best alone."""
+    best, others = good[0], good[1:]
+    for fold in range(MOST_FOLD, 1, -1):
+        for other in others:
+            axis = np.cross(best[0], other[0])
+            axis /= np.linalg.norm(axis)
+            planes = [best]
+            for k in range(1, fold):
+                turned = _turned(best[0], axis, math.pi * k / fold)
+                near = [each for each in good if abs(float(each[0] @ turned)) > math.cos(math.radians(CONFORMING))]
+                planes += near[:1]
+            if len(planes) == fold:
+                return _exact(places, planes, axis)
+    return (_plane(places, *best),)
+
+
+def _exact(places: _Places, planes: list[tuple[np.ndarray, float, float]], axis: np.ndarray) -> tuple[MirrorPlane, ...]:
+    """Return planes through one axis at exactly equal angles."""
+    normals, offsets = np.array([each[0] for each in planes]), np.array([each[1] for each in planes])
+    axis = _oriented(axis)
+    centre = np.linalg.lstsq(np.concatenate([normals, axis[None]]), np.append(offsets, 0.0), rcond=None)[0]
+    first = normals[0] - (normals[0] @ axis) * axis
+    first /= np.linalg.norm(first)
+    exact = []
+    for k, (normal, _, misfit) in enumerate(planes):
+        turned = _turned(first, axis, math.pi * k / len(planes))
+        turned = turned if turned @ normal > 0 else -turned
+        exact.append(_plane(places, turned, float(turned @ centre), misfit, centre))
+    return tuple(exact)
+
+
+def _axis_of(normals: np.ndarray) -> np.ndarray | None:
+    """Return the line in which planes meet at equal angles; None where they do not."""
+    axis = np.cross(normals[0], normals[1])
+    axis /= np.linalg.norm(axis)
+    if np.abs(normals @ axis).max() > math.sin(math.radians(CONFORMING)):
+        return None
+    beside = np.cross(axis, normals[0])
+    angle = np.sort(np.degrees(np.arctan2(normals @ beside, normals @ normals[0])) % 180.0)
+    angle = np.sort(np.where(angle > 180.0 - CONFORMING, angle - 180.0, angle))
+    even = np.arange(len(normals)) * 180.0 / len(normals)
+    return axis if np.abs(angle - even).max() < CONFORMING else None
+
+
+def _plane(
+    places: _Places, normal: np.ndarray, offset: float, misfit: float, centre: np.ndarray | None = None
+) -> MirrorPlane:
+    """Return the record of a plane, through `centre` where one is given."""
+    point = offset * normal if centre is None else centre
+    return MirrorPlane(_three(places.origin + point), _three(_oriented(normal)), misfit)
+
+
+def _turned(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return a vector square to a unit axis turned about it."""
+    return np.asarray(math.cos(angle) * vector + math.sin(angle) * np.cross(axis, vector))
+
+
+def _oriented(normal: np.ndarray) -> np.ndarray:
+    """Return a normal of which the largest component is positive."""
+    return normal if normal[np.abs(normal).argmax()] > 0 else -normal
+
+
+def _three(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

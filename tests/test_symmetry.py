@@ -1,0 +1,118 @@
+"""Mirror planes: found in scans, kept exactly by the grid, refused where there are none."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.errors import FrontError, InputError
+from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes
+
+LENGTH = 12.0  # of members of the vault, 100 long
+
+
+def vault(turn: float = 0.0, size: tuple[float, float] = (100.0, 70.0), lean: float = 0.0) -> np.ndarray:
+    """A shallow vault on a rectangle, its crown leaning to one side, turned about z and away from the origin."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-1, 1, 121), np.linspace(-1, 1, 85)))
+    z = 30 * (1 - x**2) * (1 - 0.5 * y**2) + lean * (1 - x**2) * x
+    c, s = np.cos(turn), np.sin(turn)
+    places = np.stack([size[0] / 2 * x, size[1] / 2 * y, z], axis=1)
+    return places @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + [500.0, -200.0, 10.0]
+
+
+def reflected(grid: st.Grid, row: tuple[float, ...]) -> np.ndarray:
+    """The nodes of a grid on the other side of a plane."""
+    normal = np.array(row[3:]) / np.linalg.norm(row[3:])
+    places = grid.nodes + (grid.origin - np.array(row[:3]))
+    return grid.nodes - 2 * np.outer(places @ normal, normal)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_both_planes_of_a_vault_are_found_wherever_it_stands(turn: float) -> None:
+    planes = find_mirror_planes(vault(turn), 0.5)
+    along = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0]])
+    assert len(planes) == 2
+    for plane in planes:
+        assert np.abs(along @ plane.normal).max() == pytest.approx(1, abs=1e-6) and plane.misfit < 0.1
+        assert np.dot(np.subtract([500, -200, 10], plane.point), plane.normal) == pytest.approx(0, abs=0.02)
+    assert np.dot(planes[0].normal, planes[1].normal) == pytest.approx(0, abs=1e-12)
+
+
+def test_a_crown_that_leans_leaves_one_plane_and_a_given_one_is_checked() -> None:
+    points = vault(lean=12.0)
+    (plane,) = find_mirror_planes(points, 0.5)
+    assert abs(plane.normal[1]) == pytest.approx(1, abs=1e-6)
+    with pytest.raises(InputError, match="not symmetric in mirror plane 1: 95 % of it lie within"):
+        check_mirror_planes(points, [(500, -200, 0, 1, 0, 0)], 0.5)
+    with pytest.raises(InputError, match="meet in one line at equal angles"):
+        check_mirror_planes(vault(), [(500, -200, 0, 0, 1, 0), (500, -200, 0, 1, 0.3, 0)], 50.0)
+
+
+def test_a_scan_without_a_mirror_plane_is_refused() -> None:
+    x, y = np.random.default_rng(2).random((2, 4000))
+    points = np.stack([100 * x, 60 * y, 20 * x * y + 15 * np.sin(5 * x + 3 * y)], axis=1)
+    with pytest.raises(InputError, match=r"no mirror plane within 0.5, a tenth of a member: the best leaves 95 %"):
+        find_mirror_planes(points, 0.5)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("lean", [0.0, 12.0])
+def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
+    settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick")
+    grid = st.grid_from_points(vault(0.3, lean=lean), settings)
+    assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
+    rows = grid.settings.symmetry
+    assert len(rows) == (2 if lean == 0 else 1)
+    members = {frozenset(pair) for pair in grid.edges.tolist()}
+    exact = 1e-12 * 700
+    for row in rows:
+        assert not isinstance(row, str)
+        apart, image = cKDTree(grid.nodes).query(reflected(grid, tuple(row)))
+        assert apart.max() < exact and np.array_equal(image[image], np.arange(len(image)))
+        assert {frozenset(image[list(pair)].tolist()) for pair in members} == members
+        on = np.flatnonzero(image == np.arange(len(image)))
+        assert sum(pair <= set(on.tolist()) for pair in members) >= len(on) - 1 >= 4  # rows of members on the plane
+    distinct = len(np.unique(np.round(grid.lengths, 9)))
+    assert distinct < (0.4 if lean == 0 else 0.65) * len(grid.lengths)
+    made = st.schedule(grid.replace(unit="m"), st.ScheduleSettings(tube=100.0))
+    assert None not in made.panel_types["mirror image"] and None not in made.node_types["mirror image"]
+    again = st.grid_from_points(vault(0.3, lean=lean), grid.settings)
+    assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
+
+
+@pytest.mark.kernels
+def test_a_fixed_line_without_its_image_is_refused() -> None:
+    line = [(520.0, -215.0, 33.0), (535.0, -215.0, 22.0)]
+    points = vault()
+    line = [tuple(points[np.linalg.norm(points[:, :2] - place[:2], axis=1).argmin()]) for place in line]
+    with pytest.raises(FrontError, match="is not symmetric in the mirror planes, near"):
+        st.grid_from_points(points, st.Settings(length=LENGTH, symmetry="auto", fixed_lines=[line], effort="quick"))
+
+
+@pytest.mark.kernels
+def test_the_command_takes_planes_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("shell.xyz", vault())
+    Path("planes.txt").write_text("# the long way\n500, -200, 0, 0, 1, 0\n")
+    words = f"grid shell.xyz shell.json --length {LENGTH} --effort quick --symmetry"
+    assert main([*words.split(), "planes.txt"]) == 0
+    said = capsys.readouterr()
+    assert "symmetric in 1 mirror plane, as point and normal: 500, -200, 0, 0, 1, 0" in said.out + said.err
+    assert '"symmetry": [[500.0, -200.0, 0.0, 0.0, 1.0, 0.0]]' in " ".join(
+        Path("shell.settings.json").read_text().split()
+    ).replace("[ ", "[").replace(" ]", "]")
+    for text, reason in (
+        ("500,-200,0", "line 1: a mirror plane needs six numbers"),
+        ("0,0,0,0,0,0", "a mirror plane needs a point and a normal"),
+        ("", "holds no mirror plane"),
+        ("500,-200,0,1,1,0", "the scan is not symmetric in mirror plane 1"),
+    ):
+        Path("bad.txt").write_text(text)
+        assert main([*words.replace("shell.json", "bad.json").split(), "bad.txt"]) == 2
+        error = capsys.readouterr().err
+        assert reason in error and error.count("\n") == 1 and not Path("bad.json").exists(), error
