@@ -257,7 +257,9 @@ def named_holes(
             found.add(holes[0])
         elif near or distance_from_scan(samples.surface, here) > AT_HOLE * length:
             what = "at the outer boundary, which cannot be closed" if near else "not at the scan"
-            raise InputError(f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole")
+            raise InputError(
+                f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole"
+            )
     return found
 
 
