@@ -42,6 +42,7 @@ def studio(values: Namespace) -> None:
     if not 0 <= values.port < 65536:
         raise InputError(f"--port needs a number from 0 to 65535, got {values.port}")
     project = project_of(values)
+    import sys
     import time
     import webbrowser
 
@@ -53,6 +54,7 @@ def studio(values: Namespace) -> None:
     session = Session(project, folder=Path.cwd())
     if values.source is not None:
         session.open(Path(values.source))
+        session.show_quick()
     browsers = Browsers(session)
     server, guard = start_server(values.host, values.port)
     try:
@@ -61,6 +63,7 @@ def studio(values: Namespace) -> None:
         address = f"http://{shown}:{server.get_port()}/" + (f"?token={guard.token}" if guard.token else "")
         saved = f"saved as {project} after each step" if project is not None else "saved here as soon as a scan is open"
         print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
+        sys.stdout.flush()  # for whoever reads it from a pipe, as nothing else is said
         if not values.no_open:
             webbrowser.open(address)
         while True:  # until Ctrl-C or SIGTERM, as servers do

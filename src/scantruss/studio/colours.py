@@ -11,14 +11,19 @@ from ..check.distances import distances_to_grid
 from ..export.page_tables import PageColumn
 from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
+from ..settings import Settings
+from ..surface.chosen_samples import KEPT
+from ..surface.samples import sample_surface
 
-RISING = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)], float)
+RISING = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (230, 226, 106)], float)
 DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
 PLAIN = np.array([60, 90, 110], np.uint8)
 DIMMED = np.array([215, 218, 220], np.uint8)
 BARS = 24  #: of a histogram
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
-SCAN_COLOURINGS = ("height", "distance from the grid", "normals", "plain")
+LEFT_OUT = "outliers in red"
+SCAN_COLOURINGS = ("height", "distance from the grid", "normals", LEFT_OUT, "plain")
+RED = np.array([200, 20, 20], np.uint8)
 
 
 def ramp(share: np.ndarray, stops: np.ndarray) -> np.ndarray:
@@ -69,7 +74,7 @@ def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -
 
 
 def colors_of_scan(
-    cloud: PointCloud, taken: np.ndarray, grid: Grid | None, wanted: str
+    cloud: PointCloud, taken: np.ndarray, grid: Grid | None, settings: Settings, wanted: str
 ) -> tuple[np.ndarray, tuple[str, float, float] | None]:
     """Return (K, 3) uint8 colours of some points of a scan, and words and ends of the scale, where there is one.
 
@@ -82,6 +87,9 @@ def colors_of_scan(
     if wanted == "normals":
         normals = cloud.normals[taken] if cloud.normals is not None else _normals(points)
         return (127.5 * (normals + 1.0)).astype(np.uint8), None
+    if wanted == LEFT_OUT:
+        kept = sample_surface(cloud, settings).judged[taken] == KEPT
+        return np.where(kept[:, None], PLAIN, RED), None
     if wanted == "distance from the grid" and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..surface.samples import sample_surface
 from .frame import SceneFrame
 from .picking import nearest_point
 
@@ -64,16 +65,22 @@ class FixedNodes:
 
     def place(self, origin: np.ndarray, ahead: np.ndarray) -> None:
         """Place a fixed node on the scan under a ray of the scene, or choose the one that is there."""
-        frame, cloud = self.view.frame, self.view.session.cloud
-        assert cloud is not None
+        frame = self.view.frame
         places = frame.to_scene(np.array(self._fixed).reshape(-1, 3)) if self._fixed else np.zeros((0, 3), np.float32)
         if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
             self._show(there)
             return
-        found = nearest_point(frame.to_scene(cloud.points + cloud.origin), origin, ahead)
+        scanned = self._scanned()
+        found = nearest_point(frame.to_scene(scanned), origin, ahead)
         if found is None:
             raise InputError("no point of the scan is there; click on the scan")
-        self._set(tuple((cloud.points[found] + cloud.origin).tolist()), len(self._fixed))
+        self._set(tuple(scanned[found].tolist()), len(self._fixed))
+
+    def _scanned(self) -> np.ndarray:
+        """Return the points of the scan that are no outliers (N, 3), in its own frame [scan unit]."""
+        cloud = self.view.session.cloud
+        assert cloud is not None
+        return sample_surface(cloud, self.view.session.settings).measured_points + cloud.origin
 
     def _choose(self) -> None:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)
@@ -102,10 +109,9 @@ class FixedNodes:
 
     def _drop(self, at: np.ndarray, number: int) -> None:
         """Move a fixed node to the point of the scan that is nearest to where it was dropped."""
-        cloud, frame = self.view.session.cloud, self.view.frame
-        assert cloud is not None
-        away = np.linalg.norm(cloud.points + cloud.origin - frame.from_scene(at), axis=1)
-        self._set(tuple((cloud.points[int(away.argmin())] + cloud.origin).tolist()), number)
+        scanned = self._scanned()
+        away = np.linalg.norm(scanned - self.view.frame.from_scene(at), axis=1)
+        self._set(tuple(scanned[int(away.argmin())].tolist()), number)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the fixed nodes of a state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from ..scan.cloud import PointCloud
 
 DRAWN_EXTENT = 10.0  #: of the scan in the scene, whose camera is made for such sizes
+POINTS_FOR_FRAME = 100_000  #: from which the extent of the bulk is measured
+OUTSIDE = 0.005  #: share of the points that may lie beyond each side of the frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +23,13 @@ class SceneFrame:
 
     @classmethod
     def of(cls, cloud: PointCloud) -> SceneFrame:
-        """Return the frame of a scan."""
-        return cls(cloud.origin + (cloud.bounds[0] + cloud.bounds[1]) / 2, DRAWN_EXTENT / (cloud.extent or 1.0))
+        """Return the frame of a scan, measured once: around the bulk of its points, without outliers."""
+        if cloud not in _FRAMES:
+            every = max(1, len(cloud.points) // POINTS_FOR_FRAME)
+            low, high = np.quantile(cloud.points[::every], (OUTSIDE, 1.0 - OUTSIDE), axis=0)
+            extent = float((high - low).max()) or cloud.extent or 1.0
+            _FRAMES[cloud] = cls(cloud.origin + (low + high) / 2, DRAWN_EXTENT / extent)
+        return _FRAMES[cloud]
 
     def to_scene(self, places: np.ndarray) -> np.ndarray:
         """Return places (N, 3) [scan unit] in the scene, float32."""
@@ -32,6 +40,9 @@ class SceneFrame:
         """Return places (N, 3) of the scene in the frame of the scan [scan unit]."""
         found: np.ndarray = np.asarray(places, np.float64) / self.factor + self.middle
         return found
+
+
+_FRAMES: weakref.WeakKeyDictionary[PointCloud, SceneFrame] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True)

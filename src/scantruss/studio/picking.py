@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 NEAR_ENOUGH = 0.012  #: largest angle between a ray and what it hits [rad]
+SAME_DEPTH = 0.03  #: of points that may be hit, behind the first of them [share of its depth]
 
 
 def along_and_off(places: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -18,7 +19,10 @@ def nearest_point(places: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> 
     """Return which of some points (N, 3) a ray from `origin` (3,) in direction `ahead` (3,) hits first; None if it hits none."""
     depth, off = along_and_off(places, origin, ahead)
     hit = off < NEAR_ENOUGH
-    return int(np.where(hit, depth, np.inf).argmin()) if hit.any() else None
+    if not hit.any():
+        return None
+    front = depth < depth[hit].min() * (1.0 + SAME_DEPTH)
+    return int(np.where(hit & front, off, np.inf).argmin())
 
 
 def nearest_member(ends: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> tuple[int, float] | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .colours import DIMMED, PLAIN
 from .frame import DRAWN_EXTENT, SectionPlane
+from .tone import to_be_seen
 
 if TYPE_CHECKING:
     from ..export.model import Model
@@ -17,6 +18,7 @@ SELECTED_COLOR = (230, 97, 1)
 LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
 TUBE_SIDES = 8
+DRAWN_SHARE = 0.93  #: of a panel about its middle, so that it does not cover its members
 OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float32)
 BALL_FACES = np.array(
     [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]], np.int32
@@ -47,7 +49,7 @@ class Scene:
         if not len(ends):
             self.remove(name)
             return
-        each = np.broadcast_to(colors, (len(ends), 3))
+        each = np.broadcast_to(to_be_seen(colors), (len(ends), 3))
         self.api.add_line_segments(
             name, ends.astype(np.float32), np.repeat(each[:, None], 2, axis=1), thickness=width, thickness_units="screen"
         )  # fmt: skip
@@ -104,17 +106,19 @@ class Scene:
         self.remove(name, f"{name} coloured")
         if not len(triangles):
             return
+        corners = nodes[triangles]
+        middles = corners.mean(axis=1, keepdims=True)
+        corners = (middles + DRAWN_SHARE * (corners - middles)).reshape(-1, 3).astype(np.float32)
+        faces = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
         if colors is None:
             self.api.add_mesh_simple(
-                name, nodes, triangles, color=PANEL_COLOR, side="double", flat_shading=True, opacity=opacity
+                name, corners, faces, color=PANEL_COLOR, side="double", flat_shading=True, opacity=opacity
             )
             return
         import trimesh
 
-        body = trimesh.Trimesh(
-            nodes[triangles].reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False
-        )
-        rgba = np.concatenate([np.repeat(colors, 3, axis=0), np.full((3 * len(triangles), 1), 255)], axis=1)
+        body = trimesh.Trimesh(corners, faces, process=False)
+        rgba = np.concatenate([np.repeat(colors, 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
         body.visual.vertex_colors = rgba.astype(np.uint8)
         self.api.add_mesh_trimesh(f"{name} coloured", body)
 

@@ -124,6 +124,19 @@ def _guarded(guard: Guard) -> Iterator[None]:
         raise InputError("this version of viser cannot be guarded; install viser 1.1")
 
 
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep viser from its greeting, an address that lacks the token."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
+
+
 def start_server(host: str, port: int) -> tuple[Any, Guard]:
     """Start the server.
 
@@ -153,7 +166,7 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
             ) from None
         port = trial.getsockname()[1]
     guard = Guard(host)
-    with _guarded(guard):
+    with _guarded(guard), _silent():
         server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
     server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
     return server, guard

@@ -174,6 +174,7 @@ class Session:
                     return
                 cloud = read_whole(path)
             self._start(replace(cloud, name=own))
+            self._make("quick", progress, live=True)
 
         self.worker.ask(read)
 
@@ -247,6 +248,10 @@ class Session:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
         self.change("length", goes_on=True, settings=self.settings.replace(length=length))
         return self._ask_live()
+
+    def show_quick(self) -> bool:
+        """Make a quick grid of what was opened."""
+        return self.cloud is not None and self.grid is None and self._ask_live()
 
     def _ask_live(self) -> bool:
         return self.worker.ask(lambda progress: self._make("quick", progress, live=True), quick=True)

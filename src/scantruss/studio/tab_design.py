@@ -96,7 +96,7 @@ class DesignTab:
         if cloud is None:
             self.about.content = "Open a scan: any format that `scantruss info` reads."
         elif before is None or before.cloud is not cloud:
-            low, high = session.length_bounds()
+            low, high = (float(f"{bound:.3g}") for bound in session.length_bounds())
             step = float(f"{(high - low) / SLIDER_STEPS or 1.0:.1g}")
             self.slider.min, self.slider.max, self.slider.step = low, max(high, low + step), step
             saved = f"; saved as {session.place.name} after each step" if session.place is not None else "; not saved"

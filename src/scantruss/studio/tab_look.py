@@ -136,7 +136,7 @@ class LookTab:
             return
         self._scan_key = key
         taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // DRAWN_POINTS)))
-        colors, scale = colors_of_scan(state.cloud, taken, state.grid, wanted)
+        colors, scale = colors_of_scan(state.cloud, taken, state.grid, state.settings, wanted)
         self.scan_legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
         places = self.view.frame.to_scene(state.cloud.points[taken] + state.cloud.origin)
         if self.section is not None:

@@ -28,6 +28,7 @@ from .tab_structure import StructureTab
 from .worker import words_of
 
 SELECT = "select"
+NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 CLICKS = (SELECT, "place fixed node", "switch hole or ridge", "support")  #: what a click in the scene does
 
 
@@ -202,5 +203,6 @@ class StudioView:
             for tab in self.tabs:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
-                self.client.camera.position = tuple(DRAWN_EXTENT * share for share in (0.4, -0.75, 0.5))
+                self.client.camera.fov = NATURAL_VIEW
+                self.client.camera.position = tuple(DRAWN_EXTENT * share for share in (0.7, -1.15, 0.75))
                 self.client.camera.look_at = (0.0, 0.0, 0.0)
