@@ -8,7 +8,7 @@ import numpy as np
 
 from .colours import colors_of, legend_of
 from .compare import comparison, deviation, kept_design
-from .frame import DRAWN_EXTENT
+from .frame import BESIDE, DRAWN_EXTENT
 from .state import Design
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 PRESENT = "the present one"
 NO_OTHER = "-"
-BESIDE = 1.15  #: how far the second design is drawn beside the first [extent of the scan]
 
 
 class CompareTab:
@@ -36,8 +35,12 @@ class CompareTab:
         self.table = gui.add_html("")
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
         drop.on_click(view.step(self._drop))
-        for each in (self.other, self.distance):
-            each.on_update(view.step(lambda: self._draw(view.session.state)))
+        self.other.on_update(view.step(self._choose))
+        self.distance.on_update(view.step(lambda: self._draw(view.session.state)))
+
+    def _choose(self) -> None:
+        self._draw(self.view.session.state)
+        self.view.overview(1 if self.other.value == NO_OTHER else 2)
 
     def _drop(self) -> None:
         if self.other.value != NO_OTHER:

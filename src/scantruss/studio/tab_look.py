@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..export.page_tables import PageColumn, colorings_of
-from .colours import SCAN_COLOURINGS, colors_of, colors_of_scan, histogram_of, legend_of, values_of
+from .colours import DIMMED, SCAN_COLOURINGS, colors_of, colors_of_scan, histogram_of, legend_of, values_of
 from .frame import SectionPlane
 from .scene import BALL_RADIUS, TUBE_RADIUS, cut, drawn_colors, plain_colors
 
@@ -22,7 +22,7 @@ PLAIN_GRID = "plain"
 WHOLE = "none"
 LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
 TURN_SIZE = (540, 960)  #: height and width of a turntable [pixel]
-TURN_FRAMES, TURN_MILLISECONDS = 48, 80  #: of a turntable, and how long each is shown
+TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each is shown
 PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 
 
@@ -166,6 +166,8 @@ class LookTab:
             self.count.content = f"{said}{len(self._values):,} {choice['kind']}"
         section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
+        if self.view.structure.is_moved:
+            of_members = np.broadcast_to(DIMMED, of_members.shape)
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         scene.lines("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
@@ -177,9 +179,10 @@ class LookTab:
             kept if self.nodes.value or self.tubes.value or colors["nodes"] is not None else np.zeros(len(places), bool)
         )
         of_nodes = plain_colors(len(places)) if colors["nodes"] is None else colors["nodes"]
-        as_balls, as_points = (drawn, drawn & False) if self.tubes.value else (drawn & False, drawn)
+        as_balls = drawn if self.tubes.value and colors["nodes"] is None else drawn & False
+        as_points = drawn & ~as_balls  # their colours are those of the legend, without shade
         scene.balls("/grid/balls", places[as_balls], of_nodes[as_balls], BALL_RADIUS * size)
-        scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.12 * size)
+        scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.2 * size)
         triangles, of_panels = model.triangles, colors["panels"]
         visible = np.ones(len(triangles), bool) if section is None else kept[triangles].all(axis=1)
         visible &= self.panels.value or of_panels is not None
@@ -196,7 +199,7 @@ class LookTab:
 
     def _picture(self) -> None:
         height, width = LARGE_PICTURE
-        pixels = self.view.client.get_render(height, width, transport_format="jpeg", timeout=PICTURE_PATIENCE)
+        pixels = self._shot(height, width)
         self._send("scantruss.png", [pixels], "PNG")
 
     def _turntable(self) -> None:
@@ -209,16 +212,16 @@ class LookTab:
             turn = 2 * np.pi * k / TURN_FRAMES
             around = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
             place = target + around @ (position - target)
-            frames.append(
-                self.view.client.get_render(
-                    *TURN_SIZE,
-                    wxyz=facing(place, target),
-                    position=tuple(place),
-                    fov=camera.fov,
-                    timeout=PICTURE_PATIENCE,
-                )
-            )
+            frames.append(self._shot(*TURN_SIZE, wxyz=facing(place, target), position=tuple(place), fov=camera.fov))
         self._send("turntable.gif", frames, "GIF")
+
+    def _shot(self, height: int, width: int, **camera: Any) -> np.ndarray:
+        """Return what the browser draws, (height, width, 3) uint8."""
+        try:
+            pixels: np.ndarray = self.view.client.get_render(height, width, timeout=PICTURE_PATIENCE, **camera)
+        except (RuntimeError, TimeoutError):
+            raise InputError("the browser gave no picture; keep the page open and in front") from None
+        return pixels
 
     def _send(self, name: str, frames: list[np.ndarray], kind: str) -> None:
         from PIL import Image

@@ -53,8 +53,18 @@ class StructureTab:
         animate = gui.add_button("Animate")
         run.on_click(view.step(self._run))
         animate.on_click(view.step(self._animate))
-        for each in (self.case, self.factor, self.loads, self.supports):
+        self.case.on_update(view.step(self._choose))
+        for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(lambda: self._draw(view.session.state)))
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether a displaced shape is drawn."""
+        return bool(self.case.value != AS_BUILT)
+
+    def _choose(self) -> None:
+        self._draw(self.view.session.state)
+        self.view.look.draw()
 
     def _run(self) -> None:
         self.view.session.set_structure(**{name: each.value for name, each in self.words.items()})

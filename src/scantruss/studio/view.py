@@ -14,7 +14,7 @@ from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
-from .frame import DRAWN_EXTENT, SceneFrame
+from .frame import BESIDE, DRAWN_EXTENT, SceneFrame
 from .outputs import model_to_show
 from .picking import pick
 from .scene import Scene
@@ -187,6 +187,13 @@ class StudioView:
             self.client.camera.position = tuple(where + reach * np.array([0.5, -0.5, 0.7]))
             self.client.camera.look_at = tuple(where)
 
+    def overview(self, designs: int = 1) -> None:
+        """Move the camera so that all of the scan is seen, or of several designs side by side."""
+        middle = np.array([0.5 * BESIDE * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
+        self.client.camera.fov = NATURAL_VIEW
+        self.client.camera.position = tuple(middle + DRAWN_EXTENT * (0.3 + 0.7 * designs) * np.array([0.8, -1.4, 0.9]))
+        self.client.camera.look_at = tuple(middle)
+
     def update(self) -> None:
         """Show what the session holds; called from any thread."""
         session = self.session
@@ -203,6 +210,4 @@ class StudioView:
             for tab in self.tabs:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
-                self.client.camera.fov = NATURAL_VIEW
-                self.client.camera.position = tuple(DRAWN_EXTENT * share for share in (0.7, -1.15, 0.75))
-                self.client.camera.look_at = (0.0, 0.0, 0.0)
+                self.overview()
