@@ -31,9 +31,8 @@ def opened(scan: Path, project: Path | None = None) -> Session:
     """Open a scan in metres."""
     session = Session(project)
     session.open(scan)
-    assert session.cloud is not None
-    session.settings = session.settings.replace(length=1.0, unit="m")
-    session.cloud = st.PointCloud.from_array(session.cloud.points + session.cloud.origin, unit="m", name="dome.xyz")
+    session.set_unit("m")
+    session.change("length", settings=session.settings.replace(length=1.0))
     return session
 
 
@@ -60,7 +59,7 @@ def test_the_newest_length_wins_and_a_live_grid_is_never_saved(scan: Path, tmp_p
         assert session.live(length)
     assert session.worker.wait(PATIENCE)
     assert session.grid is not None and session.grid.settings is not None
-    assert session.grid.settings.length == 1.25 and session.is_live
+    assert session.grid.settings.length == 1.25 and session.state.is_live
     assert (tmp_path / "a.scantruss").read_bytes() == before
 
 
@@ -75,7 +74,7 @@ def test_a_project_opens_as_it_was(scan: Path, tmp_path: Path) -> None:
     assert session.cloud is not None and again.cloud is not None
     assert np.array_equal(again.cloud.points, session.cloud.points)
     assert np.array_equal(again.cloud.origin, session.cloud.origin) and again.cloud.unit == "m"
-    assert again.settings == session.settings and again.structure_settings == session.structure_settings
+    assert again.settings == session.settings and again.state.structure_settings == session.state.structure_settings
     for kind, suffix in (("grid", ".json"), ("grid", ".obj"), ("structure", ".json")):
         assert again.files(kind, suffix) == session.files(kind, suffix)
     assert again.command() == session.command()
@@ -94,14 +93,14 @@ def test_every_format_of_the_table_comes_out(scan: Path) -> None:
 
 def test_what_is_refused_is_said_and_the_studio_goes_on(scan: Path) -> None:
     session = opened(scan)
-    session.settings = session.settings.replace(length=50.0)
+    session.change("length", settings=session.settings.replace(length=50.0))
     session.generate()
     assert session.worker.wait(PATIENCE)
     with pytest.raises(st.ScanTrussError) as refused:
         assert session.cloud is not None
         grid_from_cloud(session.cloud, session.settings)
     assert session.message == " ".join(str(refused.value).split())
-    session.settings = session.settings.replace(length=1.0)
+    session.change("length", settings=session.settings.replace(length=1.0))
     made(session)
 
 
@@ -125,8 +124,8 @@ def test_the_page_reads_no_file(words: str) -> None:
 def test_a_stopped_run_leaves_the_grid_before_it(scan: Path) -> None:
     session = made(opened(scan))
     before = session.grid
-    session.tell = session.stop  # as soon as it has begun
-    session.settings = session.settings.replace(length=0.8)
+    session.listen(session.stop)  # as soon as it has begun
+    session.change("length", settings=session.settings.replace(length=0.8))
     session.generate()
     assert session.worker.wait(PATIENCE)
     assert session.grid is before and session.message == ""

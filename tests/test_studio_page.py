@@ -13,10 +13,10 @@ from browser import open_page
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.export.page_tables import PageColumn
-from scantruss.studio.server import Guard, start_server
+from scantruss.studio.browsers import Browsers
+from scantruss.studio.colours import colors_of
+from scantruss.studio.server import Guard, serve_browsers, start_server
 from scantruss.studio.session import Session
-from scantruss.studio.view import StudioView, colors_of
 
 
 def free_port() -> int:
@@ -38,7 +38,7 @@ def served(tmp_path: Path) -> Iterator[tuple[str, Session]]:
     session.set_unit("m")
     server, _ = start_server("127.0.0.1", free_port())
     try:
-        StudioView(session, server)
+        serve_browsers(server, Browsers(session))
         yield f"http://127.0.0.1:{server.get_port()}/", session
     finally:
         session.stop()
@@ -129,10 +129,10 @@ def test_what_cannot_be_opened_is_one_line(
 
 
 def test_colours_span_the_values() -> None:
-    column = PageColumn("length", "m", [1.0, None, 3.0])
-    colors, low, high = colors_of(column, None)
+    values = np.array([1.0, np.nan, 3.0])
+    colors, low, high = colors_of(values, None)
     assert (low, high) == (1.0, 3.0) and len(np.unique(colors, axis=0)) == 3
-    assert colors_of(column, 1.5)[1:] == (0.0, 3.0)
+    assert colors_of(values, 1.5)[1:] == (0.0, 3.0)
 
 
 def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session]) -> None:

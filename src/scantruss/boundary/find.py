@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import LengthError
+from ..errors import InputError, LengthError, words_of_place
 from ..kernels.boundary import loops as kernels
 from ..kernels.boundary.curves import Curves
 from ..kernels.mesh.point_location import nearest_sample
@@ -16,7 +17,7 @@ from ..kernels.surface.size_field import lengths_along
 from ..runtime.progress import Progress
 from ..scan.normals import check_two_sided
 from ..settings import Settings
-from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
+from ..surface.samples import SurfaceSamples, broad_normals, distance_from_scan, is_graded, samples_with
 from .corners import CURVE_STEP
 from .curves import cut_spikes, length_around, resample
 from .given import cut_along
@@ -32,6 +33,8 @@ LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 NEARLY_CLOSED = 10.0
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
+# farthest that the boundary of a hole passes a place that names it [member lengths]
+AT_HOLE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +155,12 @@ def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSa
     """Return samples with small holes closed, and the boundary that is left."""
     found, bridged = _find_loops(samples, settings)
     loops = _external_first(found)
-    holes = [loop for loop in loops if loop.length < settings.closed_boundary_length and _is_hole(loop, samples)]
+    named = named_holes(settings.fill_at, loops, samples, settings.length)
+    holes = [
+        loop
+        for k, loop in enumerate(loops)
+        if k in named or (loop.length < settings.closed_boundary_length and is_hole(loop, samples))
+    ]
     if holes:
         made_up = fill_holes(samples, [loop.points for loop in holes])
         samples = samples_with(samples, made_up, settings)
@@ -229,7 +237,33 @@ def _rings(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
     return loops
 
 
-def _is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
+def named_holes(
+    places: Sequence[Sequence[float]], loops: Sequence[Loop], samples: SurfaceSamples, length: float
+) -> set[int]:
+    """Return which loops are the holes that pass some places [scan unit]; a hole too small to be found is closed anyway.
+
+    Raises
+    ------
+    InputError
+        A place is not at the scan, or at an outer boundary alone.
+    """
+    found: set[int] = set()
+    for place in places:
+        here = np.array(place, float) - samples.origin
+        away = {k: float(np.linalg.norm(loop.points - here, axis=1).min()) for k, loop in enumerate(loops)}
+        near = sorted((gap, k) for k, gap in away.items() if gap <= AT_HOLE * length)
+        holes = [k for _, k in near if is_hole(loops[k], samples)]
+        if holes:
+            found.add(holes[0])
+        elif near or distance_from_scan(samples.surface, here) > AT_HOLE * length:
+            what = "at the outer boundary, which cannot be closed" if near else "not at the scan"
+            raise InputError(
+                f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole"
+            )
+    return found
+
+
+def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
     """Whether a loop bounds a hole: any internal loop, or the external loop of a nearly closed piece."""
     share = float((samples.piece == loop.piece).mean())
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)

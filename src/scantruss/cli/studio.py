@@ -42,30 +42,34 @@ def studio(values: Namespace) -> None:
     if not 0 <= values.port < 65536:
         raise InputError(f"--port needs a number from 0 to 65535, got {values.port}")
     project = project_of(values)
+    import sys
     import time
     import webbrowser
 
     from ..report.terminal import print_lines
-    from ..studio.server import start_server
+    from ..studio.browsers import Browsers
+    from ..studio.server import serve_browsers, start_server
     from ..studio.session import Session
-    from ..studio.view import StudioView
 
-    session = Session(project)
+    session = Session(project, folder=Path.cwd())
     if values.source is not None:
         session.open(Path(values.source))
+        session.show_quick()
+    browsers = Browsers(session)
     server, guard = start_server(values.host, values.port)
     try:
-        StudioView(session, server)
+        serve_browsers(server, browsers)
         shown = "localhost" if values.host in LOOPBACK else values.host
         address = f"http://{shown}:{server.get_port()}/" + (f"?token={guard.token}" if guard.token else "")
-        saved = f"saved as {project} after each step" if project is not None else "not saved; name a scan or --project"
+        saved = f"saved as {project} after each step" if project is not None else "saved here as soon as a scan is open"
         print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
+        sys.stdout.flush()  # for whoever reads it from a pipe, as nothing else is said
         if not values.no_open:
             webbrowser.open(address)
         while True:  # until Ctrl-C or SIGTERM, as servers do
             time.sleep(3600.0)
     finally:
-        session.stop()
+        browsers.stop()
         server.stop()
 
 

@@ -56,7 +56,10 @@ def sweep_parser() -> Parser:
 
 MOST_RISE = 10.0  #: greatest height over that of the grid
 # one value only
-ONE_AT_LEAST = ("memory", "workers", "fixed", "fixed_lines", "unit", "z_unit", "returns", "confidence", "thin_spacing")
+ONE_AT_LEAST = (
+    "memory", "workers", "fixed", "fixed_lines", "fill_at", "no_ridge_at", "unit", "z_unit", "returns", "confidence",
+    "thin_spacing",
+)  # fmt: skip
 
 
 def _several(kind: Any) -> Callable[[str], list[Any]]:

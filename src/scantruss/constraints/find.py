@@ -14,7 +14,7 @@ from .fixed_lines import add_polylines
 from .fixed_nodes import check_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
-from .ridges import add_ridges, cut_around, find_ridges
+from .ridges import add_ridges, cut_around, find_ridges, without
 from .ridges_at_boundary import with_ridge_ends
 
 if TYPE_CHECKING:
@@ -69,7 +69,8 @@ def find_constraints(
 def wanted_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
     """Return the ridges that the grid is to follow; see `ridges.find_ridges`."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
-    return find_ridges(samples, settings) if wanted else []
+    ridges = find_ridges(samples, settings) if wanted else []
+    return without(ridges, [np.array(place, float) - samples.origin for place in settings.no_ridge_at], settings.length)
 
 
 def find_lines(samples: SurfaceSamples, boundary: Boundary, ridges: list[Ridge], settings: Settings) -> Lines:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ SHARE = 0.55  # least share of a ridge that has the full angle, unless that part
 LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
 FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
+AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
 SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
@@ -77,6 +79,16 @@ def cut_around(ridges: list[Ridge], places: np.ndarray, length: float) -> list[R
             if np.linalg.norm(np.diff(part, axis=0), axis=1).sum() >= LEAST_REMAINDER * length:
                 found.append(Ridge(part, ridge.sharp))
     return found
+
+
+def without(ridges: list[Ridge], places: Sequence[np.ndarray], length: float) -> list[Ridge]:
+    """Return the ridges but the nearest to each place (3,), where one passes it."""
+    unwanted = set()
+    for place in places:
+        gaps = [ridge.distance(place) for ridge in ridges]
+        if gaps and min(gaps) <= AT_RIDGE * length:
+            unwanted.add(int(np.argmin(gaps)))
+    return [ridge for k, ridge in enumerate(ridges) if k not in unwanted]
 
 
 def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:

@@ -223,6 +223,9 @@ class BoundarySettings(_Checked):
         source="Sec. 3.6",
         low=0.0,
     )
+    fill_at: Sequence[Sequence[float]] = _setting(
+        (), "close the hole whose boundary passes each of these places, however long it is", unit="scan unit"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,6 +256,9 @@ class ConstraintSettings(_Checked):
         unit="degree",
         low=0.0,
         high=180.0,
+    )
+    no_ridge_at: Sequence[Sequence[float]] = _setting(
+        (), "do not follow the ridge that passes each of these places", unit="scan unit"
     )
     fold_weight: float = _setting(
         0.0, "draw nodes to the crests of folds that are no ridges, even rounded ones, at the cost of even members; 1 is usual,"

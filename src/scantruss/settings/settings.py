@@ -27,6 +27,7 @@ from .values import (
     check_line,
     check_names,
     check_piece,
+    check_places,
     check_positions,
     check_ring,
     check_symmetry,
@@ -63,6 +64,8 @@ class Settings(
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         super().__post_init__()
         object.__setattr__(self, "fixed", check_positions(self.fixed))
+        for name in ("fill_at", "no_ridge_at"):
+            object.__setattr__(self, name, check_places(name, getattr(self, name)))
         object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
         object.__setattr__(self, "symmetry", check_symmetry(self.symmetry))
         object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))

@@ -28,6 +28,11 @@ def check_positions(given: Any) -> tuple[tuple[float, ...], ...]:
     return _coordinates(given, f"fixed must be positions of three numbers, got {given!r}", "a fixed node needs")
 
 
+def check_places(name: str, given: Any) -> tuple[tuple[float, ...], ...]:
+    """Return the places of a setting as tuples of numbers, or refuse them."""
+    return _coordinates(given, f"{name} must be places of three numbers, got {given!r}", f"a place of {name} needs")
+
+
 def check_line(line: Any, name: str = "fixed_lines", what: str = "a fixed line") -> tuple[tuple[float, ...], ...]:
     """Return a polyline as tuples of numbers, no point twice in a row, or refuse it."""
     refusal = f"{name} must be polylines of positions of three numbers, got {line!r}"

@@ -4,50 +4,34 @@ from __future__ import annotations
 
 import io
 import json
+import weakref
 import zipfile
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import FormatError, ScanTrussError
 from ..export.formats import model_of
 from ..export.json import encode_json, encode_model, read_grid
-from ..export.model import Model
 from ..grid.grid import Grid
 from ..runtime.files import temporary_folder, write_files
 from ..runtime.ours import MARK
 from ..scan.cloud import PointCloud
 from ..settings import Settings
-from ..structure.options import StructureSettings, read_structure_settings
+from ..structure.options import StructureSettings, read_structure_settings, settings_text
+from ..structure.statics import Solution
+from .state import Design, StudioState
 
-PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 1
+PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 2
 PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "structure.toml", "grid.json", "structure.json")
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # the same project gives the same bytes
+Part = TypeVar("Part")
 LARGEST_PART = 8_000_000_000  #: of what is unpacked [bytes]
 
 
-@dataclass(frozen=True, eq=False)
-class Project:
-    """What a project file holds."""
-
-    cloud: PointCloud
-    settings: Settings
-    grid: Grid | None
-    structure_text: str  #: settings of the structure, as TOML
-    solved: bool  #: whether there are results, which are computed again
-
-    @property
-    def structure_settings(self) -> StructureSettings:
-        """The settings of the structure."""
-        with temporary_folder() as folder:
-            place = folder / "structure.toml"
-            place.write_text(self.structure_text, encoding="utf-8")
-            return read_structure_settings(place)
-
-
-def save_project(path: Path, project: Project, structure: Model | None = None) -> None:
+def save_project(path: Path, state: StudioState) -> None:
     """Write a project file beside its place, and rename it when it is whole.
 
     Raises
@@ -55,31 +39,54 @@ def save_project(path: Path, project: Project, structure: Model | None = None) -
     FormatError
         It cannot be written; the one before is left as it was.
     """
-    cloud = project.cloud
-    arrays = {"points": cloud.points, "origin": np.asarray(cloud.origin, np.float64)}
-    if cloud.normals is not None:
-        arrays["normals"] = cloud.normals
+    cloud = state.cloud
+    assert cloud is not None
+    solved = state.grid is not None and state.solution is not None
     head = {
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped, "notes": list(cloud.notes),
                  "left_out": [list(part) for part in cloud.left_out]},
-        "settings": project.settings.to_dict(), "solved": project.solved,
+        "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
+        "asked": None if state.asked is None else state.asked.to_dict(),
+        "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
     }  # fmt: skip
     parts = {
         "made_by.npy": _npy(np.array(MARK)),
         "project.json": (json.dumps(head, indent=1, ensure_ascii=False) + "\n").encode(),
-        "scan.npz": _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_STORED),
-        "structure.toml": project.structure_text.encode(),
+        "scan.npz": _kept(_SCANS, cloud, _encode_scan),
+        "structure.toml": settings_text(state.structure_settings).encode(),
     }
-    if project.grid is not None:
-        parts["grid.json"] = encode_json(project.grid)
-    if project.solved and structure is not None:
-        parts["structure.json"] = encode_model(model_of(structure))
-    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED)})
+    if state.grid is not None:
+        parts["grid.json"] = _kept(_GRIDS, state.grid, encode_json)
+    if solved and state.solution is not None:
+        parts["structure.json"] = _kept(
+            _STRUCTURES, state.solution, lambda solution: encode_model(model_of(solution, report=state.report))
+        )
+    parts |= {f"design-{k}.json": _kept(_GRIDS, each.grid, encode_json) for k, each in enumerate(state.designs, 1)}
+    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz",))})
 
 
-def read_project(path: Path) -> Project:
-    """Read a project file.
+_SCANS: weakref.WeakKeyDictionary[PointCloud, bytes] = weakref.WeakKeyDictionary()
+_GRIDS: weakref.WeakKeyDictionary[Grid, bytes] = weakref.WeakKeyDictionary()
+_STRUCTURES: weakref.WeakKeyDictionary[Solution, bytes] = weakref.WeakKeyDictionary()
+
+
+def _kept(known: weakref.WeakKeyDictionary[Part, bytes], part: Part, encode: Callable[[Part], bytes]) -> bytes:
+    """Return the bytes of a part, encoded once: a project is saved after each step, of which most leave the scan as it is."""
+    if (content := known.get(part)) is None:
+        content = known[part] = encode(part)
+    return content
+
+
+def _encode_scan(cloud: PointCloud) -> bytes:
+    arrays = {"points": cloud.points, "origin": np.asarray(cloud.origin, np.float64)}
+    if cloud.normals is not None:
+        arrays["normals"] = cloud.normals
+    return _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_DEFLATED)
+
+
+def read_project(path: Path) -> tuple[StudioState, bool]:
+    """Return the state that a project file holds, and whether its structure was solved, which is done again.
 
     Raises
     ------
@@ -90,7 +97,9 @@ def read_project(path: Path) -> Project:
         with zipfile.ZipFile(path) as file:
             if any(file.getinfo(name).file_size > LARGEST_PART for name in file.namelist()):
                 raise ValueError("a part is too large")
-            parts = {name: file.read(name) for name in file.namelist() if name in PROJECT_PARTS}
+            parts = {
+                name: file.read(name) for name in file.namelist() if name in PROJECT_PARTS or name.startswith("design-")
+            }
     except OSError as error:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
     except (zipfile.BadZipFile, ValueError, EOFError, NotImplementedError) as error:
@@ -104,7 +113,7 @@ def read_project(path: Path) -> Project:
         raise FormatError(f"{path} is no project of scantruss studio, or a damaged one: {words}") from None
 
 
-def _project_of(parts: dict[str, bytes]) -> Project:
+def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
     head: dict[str, Any] = json.loads(parts["project.json"])
     if head["format"] != PROJECT_FORMAT or head["format_version"] > PROJECT_VERSION:
         raise ValueError(f"format {head['format']} {head['format_version']}; a newer ScanTruss reads it")
@@ -119,14 +128,35 @@ def _project_of(parts: dict[str, bytes]) -> Project:
         )  # fmt: skip
     if not len(cloud.points) or not np.isfinite(cloud.points).all():
         raise ValueError("points must be numbers")
-    grid = None
-    if "grid.json" in parts:
-        with temporary_folder() as folder:
-            place = folder / "grid.json"
-            place.write_bytes(parts["grid.json"])
-            grid = read_grid(place)
-    settings = Settings.from_dict(head["settings"])
-    return Project(cloud, settings, grid, parts["structure.toml"].decode(), bool(head["solved"]) and grid is not None)
+    grid = _grid_of(parts["grid.json"]) if "grid.json" in parts else None
+    asked = head.get("asked")
+    state = StudioState(
+        cloud,
+        Settings.from_dict(head["settings"]),
+        grid,
+        None if asked is None else Settings.from_dict(asked),
+        bool(head.get("quick", False)) and grid is not None,
+        _structure_settings_of(parts["structure.toml"]),
+        designs=tuple(
+            Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
+            for k, each in enumerate(head.get("designs", ()), 1)
+        ),
+    )
+    return state, bool(head["solved"]) and grid is not None
+
+
+def _grid_of(content: bytes) -> Grid:
+    with temporary_folder() as folder:
+        place = folder / "grid.json"
+        place.write_bytes(content)
+        return read_grid(place)
+
+
+def _structure_settings_of(content: bytes) -> StructureSettings:
+    with temporary_folder() as folder:
+        place = folder / "structure.toml"
+        place.write_bytes(content)
+        return read_structure_settings(place)
 
 
 def _npy(array: np.ndarray) -> bytes:
@@ -135,10 +165,10 @@ def _npy(array: np.ndarray) -> bytes:
     return stream.getvalue()
 
 
-def _zipped(parts: dict[str, bytes], way: int) -> bytes:
-    """Return a zip of parts, without dates."""
+def _zipped(parts: dict[str, bytes], way: int, stored: Collection[str] = ()) -> bytes:
+    """Return a zip of parts, without dates; those that are zips themselves are only stored."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as file:
         for name, content in parts.items():
-            file.writestr(zipfile.ZipInfo(name, FIXED_DATE), content, way)
+            file.writestr(zipfile.ZipInfo(name, FIXED_DATE), content, zipfile.ZIP_STORED if name in stored else way)
     return stream.getvalue()

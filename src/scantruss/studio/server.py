@@ -9,13 +9,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.cookies import CookieError, SimpleCookie
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from ..errors import InputError
 
+if TYPE_CHECKING:
+    from .browsers import Browsers
+
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 COOKIE = "scantruss_studio"
+BROWSER_KEY = "scantruss_browser"
+STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
 
@@ -90,7 +95,7 @@ class Guard:
             answer = inner(connection, request)
             if answer is not None:
                 answer.headers["Referrer-Policy"] = "no-referrer"
-                answer.headers["X-Frame-Options"] = "DENY"
+                answer.headers["X-SceneFrame-Options"] = "DENY"
                 if self.token:
                     answer.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
             return answer
@@ -117,6 +122,19 @@ def _guarded(guard: Guard) -> Iterator[None]:
         serving.serve = plain
     if not used:
         raise InputError("this version of viser cannot be guarded; install viser 1.1")
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep viser from its greeting, an address that lacks the token."""
+    import rich
+
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
 
 
 def start_server(host: str, port: int) -> tuple[Any, Guard]:
@@ -148,10 +166,39 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
             ) from None
         port = trial.getsockname()[1]
     guard = Guard(host)
-    with _guarded(guard):
+    with _guarded(guard), _silent():
         server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
     server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
     return server, guard
+
+
+def serve_browsers(server: Any, browsers: Browsers) -> None:
+    """Give each page the session of its browser, which a key in the storage of the browser tells."""
+    from .view import StudioView
+
+    views: dict[int, tuple[str, StudioView]] = {}
+
+    def begin(client: Any) -> None:
+        try:
+            known = client.local_storage.get_item(BROWSER_KEY, timeout=STORAGE_PATIENCE)
+        except (RuntimeError, TimeoutError):  # closed already, or a browser that keeps nothing
+            known = None
+        try:
+            key, session = browsers.join(known)
+        except InputError as error:
+            client.gui.add_markdown(f"**Refused:** {error}")
+            return
+        client.local_storage.set_item(BROWSER_KEY, key)
+        views[client.client_id] = (key, StudioView(session, client))
+
+    def end(client: Any) -> None:
+        key, view = views.pop(client.client_id, ("", None))
+        if view is not None:
+            view.close()
+            browsers.leave(key)
+
+    server.on_client_connect(begin)
+    server.on_client_disconnect(end)
 
 
 def _no_tunnel(*_: Any, **__: Any) -> None:

@@ -1,16 +1,15 @@
-"""Session: what a studio works on (scan, settings, grid, structure) and the steps that change it; no browser is needed."""
+"""Session: the steps that change what a studio works on, each of which can be taken back; no browser is needed."""
 
 from __future__ import annotations
 
-import json
-import shlex
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
-from ..errors import InputError, ScanTrussError, words_of_error
-from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
+from ..errors import InputError
 from ..export.model import Model
 from ..grid.grid import Grid
 from ..pipeline import grid_from_cloud
@@ -18,45 +17,125 @@ from ..runtime.files import temporary_folder
 from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import exact_range, length_range, suggest_length
-from ..scan.stream.fit import read_to_fit, spacing_to_fit, spacing_to_look
 from ..settings import Settings
-from ..structure.options import StructureSettings, loads_of_words, settings_text
-from ..structure.report import StructureReport, report_structure
-from ..structure.statics import Solution, solve
-from ..structure.truss import Truss
-from ..structure.variants import truss_arguments
-from .project import Project, read_project, save_project
-from .worker import Worker
+from ..structure.options import loads_of_words
+from ..structure.statics import Solution
+from .compare import kept_design
+from .features import Feature, find_features, switched_off
+from .opening import DATA_FOLDER, EXAMPLES, next_free, read_whole
+from .outputs import command_of, files_of, model_to_show
+from .project import read_project, save_project
+from .solving import check_words, solved_state
+from .state import History, StudioState
+from .worker import StoppedError, Worker, words_of
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 MOST_LIVE_MEMBERS = 60_000  #: of a quick grid that is made while the length changes
-DEFAULT_STRUCTURE = StructureSettings(supports="boundary", loads=("self", "snow:1kN/m2"))
 STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads")  #: what the page asks for
 
 
 class Session:
-    """The state of a studio.
+    """The state of a studio, and the steps that change it.
 
     Parameters
     ----------
     project : Path, optional
-        File that is saved after each step; none: nothing is saved.
-    tell : callable, optional
-        Called, from any thread, whenever something has changed.
+        File that is saved after each step.
+    folder : Path, optional
+        Where a scan that is opened gets a project file, if `project` is not given; none: nothing is saved.
     """
 
-    def __init__(self, project: Path | None = None, tell: Callable[[], None] = lambda: None) -> None:
-        self.place, self.tell = project, tell
-        self.cloud: PointCloud | None = None
-        self.settings = Settings(length=1.0)
-        self.grid: Grid | None = None
-        self.is_live = False  #: whether the grid is a quick one, made while the length was chosen
-        self.structure_settings = DEFAULT_STRUCTURE
-        self.solution: Solution | None = None
-        self.report: StructureReport | None = None
+    def __init__(self, project: Path | None = None, *, folder: Path | None = None) -> None:
+        self.place, self.folder = project, folder
+        self.state = StudioState()
+        self.history = History()
+        self.features: list[Feature] = []
+        self.wants_features = False  #: whether holes and ridges are looked for after each grid
         self.message = ""  #: why the last step was refused, in the words of the command line
         self.stage, self.share = "", 0.0
         self.worker = Worker(self._end, self._progress)
+        self._listeners: list[Callable[[], None]] = []
+        self._turn = 0  # counts what makes the result of a running task unwanted
+        self._features_of: tuple[PointCloud, Settings] | None = None
+        self._lock, self._saving = RLock(), RLock()
+
+    @property
+    def cloud(self) -> PointCloud | None:
+        """The scan."""
+        return self.state.cloud
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the next grid."""
+        return self.state.settings
+
+    @property
+    def grid(self) -> Grid | None:
+        """The grid."""
+        return self.state.grid
+
+    @property
+    def solution(self) -> Solution | None:
+        """The structure, solved."""
+        return self.state.solution
+
+    # ---- who listens
+
+    def listen(self, tell: Callable[[], None]) -> Callable[[], None]:
+        """Call `tell`, from any thread, whenever something has changed; return what ends that."""
+        self._listeners.append(tell)
+        return lambda: self._listeners.remove(tell) if tell in self._listeners else None
+
+    def tell(self) -> None:
+        """Say that something has changed."""
+        for tell in list(self._listeners):
+            try:
+                tell()
+            except StoppedError:
+                raise
+            except Exception:  # of a page that has just closed; the others are still told
+                sys.excepthook(*sys.exc_info())
+
+    # ---- steps
+
+    def change(self, words: str, *, goes_on: bool = False, **changes: Any) -> None:
+        """Take a step that can be taken back.
+
+        Parameters
+        ----------
+        words : str
+            What undo would take back.
+        goes_on : bool
+            Whether it goes on with the step before, where that has the same words.
+        """
+        with self._lock:
+            self.history.note(words, self.state, goes_on=goes_on)
+            self.state = replace(self.state, **changes)
+        self.message = ""
+
+    def begin(self, state: StudioState) -> None:
+        """Begin with a state, with nothing to take back."""
+        with self._lock:
+            self.state, self.history, self._turn = state, History(), self._turn + 1
+
+    def undo(self) -> None:
+        """Take the last step back."""
+        self._go(self.history.undo)
+
+    def redo(self) -> None:
+        """Take the step again that was taken back last."""
+        self._go(self.history.redo)
+
+    def _go(self, way: Callable[[StudioState], StudioState | None]) -> None:
+        self.worker.stop()
+        with self._lock:
+            other = way(self.state)
+            if other is None:
+                return
+            self.state, self._turn, self.message = other, self._turn + 1, ""
+        self.save()
+        self._look_for_features()
+        self.tell()
 
     # ---- the scan
 
@@ -69,14 +148,13 @@ class Session:
             It cannot be read.
         """
         if path.suffix.lower() == ".scantruss":
-            self._take(read_project(path))
+            state, solved = read_project(path)
+            self.begin(solved_state(state) if solved else state)
             return
-        cloud = read_whole(path)
-        self._start(cloud)
-        self.save()
+        self._start(read_whole(path))
 
     def open_upload(self, name: str, content: bytes) -> None:
-        """Open a scan that came through the page, as a step of the worker."""
+        """Open a scan or a project that came through the page, as a step of the worker."""
 
         def read(progress: Progress) -> None:
             if len(content) > LARGEST_UPLOAD:
@@ -84,26 +162,64 @@ class Session:
                     f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
                 )
             own = Path(name.replace("\\", "/")).name
+            progress("read", 0.1)
             with temporary_folder() as folder:
                 path = folder / (own or "scan")
                 path.write_bytes(content)
-                progress("read", 0.1)
+                if path.suffix.lower() == ".scantruss":
+                    state, solved = read_project(path)
+                    taken = solved_state(state) if solved else state
+                    self.change(f"open {own}", **vars(taken))
+                    self._saved_beside(own)
+                    return
                 cloud = read_whole(path)
             self._start(replace(cloud, name=own))
-            self.save()
+            self._make("quick", progress, live=True)
 
         self.worker.ask(read)
 
-    def _start(self, cloud: PointCloud) -> None:
-        self.cloud, self.grid, self.solution, self.report = cloud, None, None, None
-        self.settings = Settings(length=suggest_length(cloud), unit=cloud.unit)
+    def open_example(self, name: str) -> None:
+        """Open a bundled scan and make its quick grid, as a step of the worker."""
+        file, settings = EXAMPLES[name]
+
+        def read(progress: Progress) -> None:
+            progress("read", 0.1)
+            self._start(read_whole(DATA_FOLDER / file), settings)
+            self._make("quick", progress, live=True)
+
+        self.worker.ask(read)
+
+    def _start(self, cloud: PointCloud, settings: Settings | None = None) -> None:
+        made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
+        self.change(
+            f"open {cloud.name}", cloud=cloud, settings=made, grid=None, asked=None, is_live=False, solution=None, report=None
+        )  # fmt: skip
+        self._turn += 1
+        self.features, self._features_of = [], None
+        self._saved_beside(cloud.name or "scan")
+
+    def _saved_beside(self, name: str) -> None:
+        """Choose a project file, where there is none yet, and save."""
+        if self.place is None and self.folder is not None:
+            place = self.folder / f"{Path(name).stem}.scantruss"
+            self.place = next_free(place) if place.exists() else place
+        self.save()
 
     def set_unit(self, unit: str) -> None:
         """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
-        if self.cloud is not None:
-            self.stop()
-            self.cloud, self.grid, self.solution, self.report = replace(self.cloud, unit=unit, system=""), None, None, None
-        self.settings = self.settings.replace(unit=unit)
+        self.stop()
+        cloud = None if self.cloud is None else replace(self.cloud, unit=unit, system="")
+        self._turn += 1
+        self.change(
+            "unit",
+            cloud=cloud,
+            settings=self.settings.replace(unit=unit),
+            grid=None,
+            asked=None,
+            solution=None,
+            report=None,
+        )
+        self.save()
 
     def length_bounds(self) -> tuple[float, float]:
         """Return the lengths that the slider offers: about the suggested one, within what the scan allows [scan unit]."""
@@ -115,9 +231,29 @@ class Session:
 
     # ---- the grid
 
+    def set(self, words: str, **changes: Any) -> None:
+        """Change settings of the next grid, and show a quick one with them.
+
+        Raises
+        ------
+        InputError
+            A value cannot be used.
+        """
+        self.change(words, settings=self.settings.replace(**changes))
+        self.save()
+        self.tell()
+        self._ask_live()
+
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
-        self.settings = self.settings.replace(length=length)
+        self.change("length", goes_on=True, settings=self.settings.replace(length=length))
+        return self._ask_live()
+
+    def show_quick(self) -> bool:
+        """Make a quick grid of what was opened."""
+        return self.cloud is not None and self.grid is None and self._ask_live()
+
+    def _ask_live(self) -> bool:
         return self.worker.ask(lambda progress: self._make("quick", progress, live=True), quick=True)
 
     def generate(self) -> None:
@@ -129,19 +265,59 @@ class Session:
         self.worker.stop()
 
     def _make(self, effort: str, progress: Progress, *, live: bool = False) -> None:
-        if self.cloud is None:
+        cloud, settings, turn = self.cloud, self.settings, self._turn
+        if cloud is None:
             raise InputError("there is no scan yet; open one")
-        cloud, settings = self.cloud, self.settings.replace(effort=effort)
         low, high = exact_range(cloud)
         if live and not low <= settings.length <= high:
             return  # Generate says why
         progress("boundary", 0.0)
-        grid = grid_from_cloud(cloud, settings, progress=progress)
-        if self.cloud is not cloud or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
+        grid = grid_from_cloud(cloud, settings.replace(effort=effort), progress=progress)
+        if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
             return
-        self.grid, self.is_live, self.solution, self.report = grid, live, None, None
-        if not live:
+        made: dict[str, Any] = {"grid": grid, "asked": settings, "is_live": live, "solution": None, "report": None}
+        if live:
+            with self._lock:
+                self.state = replace(self.state, **made)
+        else:
+            self.change("generate", **made)
             self.save()
+        self.tell()
+        self._find_features(progress)
+
+    # ---- holes, ridges, fixed nodes
+
+    def show_features(self) -> None:
+        """Look for holes and ridges from now on."""
+        self.wants_features = True
+        self._look_for_features()
+
+    def _look_for_features(self) -> None:
+        if self.wants_features:
+            self.worker.ask(self._find_features, quick=True)
+
+    def _find_features(self, progress: Progress) -> None:
+        cloud, settings = self.cloud, self.settings.replace(fill_at=(), no_ridge_at=(), effort="quick")
+        if not self.wants_features or cloud is None:
+            return
+        known = self._features_of
+        if known is not None and known[0] is cloud and known[1] == settings:
+            return
+        progress("holes and ridges", 0.5)
+        self.features = find_features(cloud, settings)
+        self._features_of = (cloud, settings)
+
+    def switch(self, number: int) -> None:
+        """Close a hole or open it again, leave a ridge alone or follow it again, by its number among the features."""
+        feature = self.features[number]
+        named = switched_off(self.features, self.settings).get(number, ())
+        places = getattr(self.settings, feature.kind)
+        left = tuple(place for place in places if place not in named) if named else (*places, feature.place)
+        self.set(f"{'hole' if feature.kind == 'fill_at' else 'ridge'} {number + 1}", **{feature.kind: left})
+
+    def fix(self, places: tuple[tuple[float, ...], ...], words: str = "fixed node") -> None:
+        """Take the positions that must become nodes, in the frame of the scan [scan unit]."""
+        self.set(words, fixed=places)
 
     # ---- the structure
 
@@ -153,120 +329,61 @@ class Session:
         InputError
             It names a file, which the page may not read, or cannot be used.
         """
-        for name, text in words.items():
-            for part in (text, *text.split(","), text.partition(".csv")[0]):
-                named = part.strip()
-                if (
-                    named.lower().endswith((".csv", ".toml", ".json", ".txt"))
-                    or ".csv:" in named
-                    or Path(named).is_file()
-                ):
-                    raise InputError(f"{name} names a file, {named}; files are read by the command line only")
+        check_words(words)
         given: dict[str, Any] = dict(words)
         if "loads" in given:
             given["loads"] = loads_of_words(given["loads"])
-        self.structure_settings = self.structure_settings.replace(**given)
+        settings = self.state.structure_settings.replace(**given)
+        if settings != self.state.structure_settings:
+            self.change("structure", structure_settings=settings)
 
     def run_structure(self) -> None:
         """Make the structure of the grid and solve it."""
 
         def run(progress: Progress) -> None:
             progress("structure", 0.1)
-            self._solve()
-            self.is_live = False  # a quick grid with a structure is kept
+            turn = self._turn
+            solved = solved_state(self.state)
+            if turn != self._turn or solved.grid is not self.grid:
+                return
+            self.change("run", solution=solved.solution, report=solved.report)
             self.save()
 
         self.worker.ask(run)
 
-    def _solve(self) -> None:
-        if self.grid is None:
-            raise InputError("there is no grid yet; press Generate")
-        truss = Truss.from_grid(self.grid, **truss_arguments(self.structure_settings))
-        solution = solve(truss)
-        self.solution, self.report = solution, report_structure(solution, self.structure_settings.checks)
+    # ---- designs, files
 
-    # ---- files
+    def keep_design(self, name: str) -> None:
+        """Keep the grid, and the figures of its structure, for comparison."""
+        design = kept_design(self.state, name)
+        others = tuple(each for each in self.state.designs if each.name != design.name)
+        self.change(f"keep {design.name}", designs=(*others, design))
+        self.save()
+        self.tell()
+
+    def drop_design(self, name: str) -> None:
+        """Forget a design."""
+        self.change(f"drop {name}", designs=tuple(each for each in self.state.designs if each.name != name))
+        self.save()
+        self.tell()
 
     def model(self, kind: str) -> Model:
-        """Return the grid or the structure.
-
-        Raises
-        ------
-        InputError
-            There is none yet.
-        """
-        if kind == STRUCTURE:
-            if self.solution is None:
-                raise InputError("there is no structure yet; press Run")
-            return model_of(self.solution, report=self.report)
-        if self.grid is None:
-            raise InputError("there is no grid yet; press Generate")
-        return model_of(self.grid, cloud=self.cloud)
+        """Return the grid or the structure; see `outputs.model_to_show`."""
+        return model_to_show(self.state, kind)
 
     def files(self, kind: str, suffix: str) -> dict[str, bytes]:
-        """Return the files of a format by their names.
-
-        Raises
-        ------
-        ScanTrussError
-            There is nothing to write, or the format cannot hold it.
-        """
-        if suffix not in suffixes_of(kind):
-            raise InputError(f"no format {suffix} of a {kind}; use one of {' '.join(suffixes_of(kind))}")
-        model = self.model(kind)
-        with temporary_folder() as folder:
-            path = check_output(folder / f"{kind}{suffix}", kind)
-            check_unit(path, model.unit)
-            return {file.name: file.read_bytes() for file in write(model, path)}
-
-    def settings_file(self) -> bytes:
-        """Return the settings as `scantruss grid` saves them."""
-        made = self.settings if self.grid is None or self.grid.settings is None else self.grid.settings
-        return (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()
+        """Return the files of a format by their names; see `outputs.files_of`."""
+        return files_of(self.state, kind, suffix)
 
     def command(self) -> str:
         """Return the command lines that repeat the grid and the structure."""
-        name = Path(self.cloud.name).name if self.cloud is not None and self.cloud.name else "SCAN"
-        made = self.settings if self.grid is None or self.grid.settings is None else self.grid.settings
-        words = ["scantruss", "grid", name, "grid.json", "--settings", "grid.settings.json"]
-        lines = [
-            shlex.join(words),
-            f"# grid.settings.json: --length {made.length:g} --effort {made.effort} and all else",
-        ]
-        if self.solution is not None:
-            given = self.structure_settings
-            loads = ",".join(map(str, given.loads))
-            options = {"supports": given.supports, "support-type": given.support_type, "section": given.section,
-                       "material": given.material, "loads": loads}  # fmt: skip
-            words = ["scantruss", "structure", "grid.json", "structure.json"]
-            lines.append(
-                shlex.join([*words, *(word for name, value in options.items() for word in (f"--{name}", value))])
-            )
-        return "\n".join(lines)
+        return command_of(self.state)
 
     def save(self) -> None:
         """Save the project, where there is a place for it: written beside it, then renamed."""
-        if self.place is None or self.cloud is None:
-            return
-        grid = None if self.is_live else self.grid
-        save_project(
-            self.place,
-            Project(
-                self.cloud,
-                self.settings,
-                grid,
-                settings_text(self.structure_settings),
-                solved=grid is not None and self.solution is not None,
-            ),
-            None if self.solution is None else self.model(STRUCTURE),
-        )
-
-    def _take(self, project: Project) -> None:
-        self.cloud, self.settings, self.grid = project.cloud, project.settings, project.grid
-        self.structure_settings, self.is_live = project.structure_settings, False
-        self.solution = self.report = None
-        if project.solved:
-            self._solve()
+        with self._saving:
+            if self.place is not None and self.cloud is not None:
+                save_project(self.place, self.state)
 
     # ---- what the worker tells
 
@@ -280,23 +397,3 @@ class Session:
         self.stage, self.share = "", 0.0
         self.message = "" if error is None else words_of(error)
         self.tell()
-
-
-def read_whole(path: Path) -> PointCloud:
-    """Read a scan; one that is larger than memory is thinned while it is read, as for a first look."""
-    settings = Settings(length=1.0)
-    if spacing_to_fit(path, settings):
-        settings = settings.replace(thin_spacing=spacing_to_look(path, settings))
-    cloud, _ = read_to_fit(path, settings)
-    return cloud
-
-
-def words_of(error: Exception) -> str:
-    """Return an error in the words of the command line."""
-    if isinstance(error, ScanTrussError):
-        return " ".join(words_of_error(error).split())
-    if isinstance(error, MemoryError):
-        return "not enough memory; use fewer points or a larger length"
-    if isinstance(error, OSError):
-        return str(error.strerror or error)
-    return f"a bug in ScanTruss, {type(error).__name__}: {error}; the studio goes on"

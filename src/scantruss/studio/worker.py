@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from threading import Condition, Thread
 
+from ..errors import ScanTrussError, words_of_error
 from ..runtime.progress import Progress
 
 Task = Callable[[Progress], None]
@@ -84,3 +85,14 @@ class Worker:
             with self._change:
                 self._running = None
                 self._change.notify_all()
+
+
+def words_of(error: Exception) -> str:
+    """Return an error in the words of the command line."""
+    if isinstance(error, ScanTrussError):
+        return " ".join(words_of_error(error).split())
+    if isinstance(error, MemoryError):
+        return "not enough memory; use fewer points or a larger length"
+    if isinstance(error, OSError):
+        return str(error.strerror or error)
+    return f"a bug in ScanTruss, {type(error).__name__}: {error}; the studio goes on"

@@ -1,0 +1,113 @@
+"""Colours of values, their legends and histograms."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..check.distances import distances_to_grid
+from ..export.page_tables import PageColumn
+from ..grid.grid import Grid
+from ..scan.cloud import PointCloud
+from ..settings import Settings
+from ..surface.chosen_samples import KEPT
+from ..surface.samples import sample_surface
+
+RISING = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (230, 226, 106)], float)
+DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
+PLAIN = np.array([60, 90, 110], np.uint8)
+DIMMED = np.array([215, 218, 220], np.uint8)
+BARS = 24  #: of a histogram
+AROUND_POINT = 10  #: neighbours of which the normal of a point is made
+LEFT_OUT = "outliers in red"
+SCAN_COLOURINGS = ("height", "distance from the grid", "normals", LEFT_OUT, "plain")
+RED = np.array([200, 20, 20], np.uint8)
+
+
+def ramp(share: np.ndarray, stops: np.ndarray) -> np.ndarray:
+    """Return (N, 3) uint8 colours of shares from 0 to 1."""
+    at = np.clip(share, 0.0, 1.0) * (len(stops) - 1)
+    return np.stack([np.interp(at, np.arange(len(stops)), stops[:, k]) for k in range(3)], axis=1).astype(np.uint8)
+
+
+def values_of(column: PageColumn) -> np.ndarray:
+    """Return the values of a column (N,), NaN where they are not known."""
+    return np.array([np.nan if value is None else value for value in column.values], float)
+
+
+def colors_of(values: np.ndarray, middle: float | None) -> tuple[np.ndarray, float, float]:
+    """Return (N, 3) uint8 colours of values (N,), and what the ends of the scale stand for; plain where a value is NaN."""
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    if middle is not None:
+        far = max(high - middle, middle - low) or 1e-9
+        low, high = middle - far, middle + far
+    share = np.full(len(values), 0.5) if high <= low else (values - low) / (high - low)
+    colors = ramp(np.nan_to_num(share), RISING if middle is None else DIVERGING)
+    colors[~np.isfinite(values)] = PLAIN
+    return colors, low, high
+
+
+def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> str:
+    """Return the legend of a colouring as HTML."""
+    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in (DIVERGING if diverging else RISING))
+    ends = "".join(f"<span>{value:.4g}</span>" for value in (low, (low + high) / 2, high))
+    name = escape(f"{words} [{unit}]" if unit else words)
+    return (
+        f'<div style="padding:0 .6em;font-size:.85em">{name}<div style="height:.8em;background:linear-gradient(to right,{stops})"></div>'
+        f'<div style="display:flex;justify-content:space-between">{ends}</div></div>'
+    )
+
+
+def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -> str:
+    """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale."""
+    counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high if high > low else low + 1.0))
+    colors = ramp((np.arange(BARS) + 0.5) / BARS, DIVERGING if diverging else RISING)
+    bars = "".join(
+        f'<div title="{count:,}" style="flex:1;height:{max(100 * count / max(counts.max(), 1), 1.0 if count else 0.0):.1f}%;'
+        f'background:rgb({r},{g},{b})"></div>'
+        for count, (r, g, b) in zip(counts.tolist(), colors.tolist(), strict=True)
+    )
+    return f'<div style="display:flex;align-items:flex-end;height:3.5em;margin:0 .6em;gap:1px">{bars}</div>'
+
+
+def colors_of_scan(
+    cloud: PointCloud, taken: np.ndarray, grid: Grid | None, settings: Settings, wanted: str
+) -> tuple[np.ndarray, tuple[str, float, float] | None]:
+    """Return (K, 3) uint8 colours of some points of a scan, and words and ends of the scale, where there is one.
+
+    Parameters
+    ----------
+    taken : (K,) int, the points that are drawn
+    wanted : str, of `SCAN_COLOURINGS`
+    """
+    points = cloud.points[taken]
+    if wanted == "normals":
+        normals = cloud.normals[taken] if cloud.normals is not None else _normals(points)
+        return (127.5 * (normals + 1.0)).astype(np.uint8), None
+    if wanted == LEFT_OUT:
+        kept = sample_surface(cloud, settings).judged[taken] == KEPT
+        return np.where(kept[:, None], PLAIN, RED), None
+    if wanted == "distance from the grid" and grid is not None:
+        places = np.ascontiguousarray(points + cloud.origin - grid.origin)
+        values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
+        values = np.minimum(values, float(np.quantile(values, 0.99)))
+    elif wanted == "height":
+        values = points[:, 2] + cloud.origin[2]
+    else:
+        return np.broadcast_to(PLAIN, points.shape), None
+    colors, low, high = colors_of(values, None)
+    return colors, (wanted, low, high)
+
+
+def _normals(points: np.ndarray) -> np.ndarray:
+    """Return the normals of points (K, 3) by their neighbours, turned upwards."""
+    if len(points) <= AROUND_POINT:
+        return np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    _, near = cKDTree(points).query(points, AROUND_POINT)
+    spread = points[near] - points[near].mean(axis=1, keepdims=True)
+    _, vectors = np.linalg.eigh(np.einsum("kni,knj->kij", spread, spread))
+    normals: np.ndarray = vectors[:, :, 0]
+    return np.where(normals[:, 2:] < 0, -normals, normals)

@@ -1,0 +1,85 @@
+"""Designs side by side: their figures, and how far one lies from another."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from ..check.distances import distances_to_grid
+from ..errors import InputError
+from ..grid.grid import Grid
+from .state import Design, StudioState
+
+LONGEST_NAME = 40  #: of a design [letters]
+
+
+def kept_design(state: StudioState, name: str) -> Design:
+    """Return the grid of a state as a design.
+
+    Raises
+    ------
+    InputError
+        There is no grid, or no name.
+    """
+    name = " ".join(name.split())
+    if state.grid is None:
+        raise InputError("there is no grid yet; press Generate")
+    if not 0 < len(name) <= LONGEST_NAME:
+        raise InputError(f"a design needs a name of 1 to {LONGEST_NAME} letters")
+    return Design(name, state.grid, tuple(structure_figures(state)))
+
+
+def structure_figures(state: StudioState) -> list[tuple[str, str]]:
+    """Return the greatest figures of the structure of a state, in words; none where there is none."""
+    report = state.report
+    if report is None:
+        return []
+    values = report.to_dict()
+    service = [case for case in report.cases if case.state == "SLS"] or report.cases
+    moves = max(service, key=lambda case: case.displacement_max)
+    used = values["utilization_max"]
+    rows = [
+        ("utilization", "-" if used is None else f"{used:.2f}"),
+        ("displacement", f"{1e3 * moves.displacement_max:.3g} mm under {moves.name}"),
+        ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
+        ("mass without nodes", f"{report.truss.mass:,.0f} kg"),
+    ]
+    if report.vibration is not None and len(report.vibration.values):
+        rows.append(("lowest frequency", f"{report.vibration.values[0]:.3g} Hz"))
+    return rows
+
+
+def grid_figures(grid: Grid) -> list[tuple[str, str]]:
+    """Return the figures of a grid, in words."""
+    quality, unit = grid.quality, f" {grid.unit}" if grid.unit else ""
+    offsets = grid.deviation[np.isfinite(grid.deviation)] if grid.deviation is not None else np.zeros(0)
+    return [
+        ("nodes", f"{len(grid.nodes):,}"),
+        ("members", f"{len(grid.edges):,}"),
+        ("panels", f"{len(grid.triangles):,}"),
+        ("member length, mean", f"{quality.length_mean:.4g}{unit}"),
+        ("length std / mean (CV)", f"{quality.length_cv:.4f}"),
+        ("shape quality G", f"{quality.shape_mean:.4f}"),
+        ("members in all", f"{grid.lengths.sum():,.5g}{unit}"),
+        ("node farthest from the scan", f"{offsets.max():.3g}{unit}" if len(offsets) else "-"),
+    ]
+
+
+def comparison(designs: list[Design]) -> str:
+    """Return the figures of designs as an HTML table, one design a column."""
+    found = [dict([*grid_figures(each.grid), *each.figures]) for each in designs]
+    names = list(dict.fromkeys(name for figures in found for name in figures))
+    head = "".join(f"<th style='text-align:left'>{escape(each.name)}</th>" for each in designs)
+    rows = "".join(
+        f"<tr><td>{escape(name)}</td>{''.join(f'<td>{escape(figures.get(name, chr(45)))}</td>' for figures in found)}</tr>"
+        for name in names
+    )
+    return f'<table style="font-size:.8em;width:100%;padding:0 .6em"><tr><th></th>{head}</tr>{rows}</table>'
+
+
+def deviation(grid: Grid, other: Grid) -> np.ndarray:
+    """Return how far the nodes of a grid lie from the triangles of another (V,) [scan unit]."""
+    places = np.ascontiguousarray(grid.nodes + grid.origin - other.origin)
+    distance, _ = distances_to_grid(places, other, float(other.lengths.mean()))
+    return distance

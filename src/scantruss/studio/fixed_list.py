@@ -1,0 +1,128 @@
+"""Fixed nodes: placed by a click, typed, dragged, deleted."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..surface.samples import sample_surface
+from .frame import SceneFrame
+from .picking import nearest_point
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+FIXED_COLOR = np.array((230, 97, 1), np.uint8)
+FIXED_RADIUS = 0.1  #: of a fixed node that is drawn [scene]
+NONE_CHOSEN = "-"
+
+
+class FixedNodes:
+    """The list of fixed nodes, and the handle with which the chosen one is dragged."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view = view
+        gui.add_markdown('Set "a click" to "place fixed node" and click on the scan, or type coordinates.')
+        self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
+        self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
+        add, move, delete = gui.add_button("Add"), gui.add_button("Move there"), gui.add_button("Delete")
+        self._handle: Any = None
+        self.chosen.on_update(view.step(self._choose))
+        add.on_click(view.step(lambda: self._set(self._typed(), len(self._fixed))))
+        move.on_click(view.step(lambda: self._set(self._typed(), self._number())))
+        delete.on_click(view.step(self._delete))
+
+    @property
+    def _fixed(self) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(place) for place in self.view.session.settings.fixed)
+
+    def _number(self) -> int:
+        if self.chosen.value == NONE_CHOSEN:
+            raise InputError("choose a fixed node first")
+        return int(self.chosen.value.partition(":")[0]) - 1
+
+    def _typed(self) -> tuple[float, ...]:
+        words = [word for word in re.split(r"[,;\s]+", self.words.value.strip()) if word]
+        try:
+            x, y, z = map(float, words)
+        except ValueError:
+            raise InputError(f"a fixed node needs three numbers x, y, z, got {self.words.value!r}") from None
+        return x, y, z
+
+    def _set(self, place: tuple[float, ...], number: int) -> None:
+        fixed = list(self._fixed)
+        fixed[number : number + 1] = [place]
+        self.view.session.fix(tuple(fixed))
+        self._show(number)
+
+    def _delete(self) -> None:
+        number = self._number()
+        self.view.session.fix(tuple(each for k, each in enumerate(self._fixed) if k != number), "delete fixed node")
+
+    def place(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        """Place a fixed node on the scan under a ray of the scene, or choose the one that is there."""
+        frame = self.view.frame
+        places = frame.to_scene(np.array(self._fixed).reshape(-1, 3)) if self._fixed else np.zeros((0, 3), np.float32)
+        if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
+            self._show(there)
+            return
+        scanned = self._scanned()
+        found = nearest_point(frame.to_scene(scanned), origin, ahead)
+        if found is None:
+            raise InputError("no point of the scan is there; click on the scan")
+        self._set(tuple(scanned[found].tolist()), len(self._fixed))
+
+    def _scanned(self) -> np.ndarray:
+        """Return the points of the scan that are no outliers (N, 3), in its own frame [scan unit]."""
+        cloud = self.view.session.cloud
+        assert cloud is not None
+        return sample_surface(cloud, self.view.session.settings).measured_points + cloud.origin
+
+    def _choose(self) -> None:
+        self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)
+
+    def _show(self, number: int) -> None:
+        """Choose a fixed node, and give it a handle."""
+        options = self.chosen.options
+        self.chosen.value = options[number] if 0 <= number < len(options) and options[0] != NONE_CHOSEN else options[0]
+        if self._handle is not None:
+            self._handle.remove()
+            self._handle = None
+        if not 0 <= number < len(self._fixed):
+            return
+        place = np.array(self._fixed[number])
+        self.words.value = ", ".join(f"{c:.10g}" for c in place.tolist())
+        at = self.view.frame.to_scene(place[None])[0]
+        self._handle = self.view.scene.api.add_transform_controls(
+            "/dragged", scale=0.8, disable_rotations=True, depth_test=False, position=tuple(at.tolist())
+        )
+
+        def dragged(event: Any) -> None:
+            if event.phase == "end":
+                self.view.do(lambda: self._drop(np.array(event.target.position), number))
+
+        self._handle.on_update(dragged)
+
+    def _drop(self, at: np.ndarray, number: int) -> None:
+        """Move a fixed node to the point of the scan that is nearest to where it was dropped."""
+        scanned = self._scanned()
+        away = np.linalg.norm(scanned - self.view.frame.from_scene(at), axis=1)
+        self._set(tuple(scanned[int(away.argmin())].tolist()), number)
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show the fixed nodes of a state."""
+        if before is not None and before.settings.fixed == state.settings.fixed and before.cloud is state.cloud:
+            return
+        fixed = state.settings.fixed
+        kept = self.chosen.value.partition(":")[0]
+        words = tuple(f"{k}: {', '.join(f'{c:.6g}' for c in place)}" for k, place in enumerate(fixed, 1))
+        self.chosen.options = words or (NONE_CHOSEN,)
+        if state.cloud is not None:
+            places = np.array(fixed, float).reshape(-1, 3)
+            self.view.scene.balls("/fixed", SceneFrame.of(state.cloud).to_scene(places), FIXED_COLOR, FIXED_RADIUS)
+        if self._handle is not None:
+            self._show(int(kept) - 1 if kept.isdecimal() else -1)

@@ -1,0 +1,89 @@
+"""What a studio gives away: files of every format, the settings, and the command lines that repeat the work."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+from ..errors import InputError
+from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
+from ..export.model import Model
+from ..runtime.files import temporary_folder
+from ..structure.options import settings_text
+from .project import save_project
+from .state import StudioState
+
+
+def model_to_show(state: StudioState, kind: str) -> Model:
+    """Return the grid or the structure of a state.
+
+    Raises
+    ------
+    InputError
+        There is none yet.
+    """
+    if kind == STRUCTURE:
+        if state.solution is None:
+            raise InputError("there is no structure yet; press Run")
+        return model_of(state.solution, report=state.report)
+    if state.grid is None:
+        raise InputError("there is no grid yet; press Generate")
+    return model_of(state.grid, cloud=state.cloud)
+
+
+def files_of(state: StudioState, kind: str, suffix: str) -> dict[str, bytes]:
+    """Return the files of a format by their names.
+
+    Raises
+    ------
+    ScanTrussError
+        There is nothing to write, or the format cannot hold it.
+    """
+    if suffix not in suffixes_of(kind):
+        raise InputError(f"no format {suffix} of a {kind}; use one of {' '.join(suffixes_of(kind))}")
+    model = model_to_show(state, kind)
+    with temporary_folder() as folder:
+        path = check_output(folder / f"{kind}{suffix}", kind)
+        check_unit(path, model.unit)
+        return {file.name: file.read_bytes() for file in write(model, path)}
+
+
+def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:
+    """Return the project of a state as a file by its name: that of the place where it is saved, or of the scan.
+
+    Raises
+    ------
+    InputError
+        There is no scan.
+    """
+    if state.cloud is None:
+        raise InputError("there is no scan yet; open one")
+    name = f"{Path(state.cloud.name or 'scan').stem}.scantruss" if place is None else place.name
+    with temporary_folder() as folder:
+        save_project(folder / name, state)
+        return {name: (folder / name).read_bytes()}
+
+
+def settings_files(state: StudioState) -> dict[str, bytes]:
+    """Return the settings of the grid, and of the structure, where there is one, as the command line reads them."""
+    made = state.settings if state.grid is None or state.asked is None else state.asked
+    files = {"grid.settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
+    if state.solution is not None:
+        files["structure.toml"] = settings_text(state.structure_settings).encode()
+    return files
+
+
+def command_of(state: StudioState) -> str:
+    """Return the command lines that repeat the grid and the structure with the files of `settings_files`."""
+    name = Path(state.cloud.name).name if state.cloud is not None and state.cloud.name else "SCAN"
+    made = state.settings if state.grid is None or state.asked is None else state.asked
+    lines = [
+        shlex.join(["scantruss", "grid", name, "grid.json", "--settings", "grid.settings.json"]),
+        f"# grid.settings.json: --length {made.length:g} --effort {made.effort} and all else",
+    ]
+    if state.solution is not None:
+        lines.append(
+            shlex.join(["scantruss", "structure", "grid.json", "structure.json", "--settings", "structure.toml"])
+        )
+    return "\n".join(lines)

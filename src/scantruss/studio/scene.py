@@ -1,0 +1,189 @@
+"""What is drawn: the scan, the members, panels and nodes of a grid, and marks beside them, in the scene of one page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .colours import DIMMED, PLAIN
+from .frame import DRAWN_EXTENT, SectionPlane
+from .tone import to_be_seen
+
+if TYPE_CHECKING:
+    from ..export.model import Model
+
+PANEL_COLOR = (205, 216, 223)
+SELECTED_COLOR = (230, 97, 1)
+LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
+TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
+TUBE_SIDES = 8
+DRAWN_SHARE = 0.93  #: of a panel about its middle, so that it does not cover its members
+OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float32)
+BALL_FACES = np.array(
+    [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]], np.int32
+)
+
+
+class Scene:
+    """The scene of one page; each part is drawn again by its name, and removed when it is empty."""
+
+    def __init__(self, scene: Any) -> None:
+        self.api = scene
+        scene.set_up_direction("+z")
+
+    def remove(self, *names: str) -> None:
+        """Remove parts."""
+        for name in names:
+            self.api.remove_by_name(name)
+
+    def points(self, name: str, places: np.ndarray, colors: np.ndarray, size: float) -> None:
+        """Draw points (N, 3) in colours (N, 3) or one."""
+        if not len(places):
+            self.remove(name)
+            return
+        self.api.add_point_cloud(name, places, colors, point_size=size, point_shape="circle", precision="float32")
+
+    def lines(self, name: str, ends: np.ndarray, colors: np.ndarray, width: float = LINE_WIDTH) -> None:
+        """Draw segments (M, 2, 3) in colours (M, 3) or one."""
+        if not len(ends):
+            self.remove(name)
+            return
+        each = np.broadcast_to(to_be_seen(colors), (len(ends), 3))
+        self.api.add_line_segments(
+            name, ends.astype(np.float32), np.repeat(each[:, None], 2, axis=1), thickness=width, thickness_units="screen"
+        )  # fmt: skip
+
+    def chain(self, name: str, places: np.ndarray, closed: bool, color: tuple[int, int, int], width: float) -> None:
+        """Draw a polyline (M, 3)."""
+        around = np.concatenate([places, places[:1]]) if closed else places
+        self.lines(name, np.stack([around[:-1], around[1:]], axis=1), np.array(color, np.uint8), width)
+
+    def tubes(self, name: str, ends: np.ndarray, colors: np.ndarray, radius: float) -> None:
+        """Draw segments (M, 2, 3) as tubes."""
+        if not len(ends):
+            self.remove(name)
+            return
+        angles = 2 * np.pi * np.arange(TUBE_SIDES) / TUBE_SIDES
+        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(TUBE_SIDES)], axis=1)
+        k = np.arange(TUBE_SIDES)
+        after = (k + 1) % TUBE_SIDES
+        faces = np.concatenate(
+            [
+                np.stack([k, after, k + TUBE_SIDES], axis=1),
+                np.stack([after, after + TUBE_SIDES, k + TUBE_SIDES], axis=1),
+            ]
+        )
+        spans = ends[:, 1] - ends[:, 0]
+        sizes = np.linalg.norm(spans, axis=1)
+        self.api.add_batched_meshes_simple(
+            name,
+            np.concatenate([circle, circle + [0.0, 0.0, 1.0]]).astype(np.float32),
+            faces.astype(np.uint32),
+            turns_from_z(spans / np.maximum(sizes, 1e-12)[:, None]),
+            ends[:, 0].astype(np.float32),
+            batched_scales=np.stack([np.full_like(sizes, radius), np.full_like(sizes, radius), sizes], axis=1),
+            batched_colors=np.array(np.broadcast_to(colors, (len(ends), 3)), np.uint8),
+            lod="off",
+        )
+
+    def balls(self, name: str, places: np.ndarray, colors: np.ndarray, radius: float) -> None:
+        """Draw balls at places (N, 3) in colours (N, 3) or one."""
+        if not len(places):
+            self.remove(name)
+            return
+        corners, faces = round_ball()
+        self.api.add_batched_meshes_simple(
+            name, corners, faces, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1)), places.astype(np.float32),
+            batched_scales=np.full(len(places), radius),
+            batched_colors=np.array(np.broadcast_to(colors, (len(places), 3)), np.uint8), lod="off",
+        )  # fmt: skip
+
+    def panels(
+        self, name: str, nodes: np.ndarray, triangles: np.ndarray, colors: np.ndarray | None, opacity: float
+    ) -> None:
+        """Draw triangles (T, 3) of nodes (V, 3), in one colour or each in its own (T, 3)."""
+        self.remove(name, f"{name} coloured")
+        if not len(triangles):
+            return
+        corners = nodes[triangles]
+        middles = corners.mean(axis=1, keepdims=True)
+        corners = (middles + DRAWN_SHARE * (corners - middles)).reshape(-1, 3).astype(np.float32)
+        faces = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+        if colors is None:
+            self.api.add_mesh_simple(
+                name, corners, faces, color=PANEL_COLOR, side="double", flat_shading=True, opacity=opacity
+            )
+            return
+        import trimesh
+
+        body = trimesh.Trimesh(corners, faces, process=False)
+        rgba = np.concatenate([np.repeat(colors, 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
+        body.visual.vertex_colors = rgba.astype(np.uint8)
+        self.api.add_mesh_trimesh(f"{name} coloured", body)
+
+    def highlight(self, kind: str, number: int, places: np.ndarray, model: Model) -> None:
+        """Draw a node, member or panel so that it stands out."""
+        color = np.array(SELECTED_COLOR, np.uint8)
+        if kind == "nodes":
+            self.points("/selected/node", places[[number]], color, 0.15)
+        elif kind == "members":
+            self.lines("/selected/member", places[model.members[[number]]], color, WIDE)
+        else:
+            self.chain("/selected/panel", places[model.triangles[number]], True, SELECTED_COLOR, WIDE)
+
+    def arrows(self, name: str, places: np.ndarray, along: np.ndarray, color: tuple[int, int, int]) -> None:
+        """Draw arrows (N, 3) that end at places (N, 3)."""
+        if not len(places):
+            self.remove(name)
+            return
+        reach = DRAWN_EXTENT / 1000
+        self.api.add_arrows(
+            name, np.stack([places - along, places], axis=1).astype(np.float32), color,
+            shaft_radius=2 * reach, head_radius=5 * reach, head_length=12 * reach,
+        )  # fmt: skip
+
+
+def round_ball() -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (18, 3) and triangles (32, 3) of an octahedron whose sides are divided once, on a ball of radius 1."""
+    corners, faces = OCTAHEDRON.tolist(), []
+    known: dict[tuple[int, int], int] = {}
+
+    def middle(a: int, b: int) -> int:
+        key = (min(a, b), max(a, b))
+        if key not in known:
+            place = np.array(corners[a]) + corners[b]
+            known[key] = len(corners)
+            corners.append((place / np.linalg.norm(place)).tolist())
+        return known[key]
+
+    for a, b, c in BALL_FACES.tolist():
+        ab, bc, ca = middle(a, b), middle(b, c), middle(c, a)
+        faces += [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.array(corners, np.float32), np.array(faces, np.uint32)
+
+
+def turns_from_z(directions: np.ndarray) -> np.ndarray:
+    """Return the (M, 4) quaternions w, x, y, z that turn the z axis into unit vectors (M, 3)."""
+    x, y, z = directions.T
+    turns = np.stack([1 + z, -y, x, np.zeros_like(x)], axis=1)
+    turns[z < -1 + 1e-9] = [0.0, 1.0, 0.0, 0.0]
+    return turns / np.linalg.norm(turns, axis=1)[:, None]
+
+
+def drawn_colors(colors: np.ndarray, selected: np.ndarray | None) -> np.ndarray:
+    """Return colours (N, 3) with those dimmed that are not selected (N,)."""
+    return colors if selected is None else np.where(selected[:, None], colors, DIMMED)
+
+
+def plain_colors(count: int) -> np.ndarray:
+    """Return the colour of what has no value (count, 3)."""
+    return np.broadcast_to(PLAIN, (count, 3))
+
+
+def cut(section: SectionPlane | None, ends: np.ndarray, colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return segments and their colours on the drawn side of a section."""
+    if section is None:
+        return ends, colors
+    clipped, kept = section.clipped(ends)
+    return clipped, colors[kept]

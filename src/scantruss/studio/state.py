@@ -1,0 +1,80 @@
+"""What a studio works on, as one record that never changes, and the steps that led to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..grid.grid import Grid
+from ..scan.cloud import PointCloud
+from ..settings import Settings
+from ..structure.options import StructureSettings
+from ..structure.report import StructureReport
+from ..structure.statics import Solution
+
+MOST_UNDONE = 200  #: that can be taken back
+NO_LENGTH = Settings(length=1.0)  #: of a studio without a scan
+DEFAULT_STRUCTURE = StructureSettings(supports="boundary", loads=("self", "snow:1kN/m2"), frequencies=3)
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A grid that is kept for comparison."""
+
+    name: str
+    grid: Grid
+    figures: tuple[tuple[str, str], ...] = ()  #: of its structure, in words
+
+
+@dataclass(frozen=True, eq=False)
+class StudioState:
+    """What a studio works on."""
+
+    cloud: PointCloud | None = None
+    settings: Settings = NO_LENGTH
+    grid: Grid | None = None
+    asked: Settings | None = None  #: with which the grid was asked for; its own say what was done to get it
+    is_live: bool = False  #: whether the grid is a quick one, made while the length was chosen
+    structure_settings: StructureSettings = DEFAULT_STRUCTURE
+    solution: Solution | None = None
+    report: StructureReport | None = None
+    designs: tuple[Design, ...] = ()
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether settings have changed since the grid was made."""
+        return self.grid is not None and self.asked is not None and self.asked != self.settings
+
+
+class History:
+    """The states before the present one, and those that were taken back."""
+
+    def __init__(self) -> None:
+        self._past: list[tuple[str, StudioState]] = []
+        self._future: list[tuple[str, StudioState]] = []
+
+    def note(self, words: str, state: StudioState, *, goes_on: bool = False) -> None:
+        """Keep the state before a step; one that goes on with the same step needs none."""
+        if not (goes_on and self._past and self._past[-1][0] == words and not self._future):
+            self._past = [*self._past[-MOST_UNDONE + 1 :], (words, state)]
+        self._future = []
+
+    def undo(self, now: StudioState) -> StudioState | None:
+        """Return the state before the last step; None where there is none."""
+        if not self._past:
+            return None
+        words, before = self._past.pop()
+        self._future.append((words, now))
+        return before
+
+    def redo(self, now: StudioState) -> StudioState | None:
+        """Return the state after the step that was taken back last; None where there is none."""
+        if not self._future:
+            return None
+        words, after = self._future.pop()
+        self._past.append((words, now))
+        return after
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """The steps that undo and redo would take; "" where there is none."""
+        return (self._past[-1][0] if self._past else "", self._future[-1][0] if self._future else "")

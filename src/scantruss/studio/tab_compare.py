@@ -1,0 +1,91 @@
+"""Tab: keep designs and set two of them side by side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .colours import colors_of, legend_of
+from .compare import comparison, deviation, kept_design
+from .frame import BESIDE, DRAWN_EXTENT
+from .state import Design
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+PRESENT = "the present one"
+NO_OTHER = "-"
+
+
+class CompareTab:
+    """Designs that are kept, their figures, and one beside another."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view = view
+        self.name = gui.add_text("name", "A")
+        keep = gui.add_button("Keep this design", color="blue")
+        self.other = gui.add_dropdown(
+            "beside", (NO_OTHER,), hint="a kept design, drawn beside the present one: one camera for both"
+        )
+        self.distance = gui.add_checkbox("coloured by its distance from the present one", False)
+        self.legend = gui.add_html("")
+        drop = gui.add_button("Forget that design")
+        self.table = gui.add_html("")
+        keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
+        drop.on_click(view.step(self._drop))
+        self.other.on_update(view.step(self._choose))
+        self.distance.on_update(view.step(lambda: self._draw(view.session.state)))
+
+    def _choose(self) -> None:
+        self._draw(self.view.session.state)
+        self.view.overview(1 if self.other.value == NO_OTHER else 2)
+
+    def _drop(self) -> None:
+        if self.other.value != NO_OTHER:
+            self.view.session.drop_design(self.other.value)
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show the designs of a state."""
+        if (
+            before is not None
+            and before.designs is state.designs
+            and before.grid is state.grid
+            and before.report is state.report
+        ):
+            return
+        if before is None or before.designs is not state.designs:
+            self.other.options = (NO_OTHER, *(each.name for each in state.designs))
+            self.name.value = (
+                next(name for name in map(chr, range(65, 91)) if name not in self.other.options)
+                if len(state.designs) < 26
+                else ""
+            )
+        shown = list(state.designs)
+        if state.grid is not None:
+            shown.append(kept_design(state, PRESENT))
+        self.table.content = comparison(shown) if state.designs else ""
+        self._draw(state)
+
+    def _draw(self, state: StudioState) -> None:
+        scene, chosen = self.view.scene, self._chosen(state)
+        self.legend.content = ""
+        if chosen is None or state.cloud is None:
+            scene.remove("/beside/members", "/beside/panels", "/beside/name")
+            return
+        frame = self.view.frame
+        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([BESIDE * DRAWN_EXTENT, 0.0, 0.0], np.float32)
+        values = chosen.grid.lengths
+        words = "member length"
+        if self.distance.value and state.grid is not None:
+            values = deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1)
+            words = "distance from the present design"
+        colors, low, high = colors_of(values, None)
+        self.legend.content = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
+        scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
+        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25)
+        scene.api.add_label("/beside/name", chosen.name, position=tuple((nodes.max(axis=0)).tolist()))
+
+    def _chosen(self, state: StudioState) -> Design | None:
+        return next((each for each in state.designs if each.name == self.other.value), None)

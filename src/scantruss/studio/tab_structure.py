@@ -1,0 +1,189 @@
+"""Tab: supports, section, material and loads; what they do to the grid."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..structure.supports import HELD
+from .colours import colors_of, legend_of
+from .compare import structure_figures
+from .frame import DRAWN_EXTENT
+from .session import STRUCTURE_WORDS
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first [extent of the scan]
+LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
+SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
+LOAD_COLOR = (170, 30, 30)
+SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
+ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
+SWINGS = 3  #: of a mode while it is shown
+AS_BUILT = "as built"
+
+
+class StructureTab:
+    """The structure of the grid and its results."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view = view
+        kept = view.session.state.structure_settings
+        hint = "corners, boundary, lowest:H, fixed, line:NAME, loop:N, N001, joined by +; or set a click to support"
+        self.words = {
+            "supports": gui.add_text("supports", kept.supports, hint=hint),
+            "support_type": gui.add_dropdown("held as", tuple(HELD), initial_value=kept.support_type),
+            "section": gui.add_text("section", kept.section),
+            "material": gui.add_text("material", kept.material),
+            "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
+        }
+        run = gui.add_button("Run", color="blue")
+        self.results = gui.add_markdown("")
+        self.case = gui.add_dropdown("shape under", (AS_BUILT,), hint="load cases, combinations and modes")
+        self.factor = gui.add_text(
+            "enlarged", "", hint="how many times displacements are drawn; empty: so that they are seen"
+        )
+        self.legend = gui.add_html("")
+        self.loads, self.supports = gui.add_checkbox("loads", True), gui.add_checkbox("supports", True)
+        animate = gui.add_button("Animate")
+        run.on_click(view.step(self._run))
+        animate.on_click(view.step(self._animate))
+        self.case.on_update(view.step(self._choose))
+        for each in (self.factor, self.loads, self.supports):
+            each.on_update(view.step(lambda: self._draw(view.session.state)))
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether a displaced shape is drawn."""
+        return bool(self.case.value != AS_BUILT)
+
+    def _choose(self) -> None:
+        self._draw(self.view.session.state)
+        self.view.look.draw()
+
+    def _run(self) -> None:
+        self.view.session.set_structure(**{name: each.value for name, each in self.words.items()})
+        self.view.session.run_structure()
+
+    def support(self, found: tuple[str, int]) -> None:
+        """Hold the node under a click, or no longer."""
+        shown = self.view.shown_model()
+        if shown is None or found[0] != "nodes":
+            raise InputError("no node is there; click on a node of the grid")
+        mark = shown[0].node_marks[found[1]]
+        words = [word for word in self.words["supports"].value.split("+") if word.strip()]
+        marked = [word for word in words if word[:1] == "N" and word[1:].isdecimal()]
+        words = [word for word in marked if word != mark] if mark in marked else [*marked, mark]
+        self.words["supports"].value = "+".join(words)
+        self.view.session.set_structure(supports=self.words["supports"].value)
+        self.view.say(f"supports: {self.words['supports'].value or 'none'}; press Run")
+        self._mark_supports([shown[0].node_marks.index(word) for word in words], "/supports/chosen")
+
+    def _mark_supports(self, nodes: list[int], name: str) -> None:
+        shown = self.view.shown_model()
+        if shown is not None:
+            self.view.scene.balls(name, self.view.places(shown[0])[nodes], SUPPORT_COLOR, SUPPORT_RADIUS)
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show the structure of a state."""
+        if before is not None and before.structure_settings is not state.structure_settings:
+            asked = state.structure_settings
+            for name in STRUCTURE_WORDS:
+                value = getattr(asked, name)
+                self.words[name].value = ",".join(map(str, value)) if name == "loads" else value
+        if before is not None and before.solution is state.solution and before.grid is state.grid:
+            return
+        rows = [f"{name} **{value}**" for name, value in structure_figures(state)]
+        if state.report is not None:
+            rows += [f"**warning:** {words}" for words in state.report.warnings]
+        self.results.content = "\n\n".join(rows)
+        cases: tuple[str, ...] = (AS_BUILT,)
+        if state.solution is not None:
+            cases += tuple(result.name for result in state.solution.all_results())
+            vibration = state.report.vibration if state.report is not None else None
+            if vibration is not None:
+                cases += tuple(f"mode {k}, {value:.3g} Hz" for k, value in enumerate(vibration.values.tolist(), 1))
+        self.case.options = cases
+        self.view.scene.remove("/supports/chosen")
+        self._draw(state)
+
+    def _moved(self, state: StudioState) -> tuple[np.ndarray, float, bool] | None:
+        """Return displacements (V, 3) of the chosen case [m], how many times they are drawn, and whether it is a mode."""
+        if state.solution is None or state.report is None or self.case.value == AS_BUILT:
+            return None
+        is_mode = self.case.value.startswith("mode ") and state.report.vibration is not None
+        if is_mode and state.report.vibration is not None:
+            moved = state.report.vibration.shapes[int(self.case.value.split()[1].rstrip(",")) - 1]
+        else:
+            moved = state.solution[self.case.value].displacements[:, :3]
+        extent = DRAWN_EXTENT / self.view.frame.factor * self.view.metres()
+        usual = SHOWN_DISPLACEMENT * extent / (float(np.linalg.norm(moved, axis=1).max()) or 1.0)
+        try:
+            factor = float(self.factor.value) if self.factor.value.strip() and not is_mode else usual
+        except ValueError:
+            raise InputError(f"enlarged needs a number, got {self.factor.value!r}") from None
+        return moved, factor, is_mode
+
+    def _draw(self, state: StudioState) -> None:
+        scene, shown = self.view.scene, self.view.shown_model()
+        self.legend.content = ""
+        if shown is None or state.solution is None or shown[0].truss is None:
+            scene.remove("/moved", "/loads", "/supports/held")
+            return
+        model, _ = shown
+        places = self.view.places(model)
+        held = model.supported if self.supports.value else np.zeros(0, np.int64)
+        scene.balls("/supports/held", places[held], SUPPORT_COLOR, SUPPORT_RADIUS)
+        moved = self._moved(state)
+        if moved is None:
+            scene.remove("/moved")
+        else:
+            change, factor, is_mode = moved
+            size = 1e3 * np.linalg.norm(change, axis=1)[model.members].mean(axis=1)
+            colors, low, high = colors_of(size, None)
+            scene.lines("/moved", (places + self._in_scene(change, factor))[model.members], colors, 4.0)
+            if not is_mode:
+                self.legend.content = legend_of(f"displacement, drawn {factor:.3g} times", "mm", low, high, False)
+        self._draw_loads(state, places)
+
+    def _in_scene(self, change: np.ndarray, factor: float) -> np.ndarray:
+        return (change * (factor / self.view.metres() * self.view.frame.factor)).astype(np.float32)
+
+    def _draw_loads(self, state: StudioState, places: np.ndarray) -> None:
+        assert state.solution is not None
+        cases = state.solution.truss.cases
+        case = next((each for each in cases if each.name == self.case.value), cases[-1] if cases else None)
+        if case is None or not self.loads.value:
+            self.view.scene.remove("/loads")
+            return
+        truss, forces = state.solution.truss, np.zeros((len(places), 3))
+        if case.nodal is not None:
+            forces += case.nodal[:, :3]
+        if case.line is not None:
+            half = 0.5 * case.line * truss.lengths[:, None]
+            for side in (0, 1):
+                np.add.at(forces, truss.members[:, side], half)
+        size = np.linalg.norm(forces, axis=1)
+        strong = size > 0.02 * size.max() if size.max() > 0 else size > 0
+        along = forces[strong] * (LOAD_ARROW * DRAWN_EXTENT / (size.max() or 1.0))
+        self.view.scene.arrows("/loads", places[strong], along, LOAD_COLOR)
+
+    def _animate(self) -> None:
+        state, shown = self.view.session.state, self.view.shown_model()
+        if (moved := self._moved(state)) is None or shown is None:
+            raise InputError("choose a load case or a mode to animate")
+        change, factor, _ = moved
+        places, members = self.view.places(shown[0]), shown[0].members
+        handle = self.view.scene.api.get_handle_by_name("/moved")
+        step = self._in_scene(change, factor)
+        began = time.monotonic()
+        while (spent := time.monotonic() - began) < ANIMATION_SECONDS and self.view.session.state is state:
+            swing = np.float32(np.sin(2 * np.pi * SWINGS * spent / ANIMATION_SECONDS))
+            handle.points = (places + swing * step)[members]
+            time.sleep(FRAME_SECONDS)
+        self._draw(state)
