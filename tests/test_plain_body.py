@@ -83,6 +83,19 @@ def test_an_open_body_is_closed_at_its_boundary_first() -> None:
     assert opened.limb[scan[:, 0] < 0.0].sum() == 0
 
 
+@pytest.mark.parametrize("apart", [0.4, 0.55])
+def test_a_sparse_part_of_the_scan_encloses_the_body_too(apart: float) -> None:
+    """On the far side the points lie about half a member apart, as on the flat parts of a mesh."""
+    scan = np.concatenate([ball(), outside(rod(0.3, straight(3.0)))])
+    far, kept = np.flatnonzero(scan[:, 0] < -3.0), []
+    left = scan[far]
+    while len(left):
+        kept.append(left[0])
+        left = left[np.linalg.norm(left - left[0], axis=1) > apart]
+    opened = opened_body(np.concatenate([np.delete(scan, far, axis=0), kept]), LENGTH, SPACING)
+    assert opened is not None and opened.limb.any()
+
+
 def test_a_slit_is_filled() -> None:
     """Two boxes side by side on a common base, less than a ball of the slit apart."""
     assert 2 * SLIT_RADIUS > 0.4

@@ -34,6 +34,7 @@ OFF_BODY = (
 WALL_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
 NEIGHBORS = 12  # samples around one that tell whether it lies at a boundary
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
+SPARSE_LINK = 2.0  # the same where points are sparse, in distances of the sixth neighbour
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # of a disc, in distances of the sixth neighbour
 WALL_STEP = 0.9  # distance of places on a wall [voxels]
 OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
@@ -110,16 +111,20 @@ def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
 
 def _fans(found: Linked, length: float) -> Iterator[np.ndarray]:
     """Yield triangles (K, 3, 3) between each sample and two of those linked to it that follow one another around it."""
+    from scipy.spatial import cKDTree
+
     beside, own = found.neighbors, np.arange(len(found.mean))
     turn, beside = _around(found, np.where(beside >= 0, beside, own[:, None]))
     last = beside.shape[1] - 1
+    sixth = cKDTree(found.mean).query(found.mean, k=7)[0][:, 6]
+    widest = np.maximum(WIDEST_LINK * length, SPARSE_LINK * sixth)
     for k in range(last + 1):
         gap = turn[:, k + 1] - turn[:, k] if k < last else turn[:, 0] + 2.0 * np.pi - turn[:, -1]
         one, other = beside[:, k], beside[:, (k + 1) % (last + 1)]
         closed = (gap < np.radians(OPEN_GAP)) & (one != own) & (other != own) & (one != other)
         corners = found.mean[np.stack([own, one, other], axis=1)[closed]]
         wide = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2).max(axis=1)
-        yield corners[wide < WIDEST_LINK * length]
+        yield corners[wide < widest[closed]]
 
 
 def _tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
