@@ -168,8 +168,17 @@ def test_between_sites_a_length_is_that_of_the_sites_around() -> None:
 
 @pytest.mark.parametrize(("points", "curvature"), [(ball(5.0, 8000), 1 / 5), (tube(4.0, 12.0, 0.2), 1 / 4)])
 def test_the_curvature_of_a_ball_and_a_tube_is_one_over_the_radius(points: np.ndarray, curvature: float) -> None:
-    bends = measured_bends(samples_of(points, 1.0).surface, 2.0)
+    bends = measured_bends(samples_of(points, 1.0).surface)
     assert np.abs(bends / curvature - 1.0).max() < 0.1 and np.median(bends) == pytest.approx(curvature, rel=0.02)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.005, 0.01])
+def test_noise_makes_a_surface_neither_flatter_nor_rounder(noise: float) -> None:
+    """A saddle z = xy / 36 with the curvature 1 / 36 nearly everywhere; noise of 10 mm makes sagittas of 36 m in narrow patches."""
+    rng = np.random.default_rng(4)
+    x, y = rng.uniform([-12.0, -9.0], [12.0, 9.0], (60_000, 2)).T
+    bends = measured_bends(samples_of(np.stack([x, y, x * y / 36.0 + rng.normal(0.0, noise, len(x))], axis=1), 1.0).surface)
+    assert np.median(bends) == pytest.approx(1.0 / 37.5, rel=0.1) and np.quantile(bends, 0.95) < 1.15 / 36.0
 
 
 @pytest.mark.parametrize("points", [ball(5.0, 8000, noise=0.01), tube(4.0, 12.0, 0.2)])

@@ -208,7 +208,7 @@ class Advice:
     def radius(self) -> float:
         """Return the radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
         samples = sample_surface(self._cloud, self._settings.replace(length=self._usual))
-        bend = float(np.quantile(measured_bends(samples.surface, 1.0), CLOSE_BEND))
+        bend = float(np.quantile(measured_bends(samples.surface), CLOSE_BEND))
         return 1.0 / bend if bend > 0.0 else np.inf
 
     def _show(self, length: float) -> Callable[[str, float], None]:

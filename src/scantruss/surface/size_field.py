@@ -19,7 +19,8 @@ RATIO = 1.2  # largest ratio of the desired lengths of two successive members
 SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 because links make distances longer
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
 LESS_CURVED_SHARE = 0.95  # share of the scan that is less curved than the places with the shortest members
-NOISE_DEVIATIONS = 3.3  # standard deviations of a curvature up to which it may be noise
+NOISE_DEVIATIONS = 4.6  # standard deviations of a curvature up to which it may be noise
+WIDEST_PATCH = 4.0  # patches in which a curvature may be measured; noise falls with their width [usual patches]
 FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan [that length]
 LENGTHS_PER_THREAD = 200  # fewest samples worth a thread of their own
 
@@ -100,26 +101,29 @@ def _by_curvature(surface: Surface, most: float) -> np.ndarray:
     A member of length l over a curvature k bulges by k l^2 / 8. The most curved twentieth of the scan gets the shortest length, unless
     even the longest member would be flat there.
     """
-    bends = measured_bends(surface, most)
+    bends = measured_bends(surface)
     shortest = surface.length
     bulge = max(float(np.quantile(bends, LESS_CURVED_SHARE)) * shortest**2 / 8.0, FLAT_BULGE * most * shortest)
     lengths = np.sqrt(8.0 * bulge / np.maximum(bends, 1e-300)) / shortest
     return np.clip(lengths, 1.0, most)
 
 
-def measured_bends(surface: Surface, most: float) -> np.ndarray:
-    """Return the larger principal curvature of the scan at each sample (S,), less what may be noise [1 / scan unit].
+def measured_bends(surface: Surface) -> np.ndarray:
+    """Return the larger principal curvature of the scan at each sample (S,); 0 where it may be noise [1 / scan unit].
 
-    It is measured by the widest patches, up to the longest member, that agree with narrower ones except for noise (Lepski).
+    It is measured by the widest patches that agree with narrower ones except for noise (Lepski), and what is left of the noise is
+    taken off as in the estimate of James and Stein: a curvature well above it stays as it is.
     """
     chosen = np.zeros(len(surface.mean), np.bool_)
     kernels.choose_apart(surface.neighbors, chosen)
     samples = np.flatnonzero(chosen)
     low, high, best = np.zeros(len(samples)), np.full(len(samples), np.inf), np.zeros(len(samples))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt = _curvatures(surface, samples, most**share)
-        low, high = np.maximum(low, bend - NOISE_DEVIATIONS * doubt), np.minimum(high, bend + NOISE_DEVIATIONS * doubt)
-        best = np.where(low <= high, np.maximum(bend - NOISE_DEVIATIONS * doubt, 0.0), best)
+        bend, doubt = _curvatures(surface, samples, WIDEST_PATCH**share)
+        noise = NOISE_DEVIATIONS * doubt
+        low, high = np.maximum(low, bend - noise), np.minimum(high, bend + noise)
+        sure = bend * np.maximum(1.0 - (noise / np.maximum(bend, 1e-300)) ** 2, 0.0)
+        best = np.where(low <= high, sure, best)
     bends = np.zeros(len(chosen))
     bends[samples] = best
     bends = _spread(surface.neighbors, bends, chosen)
