@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 ROWS_OF_SHEET = 1_048_576  #: most rows of a sheet
-FORCES = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")
-MOTIONS = ("ux [m]", "uy [m]", "uz [m]", "rx [rad]", "ry [rad]", "rz [rad]")
+FORCE_HEADS = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")
+MOTION_HEADS = ("ux [m]", "uy [m]", "uz [m]", "rx [rad]", "ry [rad]", "rz [rad]")
 STIFFNESS_HEADS = ("ux [N/m]", "uy [N/m]", "uz [N/m]", "rx [Nm/rad]", "ry [Nm/rad]", "rz [Nm/rad]")
 RELEASES = ("start My", "start Mz", "end My", "end Mz")  #: rotational springs at the ends of a member
 
@@ -142,8 +142,8 @@ def _result_sheets(solution: Solution) -> dict[str, list[SheetRow]]:
     forces = ("N [N]", "Vy [N]", "Vz [N]", "T [Nm]", "My [Nm]", "Mz [Nm]")
     heads = [f"{place} {force}" for place in ("start", "end") for force in forces]
     sheets: dict[str, list[SheetRow]] = {
-        "Displacements": [("case", "node", *MOTIONS)],
-        "Reactions": [("case", "node", *FORCES)],
+        "Displacements": [("case", "node", *MOTION_HEADS)],
+        "Reactions": [("case", "node", *FORCE_HEADS)],
         "Forces": [("case", "member", *heads)],
     }
     for case in solution.cases:

@@ -25,7 +25,7 @@ JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942  # kinds of parts
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # types of numbers
 TRIANGLE_LIST = 4  # mode of a primitive; the others are not read as faces
 PACKED_MESHES = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows are where x, y (up) and z of the file go
+Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows are where x, y (up) and z of the file go
 
 Gltf = dict[str, Any]
 
@@ -49,7 +49,7 @@ def read_gltf(path: Path, wanted: Sequence[str] = ()) -> Content:
                 if accessor not in read:
                     read[accessor] = count
                     places = _numbers(path, held, buffers, accessor, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-                    points.append(places @ UPRIGHT)
+                    points.append(places @ Z_UP)
                     count += len(places)
                 if part.get("mode", TRIANGLE_LIST) != TRIANGLE_LIST:
                     all_faces = False

@@ -20,7 +20,7 @@ METRES_3MF = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.
 MODEL_PART = "3D/3dmodel.model"  # where the model is, unless the relations of the package say another place
 MOST_PARTS_3MF = 1_000_000  # objects that are built, those within others included
 
-Parts = list[tuple[np.ndarray, np.ndarray]]  # points (N, 3) and triangles (T, 3) of each mesh
+PlacedMeshes = list[tuple[np.ndarray, np.ndarray]]  # points (N, 3) and triangles (T, 3) of each mesh
 
 
 def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -30,7 +30,7 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
         space = root.tag[: root.tag.index("}") + 1] if root.tag.startswith("{") else ""
         objects = {each.get("id", ""): each for each in root.iter(f"{space}object")}
         meshes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        parts: Parts = []
+        parts: PlacedMeshes = []
         items = [(item.get("objectid", ""), _frame(item), 0) for item in root.iter(f"{space}item")]
         waiting = items or [(name, np.vstack([np.eye(3), np.zeros(3)]), 0) for name in objects]
         visits = 0

@@ -22,7 +22,7 @@ from .kinds import kind_of, read_head, reading_as, wrong_kind
 from .packed import check_size
 
 RAW = re.compile(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>\s*_")  # then the bytes as they are
-NUMBERS = {
+VTK_NUMBERS = {
     "Float32": "f4", "Float64": "f8", "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4",
     "Int64": "i8", "UInt64": "u8",
 }  # fmt: skip
@@ -38,7 +38,7 @@ class _Data:
 
     def __init__(self, path: Path, root: ElementTree.Element, raw: bytes | None) -> None:
         self.path, self.order = path, "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
-        self.head = np.dtype(self.order + NUMBERS[root.get("header_type", "UInt32")])
+        self.head = np.dtype(self.order + VTK_NUMBERS[root.get("header_type", "UInt32")])
         self.packed = root.get("compressor", "")
         if self.packed and self.packed not in UNPACKERS:
             raise FormatError(f"{path} is packed by {self.packed}, which is not read; save it with zlib or without compression")
@@ -48,7 +48,7 @@ class _Data:
 
     def numbers(self, array: ElementTree.Element) -> np.ndarray:
         """Return the numbers of an array (N,)."""
-        kind = np.dtype(self.order + NUMBERS[array.get("type", "")])
+        kind = np.dtype(self.order + VTK_NUMBERS[array.get("type", "")])
         form = array.get("format", "ascii")
         if form == "ascii":
             return np.array((array.text or "").split(), kind)
