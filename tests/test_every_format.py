@@ -81,7 +81,9 @@ def from_compas(path: Path) -> Found:
     data = json.loads(path.read_text(encoding="utf-8"))["graph"]["data"]
     nodes = data["node"].values()
     names = " ".join(edge["group"] for edges in data["edge"].values() for edge in edges.values())
-    return Found([(n["x"], n["y"], n["z"]) for n in nodes], [n["mark"] for n in nodes], names, data["attributes"]["unit"])
+    return Found(
+        [(n["x"], n["y"], n["z"]) for n in nodes], [n["mark"] for n in nodes], names, data["attributes"]["unit"]
+    )
 
 
 def from_dxf(path: Path) -> Found:

@@ -91,7 +91,8 @@ def _structure(model: Model) -> dict[str, list[str]]:
         "materials": [_text_of(material)],
         "loads": loads,
         "combinations": [
-            _text_of({"name": each.name, "state": each.state, "factors": dict(each.factors)}) for each in truss.combinations
+            _text_of({"name": each.name, "state": each.state, "factors": dict(each.factors)})
+            for each in truss.combinations
         ],
     }
 

@@ -82,7 +82,9 @@ def _mantle(
     vertices = [[file.add("VERTEX_POINT", "", point) for point in points] for points in corners]
     vector = file.add("VECTOR", "", frame.directions[0], frame.length)
     uprights = [
-        file.add("EDGE_CURVE", "", vertices[0][k], vertices[1][k], file.add("LINE", "", corners[0][k], vector), ALONG_EDGE)
+        file.add(
+            "EDGE_CURVE", "", vertices[0][k], vertices[1][k], file.add("LINE", "", corners[0][k], vector), ALONG_EDGE
+        )
         for k in range(count)
     ]
     rings: list[list[Ref]] = [[], []]

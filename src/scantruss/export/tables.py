@@ -43,7 +43,9 @@ def encode_xlsx_model(model: Model, style: FileStyle) -> bytes:
         sheets |= _result_sheets(model.solution)
     for name, rows in sheets.items():
         if len(rows) > ROWS_OF_SHEET:
-            raise FormatError(f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(rows):,}; write a .json")
+            raise FormatError(
+                f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(rows):,}; write a .json"
+            )
     return encode_workbook(sheets)
 
 
@@ -82,7 +84,9 @@ def _geometry(model: Model) -> dict[str, list[SheetRow]]:
         columns |= {f"local z, {axis}": truss.axes[:, 2, k].tolist() for k, axis in enumerate("xyz")}
         springs = truss.end_stiffness.reshape(-1, 4)
         if not truss.pinned and np.isfinite(springs).any():
-            columns |= {f"{name} [Nm/rad]": list(map(_stiff, springs[:, k].tolist())) for k, name in enumerate(RELEASES)}
+            columns |= {
+                f"{name} [Nm/rad]": list(map(_stiff, springs[:, k].tolist())) for k, name in enumerate(RELEASES)
+            }
     if model.utilization is not None:
         columns["utilization"] = [_known_or_none(value) for value in np.asarray(model.utilization, float).tolist()]
     places = zip(marks, *model.nodes.T.tolist(), map("|".join, sets), strict=True)

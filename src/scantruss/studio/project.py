@@ -61,8 +61,8 @@ def save_project(path: Path, project: Project, structure: Model | None = None) -
         arrays["normals"] = cloud.normals
     head = {
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
-        "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped, "notes": list(cloud.notes),
-                 "left_out": [list(part) for part in cloud.left_out]},
+        "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
+                 "notes": list(cloud.notes), "left_out": [list(part) for part in cloud.left_out]},
         "settings": project.settings.to_dict(), "solved": project.solved,
     }  # fmt: skip
     parts = {
@@ -114,7 +114,8 @@ def _project_of(parts: dict[str, bytes]) -> Project:
             points=np.ascontiguousarray(arrays["points"], np.float64).reshape(-1, 3),
             origin=np.asarray(arrays["origin"], np.float64).reshape(3),
             normals=np.asarray(arrays["normals"], np.float64).reshape(-1, 3) if "normals" in arrays else None,
-            unit=scan["unit"], system=str(scan.get("system", "")), name=scan["name"], dropped=int(scan["dropped"]), notes=tuple(scan["notes"]),
+            unit=scan["unit"], system=str(scan.get("system", "")), name=scan["name"],
+            dropped=int(scan["dropped"]), notes=tuple(scan["notes"]),
             left_out=tuple((str(why), int(count)) for why, count in scan["left_out"]),
         )  # fmt: skip
     if not len(cloud.points) or not np.isfinite(cloud.points).all():

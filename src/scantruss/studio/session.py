@@ -102,7 +102,12 @@ class Session:
         """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
         if self.cloud is not None:
             self.stop()
-            self.cloud, self.grid, self.solution, self.report = replace(self.cloud, unit=unit, system=""), None, None, None
+            self.cloud, self.grid, self.solution, self.report = (
+                replace(self.cloud, unit=unit, system=""),
+                None,
+                None,
+                None,
+            )
         self.settings = self.settings.replace(unit=unit)
 
     def length_bounds(self) -> tuple[float, float]:

@@ -48,12 +48,22 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
                 parts.append((points @ frame[:3] + frame[3], triangles))
             for inner in each.iter(f"{space}component"):
                 own = _frame(inner)
-                waiting.append((inner.get("objectid", ""), np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]]), depth + 1))
+                waiting.append(
+                    (
+                        inner.get("objectid", ""),
+                        np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]]),
+                        depth + 1,
+                    )
+                )
         if not parts or not sum(len(points) for points, _ in parts):
             raise FormatError(f"{path} holds no mesh")
         together = np.concatenate([points for points, _ in reversed(parts)])
         starts = np.cumsum([0, *(len(points) for points, _ in reversed(parts))])
-        faces = [triangles + start for (_, triangles), start in zip(reversed(parts), starts[:-1], strict=True) if len(triangles)]
+        faces = [
+            triangles + start
+            for (_, triangles), start in zip(reversed(parts), starts[:-1], strict=True)
+            if len(triangles)
+        ]
         metres = METRES_3MF[root.get("unit", "millimeter")]
     return Content(together, metres=metres, normals=normals_from_faces(together, faces))
 

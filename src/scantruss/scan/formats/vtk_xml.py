@@ -41,7 +41,9 @@ class _Data:
         self.head = np.dtype(self.order + VTK_NUMBERS[root.get("header_type", "UInt32")])
         self.packed = root.get("compressor", "")
         if self.packed and self.packed not in UNPACKERS:
-            raise FormatError(f"{path} is packed by {self.packed}, which is not read; save it with zlib or without compression")
+            raise FormatError(
+                f"{path} is packed by {self.packed}, which is not read; save it with zlib or without compression"
+            )
         appended = root.find("AppendedData")
         self.raw = raw
         self.text = "" if appended is None or raw is not None else (appended.text or "").strip().removeprefix("_")
@@ -55,7 +57,9 @@ class _Data:
         if form == "binary":
             return np.frombuffer(self._coded((array.text or "").strip()), kind)
         place = int(array.get("offset", ""))
-        return np.frombuffer(self._coded(self.text[place:]) if self.raw is None else self._plain(self.raw[place:]), kind)
+        return np.frombuffer(
+            self._coded(self.text[place:]) if self.raw is None else self._plain(self.raw[place:]), kind
+        )
 
     def _plain(self, data: bytes) -> bytes:
         """Return the bytes of an array that begins with the size of its parts."""
@@ -89,7 +93,9 @@ class _Data:
 
     def _cut(self, data: bytes, start: int, size: int) -> bytes:
         if start + size > len(data):
-            raise FormatError(f"{self.path} ends early: an array has {max(len(data) - start, 0):,} of {size:,} bytes; copy it again")
+            raise FormatError(
+                f"{self.path} ends early: an array has {max(len(data) - start, 0):,} of {size:,} bytes; copy it again"
+            )
         return data[start : start + size]
 
 
@@ -109,14 +115,18 @@ def read_vtk_xml(path: Path, wanted: Sequence[str] = ()) -> Content:
     with reading_as(path, "VTK XML"):
         root = ElementTree.fromstring(text)
         if root.tag != "VTKFile" or root.get("type") not in ("PolyData", "UnstructuredGrid"):
-            raise FormatError(f"{path} holds {root.get('type') or 'no VTKFile'}; points of PolyData or UnstructuredGrid are read")
+            raise FormatError(
+                f"{path} holds {root.get('type') or 'no VTKFile'}; points of PolyData or UnstructuredGrid are read"
+            )
         data = _Data(path, root, raw)
         points, normals = list[np.ndarray](), list[np.ndarray]()
         for piece in root.iter("Piece"):
             array = piece.find("Points/DataArray")
             places = np.empty((0, 3)) if array is None else data.numbers(array).reshape(-1, 3).astype(np.float64)
             if len(places) != int(piece.get("NumberOfPoints", "-1")):
-                raise FormatError(f"{path} has {len(places):,} points where it promises {piece.get('NumberOfPoints')}; copy it again")
+                raise FormatError(
+                    f"{path} has {len(places):,} points where it promises {piece.get('NumberOfPoints')}; copy it again"
+                )
             points.append(places)
             held = piece.find("PointData")
             name = None if held is None else held.get("Normals")
