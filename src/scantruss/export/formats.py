@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import FormatError
 from ..grid.grid import Grid
-from ..runtime.files import check_place, suffix_of, write_files
+from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
@@ -278,7 +278,9 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}
     row = known.get(suffix_of(path, known))
     if row is None:
-        raise FormatError(f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}')
+        raise FormatError(
+            f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}{nearest_suffix(path, known)}'
+        )
     if not path.is_file():
         raise FormatError(f"there is no file {path}; name a grid or a structure, such as one saved as .json")
     check_library(row, reading=True)
