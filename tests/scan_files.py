@@ -232,7 +232,9 @@ def vtp(points: np.ndarray, form: str) -> bytes:
             arrays.append(f'{said}"appended" offset="{len(appended)}"/>')
             appended += struct.pack("<Q", len(data)) + data
         elif form == "binary":
-            arrays.append(f'{said}"binary">{base64.b64encode(struct.pack("<Q", len(data)) + data).decode()}</DataArray>')
+            arrays.append(
+                f'{said}"binary">{base64.b64encode(struct.pack("<Q", len(data)) + data).decode()}</DataArray>'
+            )
         else:
             blocks = [data[k : k + 1024] for k in range(0, len(data), 1024)]
             packed = [zlib.compress(block) for block in blocks]

@@ -86,7 +86,6 @@ COMPRESSED = FILES["c.pcd"]
 START = COMPRESSED.index(b"DATA binary_compressed\n") + 23
 
 
-
 def packed_model(model: bytes) -> bytes:
     """A 3MF package."""
     file = io.BytesIO()
@@ -219,7 +218,8 @@ BROKEN |= {f"noise{suffix}": np.random.default_rng(4).bytes(5000) for suffix in 
 BROKEN |= {
     f"noise-behind-{name}": data[:64] + np.random.default_rng(5).bytes(len(data))
     for name, data in FILES.items()
-    if Path(name).suffix in (".ply", ".laz", ".las", ".pcd", ".e57", ".npy", ".npz", ".parquet", ".gz", ".glb", ".3mf", ".vtp", ".tif")
+    if Path(name).suffix
+    in (".ply", ".laz", ".las", ".pcd", ".e57", ".npy", ".npz", ".parquet", ".gz", ".glb", ".3mf", ".vtp", ".tif")
 }
 
 

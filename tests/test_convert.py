@@ -82,7 +82,7 @@ def test_the_utilization_of_a_structure_goes_along(place: Path, capsys: pytest.C
         ("convert net.json a.jsn", "the nearest is .json"),
         ("convert net.json a.iffc", "the nearest is .ifc"),
         ("convert net.json a.saf.xlsx", "SAF holds structures"),
-            ("convert roof.json a.png", "no format"),
+        ("convert roof.json a.png", "no format"),
         ("convert none.json a.ply", "there is no file none.json"),
         ("convert net.dwg a.ply", "no reader"),
         ("convert net.json net.json", "would overwrite"),

@@ -39,7 +39,9 @@ def test_geojson_places_nodes_members_and_panels_in_the_reference_system(tmp_pat
     assert rasterio.crs.CRS.from_user_input(held["crs"]["properties"]["name"]).to_epsg() == 25833
     by_kind: dict[str, list[Any]] = {"node": [], "member": [], "panel": []}
     for feature in held["features"]:
-        by_kind[feature["properties"]["kind"]].append((feature["properties"], shapely.geometry.shape(feature["geometry"])))
+        by_kind[feature["properties"]["kind"]].append(
+            (feature["properties"], shapely.geometry.shape(feature["geometry"]))
+        )
     places = truss.nodes + UTM
     assert [found["mark"] for found, _ in by_kind["node"]] == list(truss.node_marks)
     assert np.abs([shape.coords[0] for _, shape in by_kind["node"]] - places).max() < 1e-6
@@ -103,7 +105,9 @@ def test_a_workbook_holds_all_of_a_structure(tmp_path: Path) -> None:
     members = [dict(zip(heads, row, strict=True)) for row in sheets["Members"][1:]]
     number = {mark: k for k, mark in enumerate(truss.node_marks)}
     assert [[number[row["start"]], number[row["end"]]] for row in members] == truss.members.tolist()
-    assert {row["start My [Nm/rad]"] for row in members} == {2e5} and {row["section"] for row in members} == {"CHS114.3x5"}
+    assert {row["start My [Nm/rad]"] for row in members} == {2e5} and {row["section"] for row in members} == {
+        "CHS114.3x5"
+    }
     held = sheets["Supports"][1:]
     assert len(held) == truss.supports.any(axis=1).sum() and set(held[0][1:4]) == {5e6}
     assert len(sheets["Panels"]) == len(truss.triangles) + 1
@@ -165,7 +169,9 @@ def test_3mf_and_stl_hold_closed_bodies_where_the_structure_is(name: str, tmp_pa
         reach = bodies.ball + max(section.width + section.depth for section in truss.sections)
         assert (low > truss.nodes.min(axis=0) - reach).all() and (high < truss.nodes.max(axis=0) + reach).all()
         if suffix == ".3mf":
-            assert scene.units in ("meter", "meters") and len(list(scene.graph.nodes_geometry)) == len(truss.nodes) + len(truss.members)
+            assert scene.units in ("meter", "meters") and len(list(scene.graph.nodes_geometry)) == len(
+                truss.nodes
+            ) + len(truss.members)
 
 
 def test_step_bodies_have_the_volumes_of_ours_in_open_cascade(tmp_path: Path) -> None:

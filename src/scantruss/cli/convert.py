@@ -44,7 +44,9 @@ def convert_parser() -> Parser:
     parser.add_argument(
         "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
     )
-    parser.add_argument("--ifc-schema", metavar="|".join(IFC_EDITIONS), default="IFC4", help="edition of .ifc (default: IFC4)")
+    parser.add_argument(
+        "--ifc-schema", metavar="|".join(IFC_EDITIONS), default="IFC4", help="edition of .ifc (default: IFC4)"
+    )
     parser.add_argument("--step", metavar="|".join(STEP_PARTS), default="axes", help="what .step holds (default: axes)")
     parser.add_argument(
         "--system", metavar="EPSG:CODE", help="reference system of a scan that names none, for .geojson and .ifc"
@@ -63,7 +65,9 @@ def convert(values: Namespace) -> None:
     from ..runtime.files import SaveTogether
 
     outs = [check_output(out, "") for out in outs_of(values)]
-    style = FileStyle(tube=values.tube, ball=values.ball, ifc=values.ifc, ifc_schema=values.ifc_schema, step=values.step)
+    style = FileStyle(
+        tube=values.tube, ball=values.ball, ifc=values.ifc, ifc_schema=values.ifc_schema, step=values.step
+    )
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:

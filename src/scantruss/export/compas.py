@@ -50,7 +50,8 @@ def encode_compas(model: Model, style: FileStyle) -> bytes:
         name: {"dtype": dtype, "data": data, "inheritance": [], "guid": str(model.guid("compas", name))}
         for name, (dtype, data) in parts.items()
     }
-    return (json.dumps(whole, ensure_ascii=False, indent=1) + "\n").encode("utf-8")
+    lines = [f"{json.dumps(name)}: {json.dumps(each, ensure_ascii=False)}" for name, each in whole.items()]
+    return ("{\n" + ",\n".join(lines) + "\n}\n").encode("utf-8")
 
 
 def draw_compas(path: Path) -> Drawing:

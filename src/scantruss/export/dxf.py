@@ -82,8 +82,8 @@ class _Entities:
         scale = f" 41\n{size}\n 42\n{size}\n 43\n{size}\n"
         at = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
         handle = self.add("INSERT", layer, f"100\nAcDbBlockReference\n 66\n1\n  2\n{block}\n{at}{scale}")
-        for tag, (word, where) in words.items():
-            text = f"100\nAcDbText\n 10\n{x + size}\n 20\n{y + size}\n 30\n{z}\n 40\n{size}\n  1\n{word}\n"
+        for number, (tag, (word, where)) in enumerate(words.items()):  # each below the one before
+            text = f"100\nAcDbText\n 10\n{x + size}\n 20\n{y + size * (1 - 1.5 * number)}\n 30\n{z}\n 40\n{size}\n  1\n{word}\n"
             self.add("ATTRIB", where, f"{text}100\nAcDbAttribute\n  2\n{tag}\n 70\n0\n", handle)
         self.add("SEQEND", layer, "", handle)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError
 from ..grid.grid import Grid
-from ..runtime.files import check_place, suffix_of, write_files
+from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
@@ -87,7 +87,7 @@ FORMATS: dict[str, FileFormat] = {
     ".3dm": FileFormat("3DM", one("rhino.encode_3dm"), draw=function("drawing_files.draw_3dm"),
                        loses_of_structure="loads or results", library="rhino3dm", extra="cad"),
     ".3mf": FileFormat("3MF", one("solid_bodies.encode_3mf_bodies"), holds=(STRUCTURE,),
-                       loses_of_structure="panels or exact coordinates (relative to the origin), supports, loads or results"),
+                       loses_of_structure="panels, exact coordinates (m from the origin), supports, loads or results"),
     ".compas.json": FileFormat("COMPAS JSON", one("compas.encode_compas"), draw=function("compas.draw_compas"),
                                 loses_of_structure="loads, releases or results"),
     ".dxf": FileFormat("DXF", one("dxf.encode_dxf"), draw=function("drawing_files.draw_dxf"),
@@ -107,8 +107,7 @@ FORMATS: dict[str, FileFormat] = {
     ".step": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stp": FileFormat("STEP", one("step.encode_step"), loses="panels", loses_of_structure=NO_STRUCTURE, needs_unit=True),
     ".stl": FileFormat("STL", one("solid_bodies.encode_stl_bodies"), holds=(STRUCTURE,),
-                       loses_of_structure="panels, marks, the unit (mm) or exact coordinates (float32, relative to the origin), "
-                       "supports, loads or results"),
+                       loses_of_structure="panels, marks, exact coordinates (mm from the origin), supports, loads or results"),
     ".tcl": FileFormat("OpenSees", one("opensees.encode_tcl"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".xlsx": FileFormat("XLSX", one("tables.encode_xlsx_model")),
     ".vtu": FileFormat("VTU", one("vtu.encode_vtu"), loses="marks (members are counted from 0)", loses_of_structure="loads"),
@@ -268,7 +267,9 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}
     row = known.get(suffix_of(path, known))
     if row is None:
-        raise FormatError(f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}')
+        raise FormatError(
+            f'no reader for "{path.suffix or path.name}"; use one of {" ".join(sorted(known))}{nearest_suffix(path, known)}'
+        )
     if not path.is_file():
         raise FormatError(f"there is no file {path}; name a grid or a structure, such as one saved as .json")
     check_library(row, reading=True)

@@ -1,7 +1,7 @@
 """GeoJSON: nodes, members and panels as points, lines and polygons in the reference system of the scan.
 
-The standard of 2016 knows longitude and latitude only. GIS programs still take the member `crs` of that of 2008, as GDAL does; it is null where
-no system is known, so that nobody takes lengths for degrees.
+The standard of 2016 knows longitude and latitude only. GIS programs still take the member `crs` of that of 2008, as GDAL does; it is
+null where no system is known, so that nobody takes lengths for degrees.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What both views of an IFC file share: units, place, sections, material, groups.
 
 All numbers are in m, N, kg and s. Coordinates are
-relative to the placement of the site, which is the origin of the scan; where the reference system is known, the map conversion holds the origin
-and the site lies at 0. Identifiers follow from the marks and that origin, so a
+relative to the placement of the site, which is the origin of the scan; where the reference system is known, the map conversion holds
+the origin and the site lies at 0. Identifiers follow from the marks and that origin, so a
 part keeps its own when it is written again.
 """
 

@@ -195,9 +195,13 @@ def with_system(model: Model, system: str) -> Model:
     if model.system not in ("", system):
         raise FormatError(f"the reference system is {model.system}, not {system}; leave --system out")
     if model.unit not in SYSTEM_UNITS:
-        raise FormatError(f"a reference system is in metres or feet, and the coordinates are in {model.unit or 'a unit that is not known'}")
+        raise FormatError(
+            f"a reference system is in metres or feet, and the coordinates are in {model.unit or 'a unit that is not known'}"
+        )
     if model.truss is not None and model.truss.scale != 1.0:
-        raise FormatError(f"the structure is {model.truss.scale:g} times its scan, so its coordinates are of no reference system")
+        raise FormatError(
+            f"the structure is {model.truss.scale:g} times its scan, so its coordinates are of no reference system"
+        )
     grid = None if model.grid is None else model.grid.replace(system=system)
     truss = None if model.truss is None else model.truss.replace(system=system)
     return replace(model, system=system, grid=grid, truss=truss)

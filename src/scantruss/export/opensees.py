@@ -68,6 +68,12 @@ if __name__ == "__main__":
 """
 
 
+class Written(str):
+    """A number that is turned into text once, as many members share it."""
+
+    __repr__ = str.__str__
+
+
 def encode_tcl(model: Model, style: FileStyle) -> bytes:
     """Return the script for OpenSees itself."""
     truss = _truss(model)
@@ -210,17 +216,18 @@ def _members(model: Model, truss: Truss, made: list[Command], extra: _Extra) -> 
             made.append(("element", "Truss", number, start + 1, end + 1, truss.sections[section].area, 1))
         return
     stiffness: list[Command] = [
-        (each.area, material.young, material.shear, each.torsion, each.inertia_y, each.inertia_z)
+        tuple(
+            Written(repr(value))
+            for value in (each.area, material.young, material.shear, each.torsion, each.inertia_y, each.inertia_z)
+        )
         for each in truss.sections
     ]
-    springy = np.isfinite(truss.end_stiffness).any(axis=2)
+    springy = np.isfinite(truss.end_stiffness).any(axis=2).tolist()
+    frames, lengths = axes.tolist(), truss.lengths.tolist()
     for number, ((start, end), section) in enumerate(table, 1):
-        own, ends = truss.sections[section], [start + 1, end + 1]
-        frame = axes[number - 1].tolist()
-        rigid = (
-            RIGID * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / float(truss.lengths[number - 1])
-        )
-        for which in np.flatnonzero(springy[number - 1]).tolist():
+        own, ends, frame = truss.sections[section], [start + 1, end + 1], frames[number - 1]
+        rigid = RIGID * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / lengths[number - 1]
+        for which in [end for end in (0, 1) if springy[number - 1][end]]:
             joint = ends[which]
             ends[which] = extra.node(model.nodes[joint - 1].tolist())
             made.append(("equalDOF", joint, ends[which], 1, 2, 3))

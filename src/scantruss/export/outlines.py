@@ -102,7 +102,10 @@ def prism_of(outlines: tuple[Outline, ...]) -> tuple[np.ndarray, np.ndarray]:
     for loop in loops:
         this = start + np.arange(len(loop))
         following = np.roll(this, -1)
-        sides += [np.stack([this, following, following + count], axis=1), np.stack([this, following + count, this + count], axis=1)]
+        sides += [
+            np.stack([this, following, following + count], axis=1),
+            np.stack([this, following + count, this + count], axis=1),
+        ]
         start += len(loop)
     vertices = np.concatenate([np.insert(flat, 0, x, axis=1) for x in (0.0, 1.0)])
     return vertices, np.concatenate([end[:, ::-1], end + count, *sides])

@@ -35,10 +35,15 @@ def encode_s2k(model: Model, style: FileStyle) -> bytes:
     if truss is None:
         raise FormatError("SAP2000 holds structures; make one of the grid with scantruss structure")
     lines = [f"$ {MARK}"]
+    fields: tuple[str, ...] = ()
+    form = ""
     for name, rows in _tables(model, truss):
-        found = [f"   {'   '.join(f'{field}={_text(value)}' for field, value in row.items())}" for row in rows]
-        if found:
-            lines += ["", f'TABLE:  "{name}"', *found]
+        if rows:
+            lines += ["", f'TABLE:  "{name}"']
+        for row in rows:  # most rows have the fields of the one before
+            if (own := tuple(row)) != fields:
+                fields, form = own, "   " + "   ".join(f"{field}=%s" for field in own)
+            lines.append(form % tuple([repr(v) if type(v) is float else _text(v) for v in row.values()]))
     return ("\r\n".join([*lines, "", "END TABLE DATA", ""])).encode("utf-8")
 
 

@@ -41,7 +41,7 @@ def encode_3mf_bodies(model: Model, style: FileStyle) -> bytes:
     for number, (mark, shape, frame) in enumerate(_placed_parts(model, bodies), len(shapes) + 1):
         words = " ".join(map(repr, frame.ravel().tolist()))
         objects.append(
-            f"<object id=\"{number}\" name={quoteattr(NOT_IN_XML.sub('?', mark))} type=\"model\"><components>"
+            f'<object id="{number}" name={quoteattr(NOT_IN_XML.sub("?", mark))} type="model"><components>'
             f'<component objectid="{shape + 1}" transform="{words}"/></components></object>'
         )
         items.append(f'<item objectid="{number}"/>')
@@ -70,7 +70,10 @@ def _bodies(model: Model, style: FileStyle, name: str) -> Bodies:
 
 def _shapes(bodies: Bodies) -> list[Shape]:
     """Return the shapes of which all parts are made: a member of length 1 for each section, and a ball."""
-    return [*(prism_of(outlines_of(section)) for section in bodies.sections), *([ball_of(bodies.ball)] if bodies.ball else [])]
+    return [
+        *(prism_of(outlines_of(section)) for section in bodies.sections),
+        *([ball_of(bodies.ball)] if bodies.ball else []),
+    ]
 
 
 def _placed_parts(model: Model, bodies: Bodies) -> Iterator[tuple[str, int, np.ndarray]]:

@@ -31,7 +31,9 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
 def _encode_bodies(model: Model, style: FileStyle) -> bytes:
     bodies = bodies_of(model, style)
     if bodies is None:
-        raise FormatError("STEP bodies need sections, and nothing says how thick the members of a grid are; give --tube")
+        raise FormatError(
+            "STEP bodies need sections, and nothing says how thick the members of a grid are; give --tube"
+        )
     file = Part21(SCHEMA, "ScanTruss")
     context = _context(file, PREFIX["m"])
     members, balls = add_bodies(file, model, bodies)

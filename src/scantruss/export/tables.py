@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 ROWS_OF_SHEET = 1_048_576  #: most rows of a sheet
-FORCES = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")
-MOTIONS = ("ux [m]", "uy [m]", "uz [m]", "rx [rad]", "ry [rad]", "rz [rad]")
+FORCE_HEADS = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")
+MOTION_HEADS = ("ux [m]", "uy [m]", "uz [m]", "rx [rad]", "ry [rad]", "rz [rad]")
 STIFFNESS_HEADS = ("ux [N/m]", "uy [N/m]", "uz [N/m]", "rx [Nm/rad]", "ry [Nm/rad]", "rz [Nm/rad]")
 RELEASES = ("start My", "start Mz", "end My", "end Mz")  #: rotational springs at the ends of a member
 
@@ -43,7 +43,9 @@ def encode_xlsx_model(model: Model, style: FileStyle) -> bytes:
         sheets |= _result_sheets(model.solution)
     for name, rows in sheets.items():
         if len(rows) > ROWS_OF_SHEET:
-            raise FormatError(f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(rows):,}; write a .json")
+            raise FormatError(
+                f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(rows):,}; write a .json"
+            )
     return encode_workbook(sheets)
 
 
@@ -82,7 +84,9 @@ def _geometry(model: Model) -> dict[str, list[SheetRow]]:
         columns |= {f"local z, {axis}": truss.axes[:, 2, k].tolist() for k, axis in enumerate("xyz")}
         springs = truss.end_stiffness.reshape(-1, 4)
         if not truss.pinned and np.isfinite(springs).any():
-            columns |= {f"{name} [Nm/rad]": list(map(_stiff, springs[:, k].tolist())) for k, name in enumerate(RELEASES)}
+            columns |= {
+                f"{name} [Nm/rad]": list(map(_stiff, springs[:, k].tolist())) for k, name in enumerate(RELEASES)
+            }
     if model.utilization is not None:
         columns["utilization"] = [_known_or_none(value) for value in np.asarray(model.utilization, float).tolist()]
     places = zip(marks, *model.nodes.T.tolist(), map("|".join, sets), strict=True)
@@ -142,8 +146,8 @@ def _result_sheets(solution: Solution) -> dict[str, list[SheetRow]]:
     forces = ("N [N]", "Vy [N]", "Vz [N]", "T [Nm]", "My [Nm]", "Mz [Nm]")
     heads = [f"{place} {force}" for place in ("start", "end") for force in forces]
     sheets: dict[str, list[SheetRow]] = {
-        "Displacements": [("case", "node", *MOTIONS)],
-        "Reactions": [("case", "node", *FORCES)],
+        "Displacements": [("case", "node", *MOTION_HEADS)],
+        "Reactions": [("case", "node", *FORCE_HEADS)],
         "Forces": [("case", "member", *heads)],
     }
     for case in solution.cases:

@@ -58,7 +58,9 @@ def encode_workbook(sheets: Mapping[str, Rows]) -> bytes:
     parts = {f"xl/worksheets/sheet{number}.xml": _sheet(rows, texts) for number, rows in enumerate(sheets.values(), 1)}
     numbers = range(1, len(sheets) + 1)
     names = [quoteattr(NOT_IN_XML.sub("?", name)) for name in sheets]
-    listed = "".join(f'<sheet name={name} sheetId="{k}" r:id="rId{k}"/>' for k, name in zip(numbers, names, strict=True))
+    listed = "".join(
+        f'<sheet name={name} sheetId="{k}" r:id="rId{k}"/>' for k, name in zip(numbers, names, strict=True)
+    )
     links = [
         *(("worksheet", f"worksheets/sheet{number}.xml") for number in numbers),
         ("sharedStrings", "sharedStrings.xml"),
@@ -110,7 +112,9 @@ def _sheet(rows: Rows, texts: dict[str, int]) -> str:
                 cells.append(f'<c r="{letters[column]}{number}"><v>{value}</v></c>')
         lines.append(f'<row r="{number}">{"".join(cells)}</row>')
     main = f"{NAMESPACE}/spreadsheetml/2006/main"
-    size = f"A1:{letters[-1] if letters else 'A'}{max(len(lines), 1)}"  # without it some readers cut rows where they end
+    size = (
+        f"A1:{letters[-1] if letters else 'A'}{max(len(lines), 1)}"  # without it some readers cut rows where they end
+    )
     return f'{XML_HEAD}<worksheet xmlns="{main}"><dimension ref="{size}"/><sheetData>{"".join(lines)}</sheetData></worksheet>'
 
 

@@ -24,7 +24,14 @@ if TYPE_CHECKING:
     from .certificate import Certificate
 
 
-PROVENANCE = {"system", "settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
+PROVENANCE = {
+    "system",
+    "settings",
+    "before",
+    "certificate",
+    "seconds",
+    "line_sets",
+}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
 }  # fmt: skip

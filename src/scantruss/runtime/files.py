@@ -31,6 +31,12 @@ def suffix_of(path: Path, suffixes: Collection[str]) -> str:
     ).lower()
 
 
+def nearest_suffix(path: Path, suffixes: Collection[str]) -> str:
+    """Return words on which of some suffixes is most like that of a path, to end a message with; "" where none is."""
+    near = get_close_matches(path.suffix.lower(), suffixes, 1, 0.6)
+    return f"; the nearest is {near[0]}" if near else ""
+
+
 def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     """Return the path if a file can be written there; ask before any long work.
 
@@ -47,10 +53,9 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     """
     path = Path(path)
     if not suffix_of(path, suffixes):
-        near = get_close_matches(path.suffix.lower(), suffixes, 1, 0.6)
         raise FormatError(
             f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}'
-            + (f"; the nearest is {near[0]}" if near else "")
+            f"{nearest_suffix(path, suffixes)}"
         )
     folder = path.parent
     try:

@@ -44,8 +44,8 @@ def save_project(path: Path, state: StudioState) -> None:
     solved = state.grid is not None and state.solution is not None
     head = {
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
-        "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped, "notes": list(cloud.notes),
-                 "left_out": [list(part) for part in cloud.left_out]},
+        "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
+                 "notes": list(cloud.notes), "left_out": [list(part) for part in cloud.left_out]},
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
         "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
@@ -123,7 +123,8 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
             points=np.ascontiguousarray(arrays["points"], np.float64).reshape(-1, 3),
             origin=np.asarray(arrays["origin"], np.float64).reshape(3),
             normals=np.asarray(arrays["normals"], np.float64).reshape(-1, 3) if "normals" in arrays else None,
-            unit=scan["unit"], system=str(scan.get("system", "")), name=scan["name"], dropped=int(scan["dropped"]), notes=tuple(scan["notes"]),
+            unit=scan["unit"], system=str(scan.get("system", "")), name=scan["name"],
+            dropped=int(scan["dropped"]), notes=tuple(scan["notes"]),
             left_out=tuple((str(why), int(count)) for why, count in scan["left_out"]),
         )  # fmt: skip
     if not len(cloud.points) or not np.isfinite(cloud.points).all():

@@ -58,7 +58,9 @@ def terrain_head(path: Path) -> TerrainHead:
     with _opened(path) as raster:
         kind = np.dtype(raster.dtypes[0])
         if raster.count > 1 and kind.itemsize == 1:
-            raise FormatError(f"{path} is a picture of {raster.count} colours, not heights; name the raster of the terrain")
+            raise FormatError(
+                f"{path} is a picture of {raster.count} colours, not heights; name the raster of the terrain"
+            )
         if kind.kind not in "iuf":
             raise FormatError(f"{path} has heights of type {kind}; numbers are needed, so export it again")
         if raster.transform.is_identity:

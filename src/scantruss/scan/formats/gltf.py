@@ -25,7 +25,7 @@ JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942  # kinds of parts
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # types of numbers
 TRIANGLE_LIST = 4  # mode of a primitive; the others are not read as faces
 PACKED_MESHES = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows are where x, y (up) and z of the file go
+Z_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # rows are where x, y (up) and z of the file go
 
 Gltf = dict[str, Any]
 
@@ -49,18 +49,22 @@ def read_gltf(path: Path, wanted: Sequence[str] = ()) -> Content:
                 if accessor not in read:
                     read[accessor] = count
                     places = _numbers(path, held, buffers, accessor, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-                    points.append(places @ UPRIGHT)
+                    points.append(places @ Z_UP)
                     count += len(places)
                 if part.get("mode", TRIANGLE_LIST) != TRIANGLE_LIST:
                     all_faces = False
                     continue
                 size = held["accessors"][accessor]["count"]
-                ids = _numbers(path, held, buffers, part["indices"], 1).ravel() if "indices" in part else np.arange(size)
+                ids = (
+                    _numbers(path, held, buffers, part["indices"], 1).ravel() if "indices" in part else np.arange(size)
+                )
                 faces.append(ids[: len(ids) // 3 * 3].reshape(-1, 3).astype(np.int64) + read[accessor])
     if not points:
         raise FormatError(f"{path} has no mesh and no points in its scene")
     together = np.concatenate(points)
-    return Content(together, metres=1.0, z_metres=1.0, normals=normals_from_faces(together, faces) if all_faces else None)
+    return Content(
+        together, metres=1.0, z_metres=1.0, normals=normals_from_faces(together, faces) if all_faces else None
+    )
 
 
 def _glb(path: Path) -> tuple[Gltf, bytes | None]:
@@ -107,7 +111,9 @@ def _buffer(path: Path, buffer: Gltf, blob: bytes | None) -> bytes:
             raise FormatError(f"{path} needs the file {Path(uri).name} beside it, which is missing")
         data = place.read_bytes()
     if len(data) < buffer["byteLength"]:
-        raise FormatError(f"{path} ends early: a buffer has {len(data):,} of {buffer['byteLength']:,} bytes; copy it again")
+        raise FormatError(
+            f"{path} ends early: a buffer has {len(data):,} of {buffer['byteLength']:,} bytes; copy it again"
+        )
     return data
 
 
@@ -155,8 +161,15 @@ def _numbers(path: Path, held: Gltf, buffers: list[bytes], number: int, width: i
     count, step = int(accessor["count"]), int(view.get("byteStride") or width * kind.itemsize)
     start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))
     data = buffers[view["buffer"]]
-    if count < 0 or start < 0 or step < kind.itemsize or (count and start + (count - 1) * step + width * kind.itemsize > len(data)):
-        raise FormatError(f"{path} ends early: an accessor promises {count:,} values that its buffer does not hold; copy it again")
+    if (
+        count < 0
+        or start < 0
+        or step < kind.itemsize
+        or (count and start + (count - 1) * step + width * kind.itemsize > len(data))
+    ):
+        raise FormatError(
+            f"{path} ends early: an accessor promises {count:,} values that its buffer does not hold; copy it again"
+        )
     rows = np.ndarray((count, width), kind, data, start, (step, kind.itemsize))
     if width == 1:
         return rows

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError, InputError
+from ...runtime.files import nearest_suffix
 from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of
 from ..cloud import PointCloud
@@ -145,7 +146,8 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
             reader = READERS[inner.suffix.lower()]
         except KeyError:
             known = " ".join(sorted(READERS))
-            raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}') from None
+            near = nearest_suffix(path, READERS)
+            raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}{near}') from None
         try:
             with np.errstate(all="ignore"):  # values that are not finite are counted and left out later
                 return read_las(inner, wanted, places_of) if reader is read_las else reader(inner, wanted)

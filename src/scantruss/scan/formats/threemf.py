@@ -20,7 +20,7 @@ METRES_3MF = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.
 MODEL_PART = "3D/3dmodel.model"  # where the model is, unless the relations of the package say another place
 MOST_PARTS_3MF = 1_000_000  # objects that are built, those within others included
 
-Parts = list[tuple[np.ndarray, np.ndarray]]  # points (N, 3) and triangles (T, 3) of each mesh
+PlacedMeshes = list[tuple[np.ndarray, np.ndarray]]  # points (N, 3) and triangles (T, 3) of each mesh
 
 
 def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -30,7 +30,7 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
         space = root.tag[: root.tag.index("}") + 1] if root.tag.startswith("{") else ""
         objects = {each.get("id", ""): each for each in root.iter(f"{space}object")}
         meshes: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        parts: Parts = []
+        parts: PlacedMeshes = []
         items = [(item.get("objectid", ""), _frame(item), 0) for item in root.iter(f"{space}item")]
         waiting = items or [(name, np.vstack([np.eye(3), np.zeros(3)]), 0) for name in objects]
         visits = 0
@@ -48,12 +48,22 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
                 parts.append((points @ frame[:3] + frame[3], triangles))
             for inner in each.iter(f"{space}component"):
                 own = _frame(inner)
-                waiting.append((inner.get("objectid", ""), np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]]), depth + 1))
+                waiting.append(
+                    (
+                        inner.get("objectid", ""),
+                        np.vstack([own[:3] @ frame[:3], own[3] @ frame[:3] + frame[3]]),
+                        depth + 1,
+                    )
+                )
         if not parts or not sum(len(points) for points, _ in parts):
             raise FormatError(f"{path} holds no mesh")
         together = np.concatenate([points for points, _ in reversed(parts)])
         starts = np.cumsum([0, *(len(points) for points, _ in reversed(parts))])
-        faces = [triangles + start for (_, triangles), start in zip(reversed(parts), starts[:-1], strict=True) if len(triangles)]
+        faces = [
+            triangles + start
+            for (_, triangles), start in zip(reversed(parts), starts[:-1], strict=True)
+            if len(triangles)
+        ]
         metres = METRES_3MF[root.get("unit", "millimeter")]
     return Content(together, metres=metres, normals=normals_from_faces(together, faces))
 

@@ -22,7 +22,7 @@ from .kinds import kind_of, read_head, reading_as, wrong_kind
 from .packed import check_size
 
 RAW = re.compile(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>\s*_")  # then the bytes as they are
-NUMBERS = {
+VTK_NUMBERS = {
     "Float32": "f4", "Float64": "f8", "Int8": "i1", "UInt8": "u1", "Int16": "i2", "UInt16": "u2", "Int32": "i4", "UInt32": "u4",
     "Int64": "i8", "UInt64": "u8",
 }  # fmt: skip
@@ -38,24 +38,28 @@ class _Data:
 
     def __init__(self, path: Path, root: ElementTree.Element, raw: bytes | None) -> None:
         self.path, self.order = path, "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
-        self.head = np.dtype(self.order + NUMBERS[root.get("header_type", "UInt32")])
+        self.head = np.dtype(self.order + VTK_NUMBERS[root.get("header_type", "UInt32")])
         self.packed = root.get("compressor", "")
         if self.packed and self.packed not in UNPACKERS:
-            raise FormatError(f"{path} is packed by {self.packed}, which is not read; save it with zlib or without compression")
+            raise FormatError(
+                f"{path} is packed by {self.packed}, which is not read; save it with zlib or without compression"
+            )
         appended = root.find("AppendedData")
         self.raw = raw
         self.text = "" if appended is None or raw is not None else (appended.text or "").strip().removeprefix("_")
 
     def numbers(self, array: ElementTree.Element) -> np.ndarray:
         """Return the numbers of an array (N,)."""
-        kind = np.dtype(self.order + NUMBERS[array.get("type", "")])
+        kind = np.dtype(self.order + VTK_NUMBERS[array.get("type", "")])
         form = array.get("format", "ascii")
         if form == "ascii":
             return np.array((array.text or "").split(), kind)
         if form == "binary":
             return np.frombuffer(self._coded((array.text or "").strip()), kind)
         place = int(array.get("offset", ""))
-        return np.frombuffer(self._coded(self.text[place:]) if self.raw is None else self._plain(self.raw[place:]), kind)
+        return np.frombuffer(
+            self._coded(self.text[place:]) if self.raw is None else self._plain(self.raw[place:]), kind
+        )
 
     def _plain(self, data: bytes) -> bytes:
         """Return the bytes of an array that begins with the size of its parts."""
@@ -89,7 +93,9 @@ class _Data:
 
     def _cut(self, data: bytes, start: int, size: int) -> bytes:
         if start + size > len(data):
-            raise FormatError(f"{self.path} ends early: an array has {max(len(data) - start, 0):,} of {size:,} bytes; copy it again")
+            raise FormatError(
+                f"{self.path} ends early: an array has {max(len(data) - start, 0):,} of {size:,} bytes; copy it again"
+            )
         return data[start : start + size]
 
 
@@ -109,14 +115,18 @@ def read_vtk_xml(path: Path, wanted: Sequence[str] = ()) -> Content:
     with reading_as(path, "VTK XML"):
         root = ElementTree.fromstring(text)
         if root.tag != "VTKFile" or root.get("type") not in ("PolyData", "UnstructuredGrid"):
-            raise FormatError(f"{path} holds {root.get('type') or 'no VTKFile'}; points of PolyData or UnstructuredGrid are read")
+            raise FormatError(
+                f"{path} holds {root.get('type') or 'no VTKFile'}; points of PolyData or UnstructuredGrid are read"
+            )
         data = _Data(path, root, raw)
         points, normals = list[np.ndarray](), list[np.ndarray]()
         for piece in root.iter("Piece"):
             array = piece.find("Points/DataArray")
             places = np.empty((0, 3)) if array is None else data.numbers(array).reshape(-1, 3).astype(np.float64)
             if len(places) != int(piece.get("NumberOfPoints", "-1")):
-                raise FormatError(f"{path} has {len(places):,} points where it promises {piece.get('NumberOfPoints')}; copy it again")
+                raise FormatError(
+                    f"{path} has {len(places):,} points where it promises {piece.get('NumberOfPoints')}; copy it again"
+                )
             points.append(places)
             held = piece.find("PointData")
             name = None if held is None else held.get("Normals")
