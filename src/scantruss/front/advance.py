@@ -95,9 +95,18 @@ def advance_front(
         quadrangle=settings.case3 == "quadrangle",
         strict=1.0,
     )
-    front = run_rounds(front, samples, rules, settings, progress)
-    if wake_unreached(front):
-        front = run_rounds(front, samples, rules, settings, progress)
+    for strict in STRICTNESS:
+        count = int(front.count[lists.SEGMENTS])
+        for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
+            lists.enqueue(front, s)
+        by_cases = settings.method == "paper" and strict == STRICTNESS[0]
+        front = run(
+            front,
+            samples,
+            rules._replace(strict=strict),
+            progress,
+            kernels.advance_by_cases if by_cases else kernels.advance,
+        )
     close_gaps(front, samples, settings)
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     check_kept(members, triangles, front.nodes + samples.origin)
@@ -113,44 +122,6 @@ def advance_front(
         lines=np.searchsorted(used, members),
         settings=settings,
     )
-
-
-def run_rounds(
-    front: lists.Front, samples: SurfaceSamples, rules: lists.Rules, settings: Settings, progress: Progress | None
-) -> lists.Front:
-    """Advance in rounds, each more tolerant than the one before, until no segment finds room for a triangle."""
-    for strict in STRICTNESS:
-        count = int(front.count[lists.SEGMENTS])
-        for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
-            lists.enqueue(front, s)
-        by_cases = settings.method == "paper" and strict == STRICTNESS[0]
-        front = run(
-            front,
-            samples,
-            rules._replace(strict=strict),
-            progress,
-            kernels.advance_by_cases if by_cases else kernels.advance,
-        )
-    return front
-
-
-def wake_unreached(front: lists.Front) -> bool:
-    """Let the front start from the boundary loops that it has never reached too; whether there are any.
-
-    They bound a part of the scan that hangs on the rest by so little that no front finds its way, as the inside of a vessel does that
-    is seen only here and there.
-    """
-    count = int(front.count[lists.SEGMENTS])
-    away = front.state[:count] == lists.INACTIVE
-    follow = front.next[:count]
-    for _ in range(count):  # each turn takes a segment at least out of `away`
-        still = away & (away[follow] | ~away)
-        if (still == away).all():
-            break
-        away = still
-    for s in np.flatnonzero(away).tolist():
-        lists.enqueue(front, s)
-    return bool(away.any())
 
 
 def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) -> None:
