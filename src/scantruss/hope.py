@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
-FAR_MISSING = 2.0  # share of the scan that a grid misses above which the same holds, in shares that may be missing; of limbs 1
+# share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
+FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 
