@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any, Never
+from types import SimpleNamespace
+from typing import Any, Never, cast
 
 import naive_grid as naive
 import numpy as np
@@ -17,7 +18,7 @@ import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.candidates import LENGTHS, SMOOTHED, Attempt, attempts
 from scantruss.errors import CertificateError, FrontError
-from scantruss.hope import MOST_RUNS
+from scantruss.hope import MOST_RUNS, Hope
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
 
@@ -253,3 +254,18 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
     monkeypatch.setattr(candidates, "certified", never)
     with pytest.raises(FrontError, match="fault 1"):
         st.optimize_fronts(fronts, *steps, settings)
+
+
+def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
+    attempt = next(attempts(st.PointCloud.from_array(sheet(8.0, 8.0, 0.25)), st.Settings(length=1.0)))
+
+    def fault(kind: str) -> st.CertificateError:
+        part: Any = SimpleNamespace(kind=kind, share=0.06)
+        found = SimpleNamespace(missing=0.06, left_out=(part,), crossings=0, boundary_loops=1, scan_loops=1)
+        return st.CertificateError("the grid leaves out 6 %", cast(Any, SimpleNamespace(certificate=found)))
+
+    for kind, tried in (("limbs", False), ("far", True)):
+        hope = Hope()
+        for _ in range(2):
+            hope.note(attempt, fault(kind))
+        assert hope.allows(attempt) == tried

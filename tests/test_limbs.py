@@ -95,6 +95,16 @@ def test_a_limb_cut_off_is_closed_by_a_cap_or_left_open_and_told(cut_thin: str) 
     assert len(on_ring) == 3, "a triangular tube ends in a triangle"
 
 
+@pytest.mark.parametrize(("cut_thin", "loops"), [("close", 0), ("open", 1)])
+def test_the_open_end_of_a_thin_leg_is_a_ring_and_no_hole(cut_thin: str, loops: int) -> None:
+    """A front that ran over it as over a hole put a node far beyond it, where there is no scan."""
+    far, points = 8.0, body(3.5, 3.5)
+    leg = points[points[:, 0] < far]
+    grid = st.grid_from_points(leg, st.Settings(length=1.0, effort="quick", cut_thin=cut_thin))
+    assert len(grid.boundary_loops) == loops
+    assert far - 0.2 < (grid.nodes + grid.origin)[:, 0].max() < far + 0.05
+
+
 def test_a_cap_adds_no_member() -> None:
     """Of a ring of three nodes: open or closed, the members are the same."""
     points = body(4.5, 1.5)

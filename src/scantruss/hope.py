@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
-FAR_MISSING = 2.0  # share of the scan that a grid misses above which the same holds, in shares that may be missing
+# share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
+FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 
@@ -53,12 +54,13 @@ class Hope:
 
 
 def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
-    """Whether a grid misses many boundary loops or much of the scan, or many of its triangles cut each other."""
+    """Whether a grid misses many loops or much of the scan, or limbs as every front will, or many of its triangles cut each other."""
     if isinstance(fault, OneSidedError):
         return True
     if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
         return False
     found = fault.grid.certificate
-    if found.missing > FAR_MISSING * attempt.settings.allow_missing:
+    limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing or limbs > attempt.settings.allow_missing:
         return True
     return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING

@@ -67,11 +67,11 @@ def runs_around(marks: np.ndarray) -> np.ndarray:
 
 def _outward(surface: Surface, turns: np.ndarray, ahead: np.ndarray) -> np.ndarray:
     """Unit vectors (M, 3) along the surface, square to the direction ahead (M, 3) of a closed polyline, to its right."""
-    out = np.cross(ahead, _normals_along(surface, turns))
+    out = np.cross(ahead, normals_along(surface, turns))
     return out / np.maximum(np.linalg.norm(out, axis=1), 1e-300)[:, None]
 
 
-def _normals_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
+def normals_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
     """Normals of the scan along a closed polyline (M, 3)."""
     normals = np.empty_like(turns)
     kernels.normals_along(surface, turns, nearest_sample(surface, *turns[0].tolist()), normals)
@@ -85,7 +85,7 @@ def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -
     joined directly.
     """
     for _ in range(len(curve)):  # each cut takes away more places than it adds
-        normals = _normals_along(surface, curve)
+        normals = normals_along(surface, curve)
         high = min(len(curve) // 2, round(30.0 * width / step))
         at, gap = kernels.widest_spike(curve, normals, width, round(2.5 * width / step), high)
         if gap == 0:

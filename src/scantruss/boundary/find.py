@@ -25,6 +25,7 @@ from .holes import fill_holes
 from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
 from .touched_points import boundary_points
+from .tube_ends import end_of_tube
 
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
 SPIKES = (0.6, 0.3, 0.16)
@@ -143,6 +144,7 @@ def find_boundary(
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
+        boundary = _with_tube_ends(boundary, filled, settings) if settings.method == "default" else boundary
         boundary = replace(boundary, loops=(*boundary.loops, *_rings(filled, settings)))
         # the value must not keep its key alive
         kept = _KEPT[samples] = (settings, filled if filled is not samples else None, boundary)
@@ -261,6 +263,22 @@ def named_holes(
                 f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole"
             )
     return found
+
+
+def _with_tube_ends(boundary: Boundary, samples: SurfaceSamples, settings: Settings) -> Boundary:
+    """Return a boundary with the open ends of thin tubes among its loops, closed or left open like those of limbs that were cut off."""
+    surface, loops, bridged = samples.surface, list(boundary.loops), []
+    for curve in boundary.bridged:
+        ring = end_of_tube(surface, curve)
+        if ring is not None:
+            piece = int(samples.piece[nearest_sample(surface, *ring[0].tolist())])
+            desired = field_along(surface, ring)
+            loops.append(
+                Loop(ring, np.zeros(0, np.int64), False, length_around(ring), piece, desired, cut=settings.cut_thin)
+            )
+        if ring is None or settings.cut_thin == "close":
+            bridged.append(curve)
+    return replace(boundary, loops=tuple(loops), bridged=tuple(bridged))
 
 
 def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
