@@ -246,7 +246,7 @@ class Session:
 
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
-        self.change("length", goes_on=True, settings=self.settings.replace(length=length))
+        self.change("slider", goes_on=True, settings=self.settings.replace(length=length))
         return self._ask_live()
 
     def show_quick(self) -> bool:
