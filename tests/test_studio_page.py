@@ -138,6 +138,9 @@ def test_colours_span_the_values() -> None:
     assert colors_of(values, 1.5)[1:] == (0.0, 3.0)
 
 
+SMALL = {"width": 700, "height": 420}
+
+
 def choose(page: Any, old: str, new: str) -> None:
     """Choose something else in a drop-down list, as a person does."""
     page.locator(f"input[value='{old}']:visible").first.click()
@@ -204,8 +207,9 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
 def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
     address, session = served
     with open_page(address) as (page, errors):
+        page.set_viewport_size(SMALL)  # drawn by software: the smaller, the sooner
         page.wait_for_selector("text=dome.scantruss")
-        other = page.context.browser.new_page()
+        other = page.context.browser.new_page(viewport=SMALL)
         other.goto(address)
         other.wait_for_selector("text=dome-2.scantruss")
         before = session.settings

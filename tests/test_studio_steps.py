@@ -213,7 +213,7 @@ def test_the_frame_and_back_is_nothing_and_a_section_cuts_at_its_plane() -> None
     ends = frame.to_scene(cloud.points[:600] + cloud.origin).reshape(-1, 2, 3)
     clipped, kept = SectionPlane(0, -2.5).clipped(ends)
     assert clipped[:, :, 0].max() <= -2.5 + 1e-5
-    inside = (ends[:, :, 0] <= -2.5).all(axis=1)
+    inside = np.logical_and(*(ends[:, :, 0] <= -2.5).T)
     assert np.array_equal(clipped[inside[kept]], ends[inside])
     assert set(np.flatnonzero(~inside & (ends[:, :, 0] <= -2.5).any(axis=1))) <= set(kept.tolist())
 

@@ -22,7 +22,8 @@ DIMMED = np.array([215, 218, 220], np.uint8)
 BARS = 24  #: of a histogram
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
 OUTLIERS_IN_RED = "outliers in red"
-SCAN_COLOURINGS = ("height", "distance from the grid", "normals", OUTLIERS_IN_RED, "plain")
+FROM_GRID = "distance from the grid"
+SCAN_COLOURINGS = ("height", FROM_GRID, "normals", OUTLIERS_IN_RED, "plain")
 OUTLIER_COLOR = np.array([200, 20, 20], np.uint8)
 
 
@@ -90,7 +91,7 @@ def colors_of_scan(
     if wanted == OUTLIERS_IN_RED:
         kept = sample_surface(cloud, settings).judged[taken] == KEPT
         return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), None
-    if wanted == "distance from the grid" and grid is not None:
+    if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
         values = np.minimum(values, float(np.quantile(values, 0.99)))

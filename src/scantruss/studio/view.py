@@ -14,6 +14,7 @@ from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
+from .colours import SCAN_COLOURINGS
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
 from .outputs import model_to_show
 from .picking import pick
@@ -41,6 +42,10 @@ class StudioView:
         self._lock = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
+        if session.cloud is not None and session.grid is None:  # seen while the controls are still being made
+            self.scene.scan(session.state, SCAN_COLOURINGS[0], None)
+            self.overview()
+            client.flush()
         gui = client.gui
         with client.atomic():
             gui.main_panel.dock_right()
