@@ -19,7 +19,7 @@ SELECTED_COLOR = (230, 97, 1)
 LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
 DRAWN_POINTS = 100_000  #: of the scan
-MOST_LINES = 4000  #: members that are drawn as lines
+MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
 MOST_BEADS = 44_000  #: points by which so many members are drawn
 BEADS, BEAD_SIZE = (
     (4, 12),
@@ -82,7 +82,7 @@ class Scene:
 
     def members(self, name: str, ends: np.ndarray, colors: np.ndarray) -> None:
         """Draw the members (M, 2, 3) of a grid: as lines, or where these are too many as rows of points, which cost less."""
-        few, many = (ends, ends[:0]) if len(ends) <= MOST_LINES else (ends[:0], ends)
+        few, many = (ends, ends[:0]) if len(ends) <= MOST_DRAWN_LINES else (ends[:0], ends)
         self.lines(name, few, colors[: len(few)])
         beads = int(np.clip(MOST_BEADS // max(len(many), 1), *BEADS))
         step = float(np.linalg.norm(many[:, 1] - many[:, 0], axis=1).mean()) / beads if len(many) else 1.0

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..export.page_tables import PageColumn, colorings_of
 from .colours import DIMMED, SCAN_COLOURINGS, colors_of, histogram_of, legend_of, values_of
 from .frame import SectionPlane
-from .scene import BALL_RADIUS, MOST_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
+from .scene import BALL_RADIUS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -161,6 +161,7 @@ class LookTab:
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
+            self.count.content = "grey as built, while the Structure tab shows a displaced shape"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         scene.members("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
@@ -184,7 +185,7 @@ class LookTab:
             places,
             triangles[visible],
             None if of_panels is None else of_panels[visible],
-            0.35 if len(model.members) <= MOST_LINES else None,
+            0.35 if len(model.members) <= MOST_DRAWN_LINES else None,
         )
 
     # ---- theme and pictures
