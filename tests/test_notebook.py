@@ -43,3 +43,12 @@ def test_notebooks_show_a_picture_of_each() -> None:
         assert kept[kind.__module__, kind.__name__] is picture
         assert known(picture(value)).startswith(b"\x89PNG")
     assert grid_picture(dome().replace(triangles=np.zeros((0, 3), np.int64))) is None
+
+
+def test_a_notebook_shows_a_grid_to_turn() -> None:
+    grid = dome()
+    text = grid.show()._repr_html_()
+    assert (
+        text.startswith('<iframe srcdoc="&lt;!doctype html&gt;') and text.count("<") == 2
+    )  # all of the page is escaped
+    assert f"{len(grid.edges):,} members" in text and "http" not in text.lower().replace("http-equiv", "")

@@ -1,5 +1,6 @@
 """The studio as it is served: who is refused, and what a person sees in a browser."""
 
+import io
 import socket
 import urllib.error
 import urllib.request
@@ -9,7 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from browser import open_page
+from PIL import Image
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -135,7 +138,22 @@ def test_colours_span_the_values() -> None:
     assert colors_of(values, 1.5)[1:] == (0.0, 3.0)
 
 
-def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session]) -> None:
+SMALL = {"width": 700, "height": 420}
+
+
+def choose(page: Any, old: str, new: str) -> None:
+    """Choose something else in a drop-down list, as a person does."""
+    page.locator(f"input[value='{old}']:visible").first.click()
+    page.get_by_role("option", name=new, exact=True).first.click()
+
+
+def shown_colors(page: Any) -> np.ndarray:
+    """Return the pixels (N, 3) of the drawing."""
+    picture = Image.open(io.BytesIO(page.screenshot(clip={"x": 0, "y": 160, "width": 880, "height": 550})))
+    return np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int)
+
+
+def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_path: Path) -> None:
     address, session = served
     with open_page(address) as (page, errors):
         asked: list[Any] = []
@@ -147,14 +165,58 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session]) -> N
         page.click("button:has-text('Generate')")
         page.wait_for_selector("text=(quick, not saved)", state="detached")
         page.wait_for_selector("text=certificate: passed")
-        page.click("button:has-text('Fly there')")
+        choose(page, "select", "place fixed node")
+        page.mouse.click(445, 350)
+        page.wait_for_selector("text=undo: fixed node")
+        assert session.worker.wait(60) and len(session.settings.fixed) == 1
+        (place,) = session.settings.fixed
+        assert abs(place[2] - (2 - 0.04 * ((place[0] - 5) ** 2 + (place[1] - 5) ** 2))) < 1e-6  # it lies on the scan
+        assert session.grid is not None and session.grid.fixed.sum() == 1
+        page.click("button:has-text('Undo')")
+        page.wait_for_selector("text=redo: fixed node")
+        assert session.settings.fixed == ()
+        choose(page, "place fixed node", "select")
+        page.mouse.click(445, 370)
+        page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
         page.click("[role=tab]:has-text('Structure')")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=kg without nodes")
+        page.wait_for_selector("text=mass without nodes")
         assert session.worker.wait(60) and session.solution is not None
+        page.click("[role=tab]:has-text('View')")
+        choose(page, "utilization", "member length")
+        assert len(np.unique(shown_colors(page), axis=0)) > 50  # something is drawn
+        page.click("[role=tab]:has-text('Compare')")
+        page.click("button:has-text('Keep this design')")
+        page.wait_for_selector("text=the present one")
         page.click("[role=tab]:has-text('Files')")
+        choose(page, ".json", ".obj")
         with page.expect_download() as download:
             page.click("button:has-text('Download the grid')")
-        assert Path(download.value.path()).read_bytes() == session.files("grid", ".json")["grid.json"]
+        download.value.save_as(tmp_path / "grid.obj")
+        read = trimesh.load(tmp_path / "grid.obj", process=False)
+        assert np.allclose(read.vertices, session.grid.scan_nodes, atol=1e-6)
+        assert len(read.faces) == len(session.grid.triangles) and len(read.edges_unique) == len(session.grid.edges)
         assert not [url for url in asked if not url.startswith((address, "data:", "blob:"))]
+        assert errors == []
+        again = Session()  # what is left where the server is killed now
+        assert session.place is not None
+        again.open(session.place)
+        assert again.settings == session.settings and again.state.designs[0].name == "A"
+
+
+def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.set_viewport_size(SMALL)  # drawn by software: the smaller, the sooner
+        page.wait_for_selector("text=dome.scantruss")
+        other = page.context.browser.new_page(viewport=SMALL)
+        other.goto(address)
+        other.wait_for_selector("text=dome-2.scantruss")
+        before = session.settings
+        other.focus("[role=slider]")
+        other.keyboard.press("ArrowRight")
+        other.wait_for_selector("text=(quick, not saved)")
+        assert session.settings is before and session.grid is None
+        page.reload()
+        page.wait_for_selector("text=dome.scantruss")
         assert errors == []

@@ -15,12 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..grid.certificate import near
+from ..grid.grid import Grid
 from ..runtime.ours import MARK
-from .model import Model
+from ..scan.cloud import PointCloud
+from .model import Model, model_of_grid
 from .page_tables import Pin, colorings_of, pins_of, tables_of
 from .style import FileStyle
 
 PAGE_FOLDER = Path(__file__).parent
+NOTEBOOK_HEIGHT = 640  #: of a page within a notebook [pixel]
 PAGE_POINTS = 60_000  #: of the scan that are drawn
 PAGE_LAYERS = (("members", True), ("nodes", True), ("panels", True), ("scan", False), ("pins", True))
 
@@ -82,6 +85,22 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
             f"<script>\n{_own('page.js')}</script></body></html>\n",
         ]
     ).encode()
+
+
+class PageView:
+    """A page within a notebook."""
+
+    def __init__(self, page: bytes) -> None:
+        self.page = page
+
+    def _repr_html_(self) -> str:
+        text = escape(self.page.decode("utf-8"))
+        return f'<iframe srcdoc="{text}" style="width:100%;height:{NOTEBOOK_HEIGHT}px;border:0" title="grid"></iframe>'
+
+
+def view_of_grid(grid: Grid, cloud: PointCloud | None = None) -> PageView:
+    """Return the page of a grid for a notebook."""
+    return PageView(encode_page(model_of_grid(grid, cloud), FileStyle()))
 
 
 def _own(name: str) -> str:

@@ -105,6 +105,16 @@ class Grid(GridTables):
         image: Image = pictures.plot_grid(self, cloud, (view,) if isinstance(view, str) else tuple(view), size)
         return image
 
+    def show(self, cloud: PointCloud | None = None) -> Any:
+        """Return the grid as a view that a notebook shows: turn it, colour it, click for the row of a member; nothing is loaded.
+
+        Parameters
+        ----------
+        cloud : PointCloud, optional
+            The scan, drawn with it.
+        """
+        return import_module("scantruss.export.page").view_of_grid(self, cloud)  # a layer above this one
+
     @cached_property
     def quality(self) -> GridQuality:
         """The figures of Table 2 and more."""

@@ -21,9 +21,10 @@ PLAIN = np.array([60, 90, 110], np.uint8)
 DIMMED = np.array([215, 218, 220], np.uint8)
 BARS = 24  #: of a histogram
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
-LEFT_OUT = "outliers in red"
-SCAN_COLOURINGS = ("height", "distance from the grid", "normals", LEFT_OUT, "plain")
-RED = np.array([200, 20, 20], np.uint8)
+OUTLIERS_IN_RED = "outliers in red"
+FROM_GRID = "distance from the grid"
+SCAN_COLOURINGS = ("height", FROM_GRID, "normals", OUTLIERS_IN_RED, "plain")
+OUTLIER_COLOR = np.array([200, 20, 20], np.uint8)
 
 
 def ramp(share: np.ndarray, stops: np.ndarray) -> np.ndarray:
@@ -87,10 +88,10 @@ def colors_of_scan(
     if wanted == "normals":
         normals = cloud.normals[taken] if cloud.normals is not None else _normals(points)
         return (127.5 * (normals + 1.0)).astype(np.uint8), None
-    if wanted == LEFT_OUT:
+    if wanted == OUTLIERS_IN_RED:
         kept = sample_surface(cloud, settings).judged[taken] == KEPT
-        return np.where(kept[:, None], PLAIN, RED), None
-    if wanted == "distance from the grid" and grid is not None:
+        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), None
+    if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
         values = np.minimum(values, float(np.quantile(values, 0.99)))

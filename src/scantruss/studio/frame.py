@@ -10,7 +10,7 @@ import numpy as np
 from ..scan.cloud import PointCloud
 
 DRAWN_EXTENT = 10.0  #: of the scan in the scene, whose camera is made for such sizes
-BESIDE = 1.15  #: how far a second design is drawn beside the first [extent of the scan]
+BESIDE_FIRST = 1.15  #: how far a second design is drawn beside the first [extent of the scan]
 POINTS_FOR_FRAME = 100_000  #: from which the extent of the bulk is measured
 OUTSIDE = 0.005  #: share of the points that may lie beyond each side of the frame
 

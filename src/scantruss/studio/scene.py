@@ -6,17 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .colours import DIMMED, PLAIN
-from .frame import DRAWN_EXTENT, SectionPlane
+from .colours import DIMMED, FROM_GRID, PLAIN, colors_of_scan
+from .frame import DRAWN_EXTENT, SceneFrame, SectionPlane
 from .tone import to_be_seen
 
 if TYPE_CHECKING:
     from ..export.model import Model
+    from .state import StudioState
 
 PANEL_COLOR = (205, 216, 223)
 SELECTED_COLOR = (230, 97, 1)
 LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
+DRAWN_POINTS = 100_000  #: of the scan
+MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
+MOST_BEADS = 44_000  #: points by which so many members are drawn
+BEADS, BEAD_SIZE = (
+    (4, 12),
+    1.2,
+)  #: points of such a member at least and at most, and how large they are [their distance]
 TUBE_SIDES = 8
 DRAWN_SHARE = 0.93  #: of a panel about its middle, so that it does not cover its members
 OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float32)
@@ -31,11 +39,61 @@ class Scene:
     def __init__(self, scene: Any) -> None:
         self.api = scene
         scene.set_up_direction("+z")
+        self.light(False)
+        self._scan_key: tuple[Any, ...] = ()
+        self._scan_scale: tuple[str, float, float] | None = None
+
+    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None) -> tuple[str, float, float] | None:
+        """Draw the scan of a state, thinned, and return words and ends of the scale of its colours, where there is one.
+
+        Parameters
+        ----------
+        wanted : str
+            Of `SCAN_COLOURINGS`.
+        """
+        assert state.cloud is not None
+        key = (state.cloud, wanted, state.grid if wanted == FROM_GRID else None, section)
+        if key == self._scan_key:
+            return self._scan_scale
+        taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // DRAWN_POINTS)))
+        colors, scale = colors_of_scan(state.cloud, taken, state.grid, state.settings, wanted)
+        places = SceneFrame.of(state.cloud).to_scene(state.cloud.points[taken] + state.cloud.origin)
+        if section is not None:
+            kept = section.keeps(places)
+            places, colors = places[kept], colors[kept]
+        self.points("/scan", places, np.ascontiguousarray(colors), 0.02)
+        self._scan_key, self._scan_scale = key, scale
+        return scale
+
+    def remove_scan(self) -> None:
+        """Draw no scan."""
+        self._scan_key, self._scan_scale = (), None
+        self.remove("/scan")
 
     def remove(self, *names: str) -> None:
         """Remove parts."""
         for name in names:
             self.api.remove_by_name(name)
+
+    def light(self, is_fine: bool) -> None:
+        """Light bodies as in daylight with shadows, or plainly: reflections of a sky cost most of the time of a slow machine."""
+        self.api.configure_environment_map("warehouse" if is_fine else None)
+        self.api.configure_default_lights(True, cast_shadow=is_fine)
+
+    def members(self, name: str, ends: np.ndarray, colors: np.ndarray) -> None:
+        """Draw the members (M, 2, 3) of a grid: as lines, or where these are too many as rows of points, which cost less."""
+        few, many = (ends, ends[:0]) if len(ends) <= MOST_DRAWN_LINES else (ends[:0], ends)
+        self.lines(name, few, colors[: len(few)])
+        beads = int(np.clip(MOST_BEADS // max(len(many), 1), *BEADS))
+        step = float(np.linalg.norm(many[:, 1] - many[:, 0], axis=1).mean()) / beads if len(many) else 1.0
+        share = ((np.arange(beads) + 0.5) / beads)[None, :, None]
+        places = (many[:, None, 0] + share * (many[:, None, 1] - many[:, None, 0])).reshape(-1, 3)
+        self.points(
+            f"{name} in points",
+            places.astype(np.float32),
+            np.repeat(colors[: len(many)], beads, axis=0),
+            BEAD_SIZE * step,
+        )
 
     def points(self, name: str, places: np.ndarray, colors: np.ndarray, size: float) -> None:
         """Draw points (N, 3) in colours (N, 3) or one."""
@@ -100,7 +158,7 @@ class Scene:
         )  # fmt: skip
 
     def panels(
-        self, name: str, nodes: np.ndarray, triangles: np.ndarray, colors: np.ndarray | None, opacity: float
+        self, name: str, nodes: np.ndarray, triangles: np.ndarray, colors: np.ndarray | None, opacity: float | None
     ) -> None:
         """Draw triangles (T, 3) of nodes (V, 3), in one colour or each in its own (T, 3)."""
         self.remove(name, f"{name} coloured")
@@ -112,8 +170,9 @@ class Scene:
         faces = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
         if colors is None:
             self.api.add_mesh_simple(
-                name, corners, faces, color=PANEL_COLOR, side="double", flat_shading=True, opacity=opacity
-            )
+                name, corners, faces, color=PANEL_COLOR, side="double", flat_shading=True, opacity=opacity,
+                cast_shadow=False, receive_shadow=False,
+            )  # fmt: skip
             return
         import trimesh
 

@@ -188,8 +188,14 @@ def serve_browsers(server: Any, browsers: Browsers) -> None:
         except InputError as error:
             client.gui.add_markdown(f"**Refused:** {error}")
             return
-        client.local_storage.set_item(BROWSER_KEY, key)
-        views[client.client_id] = (key, StudioView(session, client))
+        try:
+            client.local_storage.set_item(BROWSER_KEY, key)
+            views[client.client_id] = (key, StudioView(session, client))
+        except BaseException:
+            browsers.leave(key)
+            raise
+        if client.client_id not in server.get_clients():  # closed while its page was being made
+            end(client)
 
     def end(client: Any) -> None:
         key, view = views.pop(client.client_id, ("", None))

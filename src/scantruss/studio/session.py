@@ -183,7 +183,6 @@ class Session:
         file, settings = EXAMPLES[name]
 
         def read(progress: Progress) -> None:
-            progress("read", 0.1)
             self._start(read_whole(DATA_FOLDER / file), settings)
             self._make("quick", progress, live=True)
 
@@ -246,7 +245,7 @@ class Session:
 
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
-        self.change("length", goes_on=True, settings=self.settings.replace(length=length))
+        self.change("slider", goes_on=True, settings=self.settings.replace(length=length))
         return self._ask_live()
 
     def show_quick(self) -> bool:
@@ -273,14 +272,15 @@ class Session:
             return  # Generate says why
         progress("boundary", 0.0)
         grid = grid_from_cloud(cloud, settings.replace(effort=effort), progress=progress)
-        if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
-            return
         made: dict[str, Any] = {"grid": grid, "asked": settings, "is_live": live, "solution": None, "report": None}
-        if live:
-            with self._lock:
+        with self._lock:
+            if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
+                return
+            if live:
                 self.state = replace(self.state, **made)
-        else:
-            self.change("generate", **made)
+            else:
+                self.change("generate", **made)
+        if not live:
             self.save()
         self.tell()
         self._find_features(progress)

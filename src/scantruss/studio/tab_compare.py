@@ -8,7 +8,7 @@ import numpy as np
 
 from .colours import colors_of, legend_of
 from .compare import comparison, deviation, kept_design
-from .frame import BESIDE, DRAWN_EXTENT
+from .frame import BESIDE_FIRST, DRAWN_EXTENT
 from .state import Design
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class CompareTab:
             scene.remove("/beside/members", "/beside/panels", "/beside/name")
             return
         frame = self.view.frame
-        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([BESIDE * DRAWN_EXTENT, 0.0, 0.0], np.float32)
+        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([BESIDE_FIRST * DRAWN_EXTENT, 0.0, 0.0], np.float32)
         values = chosen.grid.lengths
         words = "member length"
         if self.distance.value and state.grid is not None:

@@ -9,15 +9,14 @@ import numpy as np
 
 from ..errors import InputError
 from ..export.page_tables import PageColumn, colorings_of
-from .colours import DIMMED, SCAN_COLOURINGS, colors_of, colors_of_scan, histogram_of, legend_of, values_of
+from .colours import DIMMED, SCAN_COLOURINGS, colors_of, histogram_of, legend_of, values_of
 from .frame import SectionPlane
-from .scene import BALL_RADIUS, TUBE_RADIUS, cut, drawn_colors, plain_colors
+from .scene import BALL_RADIUS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
 
 if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-DRAWN_POINTS = 100_000  #: of the scan
 PLAIN_GRID = "plain"
 WHOLE = "none"
 LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
@@ -32,7 +31,6 @@ class LookTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, step = view, view.step
         self._choices: dict[str, dict[str, Any]] = {}
-        self._scan_key: tuple[Any, ...] = ()
         self._values: np.ndarray | None = None
         self.coloring = gui.add_dropdown("grid", (PLAIN_GRID,))
         self.legend, self.bars = gui.add_html(""), gui.add_html("")
@@ -60,6 +58,7 @@ class LookTab:
         for each in (self.axis, self.at):
             each.on_update(step(self.draw_scan))
         self.pins.on_update(step(lambda: view.design._fill_grid(view.session.state, "")))
+        self.tubes.on_update(step(lambda: view.scene.light(self.tubes.value)))
         self.dark.on_update(step(self._theme))
         picture.on_click(step(self._picture))
         turn.on_click(step(self._turntable))
@@ -126,30 +125,24 @@ class LookTab:
         """Draw the scan."""
         state = self.view.session.state
         if state.cloud is None or not self.scan.value:
-            self._scan_key = ()
-            self.view.scene.remove("/scan")
+            self.view.scene.remove_scan()
             self.scan_legend.content = ""
             return
-        wanted = self.scan_coloring.value
-        key = (state.cloud, wanted, state.grid if wanted.startswith("distance") else None, self.section)
-        if key == self._scan_key:
-            return
-        self._scan_key = key
-        taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // DRAWN_POINTS)))
-        colors, scale = colors_of_scan(state.cloud, taken, state.grid, state.settings, wanted)
+        scale = self.view.scene.scan(state, self.scan_coloring.value, self.section)
         self.scan_legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
-        places = self.view.frame.to_scene(state.cloud.points[taken] + state.cloud.origin)
-        if self.section is not None:
-            kept = self.section.keeps(places)
-            places, colors = places[kept], colors[kept]
-        self.view.scene.points("/scan", places, np.ascontiguousarray(colors), 0.02)
 
     def draw(self) -> None:
         """Draw the grid or structure."""
         scene, shown = self.view.scene, self.view.shown_model()
         if shown is None:
             scene.remove(
-                "/grid/members", "/grid/tubes", "/grid/nodes", "/grid/balls", "/grid/panels", "/grid/panels coloured"
+                "/grid/members",
+                "/grid/members in points",
+                "/grid/tubes",
+                "/grid/nodes",
+                "/grid/balls",
+                "/grid/panels",
+                "/grid/panels coloured",
             )
             return
         model, _ = shown
@@ -168,9 +161,10 @@ class LookTab:
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
+            self.count.content = "grey as built, while the Structure tab shows a displaced shape"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
-        scene.lines("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
+        scene.members("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
         scene.tubes(
             "/grid/tubes", ends if bodies else ends[:0], of_members if bodies else of_members[:0], TUBE_RADIUS * size
         )
@@ -187,7 +181,11 @@ class LookTab:
         visible = np.ones(len(triangles), bool) if section is None else kept[triangles].all(axis=1)
         visible &= self.panels.value or of_panels is not None
         scene.panels(
-            "/grid/panels", places, triangles[visible], None if of_panels is None else of_panels[visible], 0.35
+            "/grid/panels",
+            places,
+            triangles[visible],
+            None if of_panels is None else of_panels[visible],
+            0.35 if len(model.members) <= MOST_DRAWN_LINES else None,
         )
 
     # ---- theme and pictures

@@ -14,7 +14,8 @@ from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
-from .frame import BESIDE, DRAWN_EXTENT, SceneFrame
+from .colours import SCAN_COLOURINGS
+from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
 from .outputs import model_to_show
 from .picking import pick
 from .scene import Scene
@@ -41,6 +42,10 @@ class StudioView:
         self._lock = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
+        if session.cloud is not None and session.grid is None:  # seen while the controls are still being made
+            self.scene.scan(session.state, SCAN_COLOURINGS[0], None)
+            self.overview()
+            client.flush()
         gui = client.gui
         with client.atomic():
             gui.main_panel.dock_right()
@@ -63,7 +68,7 @@ class StudioView:
                 self.compare = CompareTab(self, gui)
             with tabs.add_tab("Files"):
                 self.files = FilesTab(self, gui)
-        self.tabs = (self.design, self.look, self.structure, self.compare, self.files)
+        self.tabs = (self.design, self.structure, self.look, self.compare, self.files)
         self.steps.on_click(self.step(self._take_back))
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
@@ -189,7 +194,7 @@ class StudioView:
 
     def overview(self, designs: int = 1) -> None:
         """Move the camera so that all of the scan is seen, or of several designs side by side."""
-        middle = np.array([0.5 * BESIDE * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
+        middle = np.array([0.5 * BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
         self.client.camera.fov = NATURAL_VIEW
         self.client.camera.position = tuple(middle + DRAWN_EXTENT * (0.3 + 0.7 * designs) * np.array([0.8, -1.4, 0.9]))
         self.client.camera.look_at = tuple(middle)
