@@ -177,7 +177,9 @@ def test_noise_makes_a_surface_neither_flatter_nor_rounder(noise: float) -> None
     """A saddle z = xy / 36 with the curvature 1 / 36 nearly everywhere; noise of 10 mm makes sagittas of 36 m in narrow patches."""
     rng = np.random.default_rng(4)
     x, y = rng.uniform([-12.0, -9.0], [12.0, 9.0], (60_000, 2)).T
-    bends = measured_bends(samples_of(np.stack([x, y, x * y / 36.0 + rng.normal(0.0, noise, len(x))], axis=1), 1.0).surface)
+    bends = measured_bends(
+        samples_of(np.stack([x, y, x * y / 36.0 + rng.normal(0.0, noise, len(x))], axis=1), 1.0).surface
+    )
     assert np.median(bends) == pytest.approx(1.0 / 37.5, rel=0.1) and np.quantile(bends, 0.95) < 1.15 / 36.0
 
 

@@ -13,12 +13,12 @@ from ..errors import InputError
 
 SYMMETRY_TOLERANCE = 0.1  #: by how far 95 % of a scan may lie off its mirror image [member lengths]
 CELLS_ACROSS = 60  #: of the cells in each of which one place stands for the scan, along its longest side
-FEWEST_PLACES = 50  #: from which a symmetry can be told
+FEWEST_MIRRORED_PLACES = 50  #: from which a symmetry can be told
 TRIED = 400  #: places with which a plane is tried first
 TURN_STEP = 2.0  #: between the directions tried about each principal axis [degree]
 REFINED = 12  #: planes that are refined
 APART = 5.0  #: of two planes [degree]
-REFINEMENTS = 15  #: Gauss-Newton steps of a plane
+PLANE_REFINEMENTS = 15  #: Gauss-Newton steps of a plane
 NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
 QUANTILE = 0.95  #: of the places, which the misfit holds for
 MOST_FOLD = 6  #: mirror planes through one axis that are kept
@@ -121,7 +121,7 @@ def _places(points: np.ndarray) -> _Places:
     _, inverse = np.unique(keys @ [1, 1 << 20, 1 << 40], return_inverse=True)
     counts = np.bincount(inverse.ravel())
     at = np.stack([np.bincount(inverse.ravel(), points[:, k] - low[k]) / counts for k in range(3)], axis=1)
-    if len(at) < FEWEST_PLACES:
+    if len(at) < FEWEST_MIRRORED_PLACES:
         raise InputError(f"the scan has too few points for its symmetry to be told: {len(points):,}")
     middle = at.mean(axis=0)
     at -= middle
@@ -154,10 +154,10 @@ def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
 def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float, float]:
     """Return a plane moved to where the scan is nearest to its image, and its misfit: iterated closest points to planes."""
     everything = np.arange(len(places.at))
-    for _ in range(REFINEMENTS):
+    for _ in range(PLANE_REFINEMENTS):
         off, nearest = places.misfits(normal, offset, everything)
         use = off < NEAR_CELLS * places.cell
-        if use.sum() < FEWEST_PLACES:
+        if use.sum() < FEWEST_MIRRORED_PLACES:
             break
         at, target, across = places.at[use], places.at[nearest[use]], places.normals[nearest[use]]
         height = at @ normal - offset

@@ -20,7 +20,7 @@ SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 be
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
 LESS_CURVED_SHARE = 0.95  # share of the scan that is less curved than the places with the shortest members
 NOISE_DEVIATIONS = 4.6  # standard deviations of a curvature up to which it may be noise
-WIDEST_PATCH = 4.0  # patches in which a curvature may be measured; noise falls with their width [usual patches]
+WIDEST_CURVATURE_PATCH = 4.0  # patches in which a curvature may be measured; noise falls with their width [usual patches]
 FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan [that length]
 LENGTHS_PER_THREAD = 200  # fewest samples worth a thread of their own
 
@@ -119,7 +119,7 @@ def measured_bends(surface: Surface) -> np.ndarray:
     samples = np.flatnonzero(chosen)
     low, high, best = np.zeros(len(samples)), np.full(len(samples), np.inf), np.zeros(len(samples))
     for share in (0.0, 0.5, 1.0):
-        bend, doubt = _curvatures(surface, samples, WIDEST_PATCH**share)
+        bend, doubt = _curvatures(surface, samples, WIDEST_CURVATURE_PATCH**share)
         noise = NOISE_DEVIATIONS * doubt
         low, high = np.maximum(low, bend - noise), np.minimum(high, bend + noise)
         sure = bend * np.maximum(1.0 - (noise / np.maximum(bend, 1e-300)) ** 2, 0.0)
