@@ -21,7 +21,10 @@ PLANES_APART = 5.0  #: of two planes [degree]
 PLANE_STEPS = 10  #: Gauss-Newton steps of a plane
 NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
 IMAGE_QUANTILE = 0.95  #: of the places, which the misfit holds for
-MOST_FOLD = 3  #: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
+MORE_PLANES = 0.25  #: of the tolerance, which planes besides the best must keep
+MOST_FOLD = (
+    3  #: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
+)
 LEAST_ACROSS_AXES = 0.3  #: sine of the angle of an axis to the normal of a plane through it, beyond which it is tried
 ROUGHLY = 20.0  #: tolerances within which a plane is worth refining
 CONFORMING = 2.0  #: by how far planes through one axis may be off equal angles [degree]
@@ -86,7 +89,7 @@ def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlan
             f"the scan has no mirror plane within {tolerance:.4g}, a tenth of a member: the best leaves 95 % of it within"
             f" {found[0][2]:.4g} of its image; leave --symmetry out"
         )
-    return _through_one_axis(places, good, tolerance)
+    return _through_one_axis(places, good, MORE_PLANES * tolerance)
 
 
 def check_mirror_planes(
@@ -210,7 +213,9 @@ def _misfits_of(places: _Places, planes: Sequence[MirrorPlane]) -> list[float]:
     found = []
     for plane in planes:
         normal = np.array(plane.normal)
-        off, _ = places.misfits(normal, float((np.array(plane.point) - places.origin) @ normal), np.arange(len(places.at)))
+        off, _ = places.misfits(
+            normal, float((np.array(plane.point) - places.origin) @ normal), np.arange(len(places.at))
+        )
         found.append(float(np.quantile(off, IMAGE_QUANTILE)))
     return found
 
