@@ -160,4 +160,4 @@ def test_double_layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(made.lengths) < 0.7 * len(truss.members)
     images = made.node_types["mirror image"]
     assert sum(image is None for image in images) < 0.1 * len(images)
-    assert {path.suffix for path in tmp_path.iterdir()} == {".xlsx", ".pdf", ".stl"}
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".pdf", ".stl"}
