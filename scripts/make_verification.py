@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -66,7 +67,7 @@ class Proof(NamedTuple):
 
 def proofs() -> list[Proof]:
     """Return all proofs, in their order in the docs."""
-    return [*_statics(), *_stability(), *_paths(), *_sections(), *_checks(), *_shells()]
+    return [*_statics(), *_space_truss(), *_stability(), *_paths(), *_sections(), *_checks(), *_shells()]
 
 
 def _statics() -> Iterator[Proof]:
@@ -154,6 +155,13 @@ def _statics() -> Iterator[Proof]:
     )
 
 
+def _space_truss() -> Iterator[Proof]:
+    """Yield the star dome."""
+    sinks = -float(solve(star_dome()).cases[0].displacements[0, 2])
+    reference = "Levy and Spillers, Analysis of Geometrically Nonlinear Structures, 2.4.2"
+    yield Proof("star dome of 24 bars, 220.46 lb on its crown, linear: crown sinks", "in", reference, 0.20641184, sinks)
+
+
 def _stability() -> Iterator[Proof]:
     """Yield columns and a beam that swings."""
     count, length = 16, 4.0
@@ -220,6 +228,39 @@ def _paths() -> Iterator[Proof]:
         "cantilever 5 m, force that turns its tip by 1 rad: tip sinks", "m", reference, 5 * down, -moved[2], 1e-3
     )
     yield Proof("the same: tip lies out", "m", reference, 5 * away, 5 + moved[0], 1e-3)
+    moved = perfect(bend(), stop_factor=1.0).displacements[-1, -1]
+    reference = "Bathe and Bolourchi 1979"
+    what = "bend of 45 degrees, radius 100 in, 600 lb across its plane: tip moves"
+    for way, theirs, within in (("along", -23.5, 4e-3), ("back", 13.4, 2e-2), ("across", 53.4, 2e-3)):
+        ours = float(moved[("along", "back", "across").index(way)])
+        yield Proof(f"{what} {way}", "in", reference, theirs, ours, within)
+
+
+def bend() -> Truss:
+    """Return the eighth of a ring of a square bar, 1 in wide, held at one end and loaded across its plane at the other."""
+    count = 16
+    turn = np.linspace(0.0, math.pi / 4, count + 1)
+    nodes = 100.0 * np.stack([np.sin(turn), np.cos(turn) - 1.0, np.zeros(count + 1)], axis=1)
+    members = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
+    bar = replace(TUBE, area=1.0, inertia_y=1 / 12, inertia_z=1 / 12, torsion=1 / 6)
+    soft = replace(STEEL, young=1e7, shear=5e6)
+    tip = forces(count + 1, {count: (0, 0, 600.0)})
+    return make_truss(nodes, members, {0: HELD}, tip, sections=(bar,), material=soft)
+
+
+def star_dome() -> Truss:
+    """Return the star dome of 24 bars with a load on its crown [in, lb]."""
+    turn = np.radians(60.0 * np.arange(6))
+    inner = np.stack([9.8425 * np.cos(turn), 9.8425 * np.sin(turn), np.full(6, 2.4472)], axis=1)
+    outer = np.stack([19.685 * np.cos(turn + np.pi / 6), 19.685 * np.sin(turn + np.pi / 6), np.zeros(6)], axis=1)
+    around, next_one = np.arange(1, 7), np.roll(np.arange(1, 7), -1)
+    pairs = [(np.zeros(6, np.int64), around), (around, next_one), (around, around + 6), (next_one, around + 6)]
+    members = np.concatenate([np.stack(pair, axis=1) for pair in pairs])
+    nodes = np.concatenate([[[0.0, 0.0, 3.2346]], inner, outer])
+    bar, steel = replace(TUBE, area=0.0155), replace(STEEL, young=3e7)
+    feet = {node: HINGED for node in range(7, 13)}
+    crown = forces(13, {0: (0, 0, -220.46)})
+    return make_truss(nodes, members, feet, crown, sections=(bar,), material=steel, pinned=True)
 
 
 def _sections() -> Iterator[Proof]:

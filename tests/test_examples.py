@@ -151,3 +151,13 @@ def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
     assert len(ezdxf.readfile(tmp_path / "stadium.dxf").modelspace().query("LINE")) == count
     assert "members" in trimesh.load(tmp_path / "stadium.glb").geometry
+
+
+def test_double_layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts come in pairs that are equal or mirror images, and every file is there."""
+    truss, made = run("12_double_layer", tmp_path, monkeypatch)
+    assert set(truss.member_sets) == {"top", "bottom", "web"} and len(made.members) == len(truss.members)
+    assert len(made.lengths) < 0.7 * len(truss.members)
+    images = made.node_types["mirror image"]
+    assert sum(image is None for image in images) < 0.1 * len(images)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".csv", ".pdf", ".stl"}

@@ -85,7 +85,7 @@ def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
 
 @pytest.mark.kernels
 def test_a_fixed_line_without_its_image_is_refused() -> None:
-    line = [(520.0, -215.0, 33.0), (535.0, -215.0, 22.0)]
+    line = [(512.0, -215.0, 33.0), (532.0, -185.0, 22.0)]  # aslant over the middle
     points = vault()
     line = [tuple(points[np.linalg.norm(points[:, :2] - place[:2], axis=1).argmin()]) for place in line]
     with pytest.raises(FrontError, match="is not symmetric in the mirror planes, near"):
@@ -116,3 +116,11 @@ def test_the_command_takes_planes_of_a_file(
         assert main([*words.replace("shell.json", "bad.json").split(), "bad.txt"]) == 2
         error = capsys.readouterr().err
         assert reason in error and error.count("\n") == 1 and not Path("bad.json").exists(), error
+
+
+def test_a_surface_of_revolution_has_three_planes_at_60_degrees() -> None:
+    radius, turn = (each.ravel() for each in np.meshgrid(np.sqrt(np.linspace(0.0, 1.0, 60)), np.linspace(0, 6.28, 160)))
+    points = np.stack([10 * radius * np.cos(turn), 10 * radius * np.sin(turn), 3 * (1 - radius**2)], axis=1)
+    planes = find_mirror_planes(points, 0.1)
+    cosines = np.abs(np.array([plane.normal for plane in planes]) @ np.transpose([plane.normal for plane in planes]))
+    assert len(planes) == 3 and cosines[np.triu_indices(3, 1)] == pytest.approx(0.5, abs=1e-12)

@@ -17,7 +17,7 @@ from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .hope import Hope
-from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid
+from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid, sides_of
 from .runtime.progress import Progress
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
@@ -143,16 +143,20 @@ def symmetric_grid(
     )
     half = grid_from_cloud(cloud, lined, progress=progress)
     own = (half.settings or lined).replace(fixed_lines=plain.fixed_lines, line_names=plain.line_names)
-    made = mirrored_grid(half, planes, settings.length)
-    check_lines_kept(half, made, settings.length)
     samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
-    kept = made.replace(settings=own.replace(symmetry=[plane.row for plane in planes]))
-    try:
-        return certified(kept, samples, boundary, own)
-    except CertificateError as error:
-        if not keep_failed:
-            raise
-        return error.grid if isinstance(error.grid, Grid) else kept
+    kept = own.replace(symmetry=[plane.row for plane in planes])
+    refused: FrontError | None = None
+    for side in sides_of(planes):
+        try:
+            made = mirrored_grid(half, side, settings.length)
+            check_lines_kept(half, made, settings.length)
+            return certified(made.replace(settings=kept), samples, boundary, own)
+        except FrontError as error:
+            refused = refused or error
+    assert refused is not None
+    if keep_failed and isinstance(refused, CertificateError):
+        return refused.grid
+    raise refused
 
 
 def first_that_passes(

@@ -133,6 +133,7 @@ def structure(values: Namespace) -> None:
         modes = settings.buckling or int(settings.size > 0)
         buckling = worst_buckling(factored, solution, modes) if modes else None
         vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
+        del factored  # a path makes its own, and they are large
         path = _path(truss, settings, bars) if settings.path else None
         bars("checks", 0.8)
         found: dict[str, Any] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +60,14 @@ def wedge_of(planes: Sequence[MirrorPlane], origin: np.ndarray) -> _Wedge:
     inner = math.sin(angle) * first - math.cos(angle) * normal
     walls = [(normal, float(normal @ centre)), (inner, float(inner @ centre))]
     return _Wedge(walls, [first, second], centre, np.cross(first, normal), 2 * len(planes))
+
+
+def sides_of(planes: Sequence[MirrorPlane]) -> list[Sequence[MirrorPlane]]:
+    """Return the planes, and of a single one the same facing the other way: the other side can be kept as well."""
+    if len(planes) > 1:
+        return [planes]
+    x, y, z = planes[0].normal
+    return [planes, [replace(planes[0], normal=(-x, -y, -z))]]
 
 
 def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> list[np.ndarray]:

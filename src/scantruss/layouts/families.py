@@ -7,22 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from ..grid.grid import Grid
 from .double_layer import smoothed_normals
 
-FAMILY_ROUNDS = 60  #: of assignment and relaxation
-INNER_SHARE = 0.8  #: of the tolerance, within which a length is taken to be that of its family
+FAMILY_ROUNDS = 200  #: of assignment and relaxation
+INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
 BISECTIONS = 60  #: of the least misfit
-STIFFNESS_OF_PLACE = 0.02  #: weight of staying where one is, over that of a length
+STIFFNESS_OF_PLACE = 0.005  #: weight of staying where one is, over that of a length
 FARTHEST_MOVE = 0.35  #: of a node along the surface, over the mean member
 HIGHEST_RISE = 0.05  #: of a node off the triangles of the grid, over the mean member; by how far its quadric may rise
 STAYING_TURN = 25.0  #: turn of the boundary from which a node stays [degree]
-HEAVIER = 1.25  #: weight of a member that lies in no family, over that of the round before
+HEAVIER = 1.12  #: weight of a member that lies in no family, over that of the round before
 MOST_WEIGHT = 100.0  #: of a member
+LEAST_FITTED = 5  #: nodes around one, to which a quadric is fitted
 USUAL_SHARE = 0.95  #: of the members, which few lengths shall hold
 
 
@@ -190,25 +191,8 @@ def _charts(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     u = axis - (axis * normal).sum(axis=1, keepdims=True) * normal
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     frames = np.stack([u, np.cross(normal, u), normal], axis=1)
-    near: list[set[int]] = [set() for _ in range(count)]
-    for a, b in grid.edges.tolist():
-        near[a].add(b)
-        near[b].add(a)
-    quadrics, free = np.zeros((count, 3)), np.ones((count, 2), bool)
-    for node in range(count):
-        around = sorted(set().union(near[node], *(near[other] for other in near[node])) - {node})
-        if len(around) < 5:
-            continue
-        x, y, z = frames[node] @ (grid.nodes[around] - grid.nodes[node]).T
-        fitted = np.linalg.lstsq(np.stack([x, y, x * x, x * y, y * y], axis=1), z, rcond=None)[0]
-        tilted = (
-            frames[node, 2] - fitted[0] * frames[node, 0] - fitted[1] * frames[node, 1]
-        )  # the normal of the quadric
-        frames[node, 2] = tilted / np.linalg.norm(tilted)
-        frames[node, 0] -= (frames[node, 0] @ frames[node, 2]) * frames[node, 2]
-        frames[node, 0] /= np.linalg.norm(frames[node, 0])
-        frames[node, 1] = np.cross(frames[node, 2], frames[node, 0])
-        quadrics[node] = fitted[2:]
+    free = np.ones((count, 2), bool)
+    frames, quadrics = _fitted(grid, frames)
     for loop in grid.boundary_loops:
         before, after = grid.nodes[np.roll(loop, 1)], grid.nodes[np.roll(loop, -1)]
         for node, a, b in zip(loop.tolist(), before, after, strict=True):
@@ -227,6 +211,31 @@ def _charts(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     free[grid.fixed] = False
     free[grid.lines.ravel()] = False
     return frames, free, quadrics
+
+
+def _fitted(grid: Grid, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the frames (V, 3, 3) turned to the normals of quadrics fitted to the neighbours and theirs, and the quadrics (V, 3)."""
+    count = len(grid.nodes)
+    ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
+    near = csr_matrix((np.ones(len(ends)), tuple(ends.T)), (count, count))
+    near = near + near @ near
+    near.setdiag(0)
+    near.eliminate_zeros()
+    near.sort_indices()
+    node, place = np.repeat(np.arange(count), np.diff(near.indptr)), np.arange(near.nnz)
+    local = np.einsum("kij,kj->ki", frames[node], grid.nodes[near.indices] - grid.nodes[node])
+    around = np.zeros((count, int(np.diff(near.indptr).max(initial=1)), 3))  # rows of nil weigh nothing in the fit
+    around[node, place - near.indptr[node]] = local
+    x, y, z = around.transpose(2, 0, 1)
+    table = np.stack([x, y, x * x, x * y, y * y], axis=2)
+    fitted = (np.linalg.pinv(table) @ z[..., None])[..., 0]
+    fitted[np.diff(near.indptr) < LEAST_FITTED] = 0.0
+    u, v, normal = (frames[:, k] for k in range(3))
+    normal = normal - fitted[:, [0]] * u - fitted[:, [1]] * v
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    u = u - (u * normal).sum(axis=1, keepdims=True) * normal
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    return np.stack([u, np.cross(normal, u), normal], axis=1), fitted[:, 2:]
 
 
 def _positions(

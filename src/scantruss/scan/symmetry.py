@@ -12,16 +12,21 @@ from scipy.spatial import cKDTree
 from ..errors import InputError
 
 SYMMETRY_TOLERANCE = 0.1  #: by how far 95 % of a scan may lie off its mirror image [member lengths]
-CELLS_ACROSS = 60  #: of the cells in each of which one place stands for the scan, along its longest side
-FEWEST_MIRRORED_PLACES = 50  #: from which a symmetry can be told
-TRIED = 400  #: places with which a plane is tried first
+CELLS_ACROSS = 45  #: of the cells in each of which one place stands for the scan, along its longest side
+FEWEST_OF_SYMMETRY = 50  #: from which a symmetry can be told
+PLACES_TRIED = 300  #: places with which a plane is tried first
 TURN_STEP = 2.0  #: between the directions tried about each principal axis [degree]
-REFINED = 12  #: planes that are refined
-APART = 5.0  #: of two planes [degree]
-PLANE_REFINEMENTS = 15  #: Gauss-Newton steps of a plane
+PLANES_REFINED = 8  #: planes that are refined
+PLANES_APART = 5.0  #: of two planes [degree]
+PLANE_STEPS = 10  #: Gauss-Newton steps of a plane
 NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
-QUANTILE = 0.95  #: of the places, which the misfit holds for
-MOST_FOLD = 6  #: mirror planes through one axis that are kept
+IMAGE_QUANTILE = 0.95  #: of the places, which the misfit holds for
+MORE_PLANES = 0.25  #: of the tolerance, which planes besides the best must keep
+MOST_FOLD = (
+    3  #: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
+)
+LEAST_ACROSS_AXES = 0.3  #: sine of the angle of an axis to the normal of a plane through it, beyond which it is tried
+ROUGHLY = 20.0  #: tolerances within which a plane is worth refining
 CONFORMING = 2.0  #: by how far planes through one axis may be off equal angles [degree]
 
 
@@ -76,7 +81,7 @@ def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlan
     found = sorted((_refined(places, normal, offset) for normal, offset in planes), key=lambda each: each[2])
     good: list[tuple[np.ndarray, float, float]] = []
     for each in found:
-        alone = all(abs(float(each[0] @ other[0])) < math.cos(math.radians(APART)) for other in good)
+        alone = all(abs(float(each[0] @ other[0])) < math.cos(math.radians(PLANES_APART)) for other in good)
         if each[2] <= tolerance and alone:
             good.append(each)
     if not good:
@@ -84,7 +89,7 @@ def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlan
             f"the scan has no mirror plane within {tolerance:.4g}, a tenth of a member: the best leaves 95 % of it within"
             f" {found[0][2]:.4g} of its image; leave --symmetry out"
         )
-    return _through_one_axis(places, good)
+    return _through_one_axis(places, good, MORE_PLANES * tolerance)
 
 
 def check_mirror_planes(
@@ -96,8 +101,7 @@ def check_mirror_planes(
     for number, row in enumerate(rows, 1):
         point, normal = np.array(row[:3], float), np.array(row[3:], float)
         normal = _oriented(normal / np.linalg.norm(normal))
-        off, _ = places.misfits(normal, float((point - places.origin) @ normal), np.arange(len(places.at)))
-        misfit = float(np.quantile(off, QUANTILE))
+        (misfit,) = _misfits_of(places, [MirrorPlane(_three(point), _three(normal), 0.0)])
         if misfit > tolerance:
             raise InputError(
                 f"the scan is not symmetric in mirror plane {number}: 95 % of it lie within {misfit:.4g} of its image, and"
@@ -106,7 +110,7 @@ def check_mirror_planes(
         planes.append(MirrorPlane(_three(point), _three(normal), misfit))
     normals = np.array([plane.normal for plane in planes])
     for k in range(1, len(planes)):
-        if np.abs(normals[:k] @ normals[k]).max() > math.cos(math.radians(APART)):
+        if np.abs(normals[:k] @ normals[k]).max() > math.cos(math.radians(PLANES_APART)):
             raise InputError(f"mirror plane {k + 1} is nearly one of those before; give each once")
     if len(planes) > 1 and _axis_of(normals) is None:
         raise InputError("several mirror planes must meet in one line at equal angles, such as two that are square")
@@ -121,7 +125,7 @@ def _places(points: np.ndarray) -> _Places:
     _, inverse = np.unique(keys @ [1, 1 << 20, 1 << 40], return_inverse=True)
     counts = np.bincount(inverse.ravel())
     at = np.stack([np.bincount(inverse.ravel(), points[:, k] - low[k]) / counts for k in range(3)], axis=1)
-    if len(at) < FEWEST_MIRRORED_PLACES:
+    if len(at) < FEWEST_OF_SYMMETRY:
         raise InputError(f"the scan has too few points for its symmetry to be told: {len(points):,}")
     middle = at.mean(axis=0)
     at -= middle
@@ -142,22 +146,22 @@ def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
             for k in range(3)
         ]
     )
-    tried = np.unique(np.linspace(0, len(places.at) - 1, TRIED).astype(np.int64))
+    tried = np.unique(np.linspace(0, len(places.at) - 1, PLACES_TRIED).astype(np.int64))
     score = np.array([np.minimum(places.misfits(n, 0.0, tried)[0], 3 * places.cell).mean() for n in normals])
     chosen: list[int] = []
     for k in np.argsort(score, kind="stable").tolist():
-        if all(abs(float(normals[k] @ normals[j])) < math.cos(math.radians(2 * APART)) for j in chosen):
+        if all(abs(float(normals[k] @ normals[j])) < math.cos(math.radians(2 * PLANES_APART)) for j in chosen):
             chosen.append(k)
-    return [(normals[k], 0.0) for k in chosen[:REFINED]]
+    return [(normals[k], 0.0) for k in chosen[:PLANES_REFINED]]
 
 
 def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float, float]:
     """Return a plane moved to where the scan is nearest to its image, and its misfit: iterated closest points to planes."""
     everything = np.arange(len(places.at))
-    for _ in range(PLANE_REFINEMENTS):
+    for _ in range(PLANE_STEPS):
         off, nearest = places.misfits(normal, offset, everything)
         use = off < NEAR_CELLS * places.cell
-        if use.sum() < FEWEST_MIRRORED_PLACES:
+        if use.sum() < FEWEST_OF_SYMMETRY:
             break
         at, target, across = places.at[use], places.at[nearest[use]], places.normals[nearest[use]]
         height = at @ normal - offset
@@ -172,24 +176,48 @@ def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.nda
         normal = turned / np.linalg.norm(turned)
     off, _ = places.misfits(normal, offset, everything)
     sign = 1.0 if np.array_equal(_oriented(normal), normal) else -1.0
-    return sign * normal, sign * offset, float(np.quantile(off, QUANTILE))
+    return sign * normal, sign * offset, float(np.quantile(off, IMAGE_QUANTILE))
 
 
-def _through_one_axis(places: _Places, good: list[tuple[np.ndarray, float, float]]) -> tuple[MirrorPlane, ...]:
-    """Return the largest set of planes through one axis at equal angles, the best of them as it is; else the best alone."""
-    best, others = good[0], good[1:]
+def _through_one_axis(
+    places: _Places, good: list[tuple[np.ndarray, float, float]], tolerance: float
+) -> tuple[MirrorPlane, ...]:
+    """Return the largest set of planes through one axis at equal angles, the first as it is the best; else the best alone."""
+    best = good[0]
+    axes = [np.cross(best[0], each[0]) for each in good[1:]]
+    axes += [along - (along @ best[0]) * best[0] for along in np.linalg.eigh(places.at.T @ places.at)[1].T]
+    axes = [axis / np.linalg.norm(axis) for axis in axes if np.linalg.norm(axis) > LEAST_ACROSS_AXES]
+    everything = np.arange(len(places.at))
     for fold in range(MOST_FOLD, 1, -1):
-        for other in others:
-            axis = np.cross(best[0], other[0])
-            axis /= np.linalg.norm(axis)
+        for axis in axes:
             planes = [best]
-            for k in range(1, fold):
+            for k in range(1, fold):  # a surface of revolution has them at any angle
                 turned = _turned(best[0], axis, math.pi * k / fold)
-                near = [each for each in good if abs(float(each[0] @ turned)) > math.cos(math.radians(CONFORMING))]
-                planes += near[:1]
+                off, _ = places.misfits(turned, best[1] * float(turned @ best[0]), everything)
+                if np.quantile(off, IMAGE_QUANTILE) > ROUGHLY * tolerance:
+                    break
+                each = _refined(places, turned, best[1] * float(turned @ best[0]))
+                if each[2] > tolerance or abs(float(each[0] @ turned)) < math.cos(math.radians(CONFORMING)):
+                    break
+                planes.append(each)
             if len(planes) == fold:
-                return _exact(places, planes, axis)
+                exact = _exact(places, planes, axis)
+                checked = _misfits_of(places, exact)
+                if max(checked) <= tolerance:
+                    return exact
     return (_plane(places, *best),)
+
+
+def _misfits_of(places: _Places, planes: Sequence[MirrorPlane]) -> list[float]:
+    """Return the misfit of each of some planes."""
+    found = []
+    for plane in planes:
+        normal = np.array(plane.normal)
+        off, _ = places.misfits(
+            normal, float((np.array(plane.point) - places.origin) @ normal), np.arange(len(places.at))
+        )
+        found.append(float(np.quantile(off, IMAGE_QUANTILE)))
+    return found
 
 
 def _exact(places: _Places, planes: list[tuple[np.ndarray, float, float]], axis: np.ndarray) -> tuple[MirrorPlane, ...]:

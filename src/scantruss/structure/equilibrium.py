@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from .corotational import Members, Response, respond
 from .frame import freedoms, member_freedoms
 from .mechanism import softest_motion
-from .statics import ORDERING, SINGULAR, Factored, dead_loads
+from .statics import IN_ORDER, SINGULAR, Factored, dead_loads
 from .truss import LoadCase
 
 
@@ -151,11 +151,11 @@ class Equilibrium:
         values[self._diagonal] += self.springs[:, : self.width].ravel()[self.free]
         matrix = csc_matrix((values * self._scale, self._row, self._first), shape=(len(self.free),) * 2)
         try:
-            lu = splu(matrix, **ORDERING)
+            lu = splu(matrix, **IN_ORDER)
             if (lu.perm_r != lu.perm_c).any():
                 raise RuntimeError("a pivot is off the diagonal")
         except RuntimeError:  # singular, or nearly so: take the next matrix
-            lu = splu((matrix + SINGULAR / 10 * identity(len(self.free))).tocsc(), **ORDERING)
+            lu = splu((matrix + SINGULAR / 10 * identity(len(self.free))).tocsc(), **IN_ORDER)
         return Tangent(matrix, lu, self.root)
 
     def direction(self, response: Response) -> np.ndarray:

@@ -142,7 +142,9 @@ def solve_path(
     case = combined_case(truss, modes.of)
     last = stop_factor or (MULTIPLE * linear if linear else UNBUCKLED_FACTOR)
     found: Path | None = None
-    for shape in imperfection_of(truss, imperfection, modes):
+    shapes = list(imperfection_of(truss, imperfection, modes))
+    factored = replace(factored, factor=None)  # as large as a tangent, of which several are kept
+    for shape in shapes:
         limit = found.limit_factor if found else None
         end = last if limit is None else min(last, limit)
         bent = truss.replace(nodes=shape.perfect + shape.moves)
@@ -201,6 +203,7 @@ class _Walk:
         self.soft = self._norm(here.towards)
         while done < self.steps:  # each turn takes a step, or the path ends
             for cut in range(CUTS + 1):
+                step = None  # lets go of its tangent
                 step = self._step(here, back, arc)
                 if step is not None and (cut >= SMOOTH_CUTS or self._is_smooth(here, step)):
                     break
@@ -209,6 +212,7 @@ class _Walk:
                 self.ended = f"no state of equilibrium was found beyond the factor {here.state.factor:.4g}"
                 return
             there, taken, work = step
+            del step
             done += 1
             if there.tangent.negative == 0 and there.state.factor >= self.end:
                 there = self._at_factor(here, taken, there)
@@ -287,6 +291,7 @@ class _Walk:
             if error <= BALANCED:
                 if to is None and taken @ (scale * first) <= 0:  # it has turned back
                     return None
+                tangent = here.tangent  # lets go of a newer one, which takes much memory
                 return self._place(state), taken, iteration + 4 * fresh
             if error > SLOW * before:
                 if fresh == TANGENTS:
@@ -328,7 +333,8 @@ class _Walk:
         low, high = 0.0, arc
         value = start = here.tangent.smallest
         beyond, beyond_factor, falls = there.tangent.smallest, there.state.factor, self._falls(there, taken)
-        last = here
+        last: tuple[LoadedState, int, float] | None = None  # without its tangent, which takes much memory
+        last_factor = here.state.factor
         kept: bool | None = None
         for _ in range(REFINEMENTS):
             share = value / (value - beyond)
@@ -341,18 +347,22 @@ class _Walk:
                 continue
             stable = found[0].tangent.negative == 0
             if stable:
-                low, last, value = middle, found[0], found[0].tangent.smallest
+                low, value = middle, found[0].tangent.smallest
+                last, last_factor = (found[0].state, found[0].tangent.negative, value), found[0].state.factor
                 beyond /= 2 if stable is kept else 1
             else:
                 high, beyond, beyond_factor = middle, found[0].tangent.smallest, found[0].state.factor
                 falls = self._falls(found[0], found[1])
                 value /= 2 if stable is kept else 1
             kept = stable
-            near = abs(beyond_factor - last.state.factor) < NEARLY_SAME[1] * abs(last.state.factor)
-            if last.tangent.smallest < CRITICAL * start or high - low < (NEARLY_SAME[0] if near else CRITICAL) * arc:
+            found = None
+            near = abs(beyond_factor - last_factor) < NEARLY_SAME[1] * abs(last_factor)
+            softest = here.tangent.smallest if last is None else last[2]
+            if softest < CRITICAL * start or high - low < (NEARLY_SAME[0] if near else CRITICAL) * arc:
                 break
-        if last is not here:
-            self._keep(last)
+        if last is not None:
+            self.states.append(last[0])
+            self.negative.append(last[1])
         self.critical = len(self.states) - 1
         self.kind = "limit point" if falls else "bifurcation"
 

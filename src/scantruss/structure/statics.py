@@ -23,11 +23,13 @@ from .frame import (
     transforms,
 )
 from .mechanism import refuse_mechanism, softest_motion
+from .ordering import dissected
 from .truss import GRAVITY, LoadCase, Truss
 
 SINGULAR = 1e-12  #: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
 STATIONS = 9  #: places along a member, both ends included, at which forces are given
 ORDERING = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+IN_ORDER = {**ORDERING, "permc_spec": "NATURAL"}  #: of displacements that are in a good order already
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,6 +200,7 @@ def factor_stiffness(truss: Truss) -> Factored:
     stiffness = stiffness_matrix(truss)
     held = np.isinf(truss.supports[:, : freedoms(truss)]).ravel()
     free = np.flatnonzero(~held)
+    free = free[np.argsort(dissected(truss)[free // freedoms(truss)], kind="stable")]
     if len(free) == 0:
         return Factored(truss, stiffness, free, np.ones(0), None)
     part = stiffness[free][:, free]
@@ -206,12 +209,12 @@ def factor_stiffness(truss: Truss) -> Factored:
     scale = diags(1.0 / root)
     scaled = (scale @ part @ scale).tocsc()
     try:
-        factor = splu(scaled, **ORDERING)
+        factor = splu(scaled, **IN_ORDER)
         small = float(np.abs(factor.U.diagonal()).min()) < SINGULAR
     except RuntimeError:  # a pivot is nil
         factor, small = None, True
     if small:
-        factor = splu((scaled + SINGULAR / 10 * identity(len(free))).tocsc(), **ORDERING)
+        factor = splu((scaled + SINGULAR / 10 * identity(len(free))).tocsc(), **IN_ORDER)
     value, motion = softest_motion(scaled, factor)
     if value < SINGULAR:
         everywhere = np.zeros(stiffness.shape[0])
