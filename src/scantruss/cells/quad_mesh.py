@@ -1,0 +1,118 @@
+"""Quads on the scan while they are improved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..grid.grid import Grid
+from ..improve.working_mesh import WorkingMesh
+from ..kernels.mesh.grid import INTERIOR, ON_CURVE
+from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
+from .fine_mesh import ALONG, AT_REST_THERE, FREE
+from .quad_settle import energy_of_quads, settle_quads
+
+import os
+LENGTHS, ANGLES = float(os.environ.get('QL','3.0')), float(os.environ.get('QA','0.5'))  # weights of lengths and of angles while quads are improved
+LAST_LENGTHS, LAST_ANGLES = 3.0, 0.5  # the same in the end
+STRIDE = 1.5  # over-relaxation
+ENOUGH = 2e-5  # gain of energy a node in a sweep below which nodes have settled
+
+
+def triangles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
+    """Return the triangles (T, 3) of quads (Q, 4), each cut along its shorter diagonal."""
+    a, b, c, d = (nodes[panels[:, k]] for k in range(4))
+    other = np.linalg.norm(b - d, axis=1) < np.linalg.norm(a - c, axis=1)
+    first = np.where(other[:, None], panels[:, [0, 1, 3]], panels[:, [0, 1, 2]])
+    second = np.where(other[:, None], panels[:, [1, 2, 3]], panels[:, [0, 2, 3]])
+    return np.stack([first, second], axis=1).reshape(-1, 3)
+
+
+class QuadMesh:
+    """Quads, the quads at each node, and where each node lies on the scan and the curves."""
+
+    def __init__(self, mesh: WorkingMesh, quads: np.ndarray, chains: np.ndarray) -> None:
+        net, count = mesh.net, mesh.net.used
+        room = count + max(count // 2, 64)
+        self.surface, self.curves, self.length = mesh.surface, mesh.curves, mesh.length
+        self.nodes = _room(net.nodes[:count], room)
+        kind = net.kind[:count]
+        self.held = _room(np.where(kind == INTERIOR, FREE, np.where(kind == ON_CURVE, ALONG, AT_REST_THERE)), room)
+        self.curve, self.arc = _room(net.curve[:count], room), _room(net.arc[:count], room)
+        self.patches = _room(mesh.patches[:count], room)
+        self.desired = _room(mesh.length * net.desired[:count], room)
+        self.fixed = _room(mesh.fixed[:count], room)
+        self.free = list(range(room - 1, count - 1, -1))
+        self.quads: list[list[int]] = quads.tolist()
+        self.at: list[set[int]] = [set() for _ in range(room)]
+        for q, corners in enumerate(self.quads):
+            for v in corners:
+                self.at[v].add(q)
+        self.chains = {tuple(sorted(pair)) for pair in chains.tolist()}
+
+    def live(self) -> np.ndarray:
+        """Return the quads that are there (Q, 4)."""
+        return np.array([corners for corners in self.quads if corners], np.int64)
+
+    def shares(self, quads: np.ndarray) -> np.ndarray:
+        """Return the weight of each side of some quads (Q, 4), which may have others beside them."""
+        if not self.chains:
+            return np.full(quads.shape, 0.5)
+        low = np.minimum(quads, np.roll(quads, -1, axis=1))
+        high = np.maximum(quads, np.roll(quads, -1, axis=1))
+        rows = [
+            [1.0 if len(self.at[a] & self.at[b]) == 1 else 0.5 for a, b in zip(x, y, strict=True)]
+            for x, y in zip(low.tolist(), high.tolist(), strict=True)
+        ]
+        return np.array(rows).reshape(-1, 4)
+
+    def settle(self, sweeps: int, lengths: float = LENGTHS, angles: float = ANGLES, stride: float = STRIDE, enough: float = ENOUGH) -> None:
+        """Move all nodes downhill."""
+        quads = self.live()
+        some = np.unique(quads)
+        self.settle_some(quads, some[self.held[some] != AT_REST_THERE], sweeps, lengths, angles, stride, enough)
+
+    def settle_some(
+        self, quads: np.ndarray, some: np.ndarray, sweeps: int, lengths: float = LENGTHS, angles: float = ANGLES,
+        stride: float = STRIDE, enough: float = ENOUGH, share: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
+        """Move some nodes downhill; all quads at them must be among those given."""
+        share = self.shares(quads) if share is None else share
+        flat = quads.ravel()
+        order = np.argsort(flat, kind="stable")
+        begin = np.searchsorted(flat[order], some)
+        end = np.searchsorted(flat[order], some, side="right")
+        start = np.concatenate([[0], np.cumsum(end - begin)])
+        of = np.concatenate([order[b:e] for b, e in zip(begin.tolist(), end.tolist(), strict=True)]) // 4 if len(some) else np.zeros(0, np.int64)
+        settle_quads(
+            self.nodes, quads, share, of, start, some, self.held, self.curve, self.arc, self.patches, self.curves,
+            self.desired, lengths, angles, sweeps, stride, enough,
+        )  # fmt: skip
+
+    def energies(self, quads: np.ndarray, share: np.ndarray | None = None, lengths: float = LENGTHS, angles: float = ANGLES) -> np.ndarray:
+        """Return the energy of each quad (Q,)."""
+        out = np.zeros(len(quads))
+        share = self.shares(quads) if share is None else share
+        energy_of_quads(self.nodes, quads, share, self.patches, self.desired, lengths, angles, out)
+        return out
+
+    def renew(self, near: float) -> None:
+        """Fit a new patch to each node farther from the centre of its own than `near` members."""
+        used = np.unique(self.live())
+        away = np.linalg.norm(self.nodes[used] - self.patches[used, CENTRE : CENTRE + 3], axis=1)
+        for v in used[away > near * self.desired[used]].tolist():
+            fit_patch(self.surface, self.patches[v], int(self.patches[v, NEAREST_SAMPLE]), tuple(self.nodes[v].tolist()))
+
+    def grid(self, like: Grid) -> Grid:
+        """Return the triangles of the quads as a grid; node numbers change."""
+        quads = self.live()
+        kept, inverse = np.unique(quads, return_inverse=True)
+        panels = inverse.reshape(-1, 4).astype(np.int64)
+        nodes = self.nodes[kept]
+        return like.replace(nodes=nodes, triangles=triangles_of(nodes, panels), fixed=self.fixed[kept], lines=np.zeros((0, 2), np.int64), line_sets=(), deviation=None, desired=None), panels
+
+
+def _room(values: np.ndarray, room: int) -> np.ndarray:
+    """Return a copy with room for more rows."""
+    more = np.zeros((room, *values.shape[1:]), values.dtype)
+    more[: len(values)] = values
+    return more
