@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from .boundary.find import find_boundary
+from .cells.make import with_cells
 from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
@@ -188,7 +189,8 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
-    return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)  # certificate
+    best = best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)  # certificate
+    return with_cells(best, samples, boundary, constraints, settings, progress=progress)  # quads, hexagons
 
 
 class Stopwatch:

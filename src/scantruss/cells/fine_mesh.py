@@ -9,7 +9,7 @@ import numpy as np
 
 from ..grid.grid import Grid
 from ..improve.working_mesh import WorkingMesh
-from ..kernels.boundary.curves import nearest_on_curves
+from ..kernels.boundary.curves import at_arc, nearest_on_curves
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import onto_patch
 
@@ -117,8 +117,6 @@ def fine_mesh(grid: Grid, mesh: WorkingMesh, parts: int) -> FineMesh:
 
 def _onto_curves(nodes: np.ndarray, some: np.ndarray, mesh: WorkingMesh, grid: Grid) -> None:
     """Put some nodes onto the nearest curve, where one is near."""
-    from ..kernels.boundary.curves import at_arc
-
     for v in some.tolist():
         curve, arc, distance = nearest_on_curves(mesh.curves, *nodes[v].tolist())
         if curve >= 0 and distance < 0.35 * mesh.length:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..grid.grid import Grid
+from ..grid.panels import triangles_of
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
@@ -16,15 +17,6 @@ LENGTHS, ANGLES = float(os.environ.get('QL','3.0')), float(os.environ.get('QA','
 LAST_LENGTHS, LAST_ANGLES = 3.0, 0.5  # the same in the end
 STRIDE = 1.5  # over-relaxation
 ENOUGH = 2e-5  # gain of energy a node in a sweep below which nodes have settled
-
-
-def triangles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
-    """Return the triangles (T, 3) of quads (Q, 4), each cut along its shorter diagonal."""
-    a, b, c, d = (nodes[panels[:, k]] for k in range(4))
-    other = np.linalg.norm(b - d, axis=1) < np.linalg.norm(a - c, axis=1)
-    first = np.where(other[:, None], panels[:, [0, 1, 3]], panels[:, [0, 1, 2]])
-    second = np.where(other[:, None], panels[:, [1, 2, 3]], panels[:, [0, 2, 3]])
-    return np.stack([first, second], axis=1).reshape(-1, 3)
 
 
 class QuadMesh:
@@ -103,12 +95,20 @@ class QuadMesh:
             fit_patch(self.surface, self.patches[v], int(self.patches[v, NEAREST_SAMPLE]), tuple(self.nodes[v].tolist()))
 
     def grid(self, like: Grid) -> Grid:
-        """Return the triangles of the quads as a grid; node numbers change."""
+        """Return the quads as a grid with all else as in another; nodes without a quad are dropped."""
         quads = self.live()
         kept, inverse = np.unique(quads, return_inverse=True)
         panels = inverse.reshape(-1, 4).astype(np.int64)
         nodes = self.nodes[kept]
-        return like.replace(nodes=nodes, triangles=triangles_of(nodes, panels), fixed=self.fixed[kept], lines=np.zeros((0, 2), np.int64), line_sets=(), deviation=None, desired=None), panels
+        made = like.replace(
+            nodes=nodes, triangles=triangles_of(nodes, panels), panels=panels, fixed=self.fixed[kept],
+            lines=np.zeros((0, 2), np.int64),
+        )  # fmt: skip
+        number = np.full(len(self.nodes), -1)
+        number[kept] = np.arange(len(kept))
+        chains = np.sort(number[np.array(sorted(self.chains), np.int64).reshape(-1, 2)], axis=1)
+        count, single = len(kept), made.edges[made.edge_uses == 1]
+        return made.replace(lines=chains[~np.isin(chains @ [count, 1], single @ [count, 1])])
 
 
 def _room(values: np.ndarray, room: int) -> np.ndarray:

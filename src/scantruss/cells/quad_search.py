@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .fine_mesh import ALONG, AT_REST_THERE, FREE
@@ -10,7 +12,7 @@ from .quad_mesh import QuadMesh
 SETTLED_RINGS = 2  # rings of quads around a move whose nodes settle in a trial
 TRIAL_SWEEPS = 8  # sweeps of a trial
 LEAST_GAIN = 1e-3  # least energy that a move must gain
-ROUNDS = 6  # most rounds of the search
+ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # most rounds of the search
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
 MOST_MEMBERS = 6  # most members at a node inside
 
@@ -333,16 +335,16 @@ class Search:
         return self.kept - kept
 
 
-def search_quads(mesh: QuadMesh) -> None:
+def search_quads(mesh: QuadMesh, effort: str, report: Callable[[float], None]) -> None:
     """Search until no move is kept, in rounds, and settle after each."""
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS[effort]):
+        report(0.3 + 0.6 * number / ROUNDS[effort])
         quads = mesh.live()
         price = float(min(mesh.energies(quads).mean(), 0.25))
         search = Search(mesh, price)
         kept = search.round()
         mesh.renew(0.4)
         mesh.settle(30)
-        print("kept", kept, "of", search.trials, "energy", mesh.energies(mesh.live()).mean().round(4))
         if kept == 0:
             break
 

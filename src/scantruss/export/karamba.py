@@ -31,7 +31,7 @@ def encode_karamba(model: Model, style: FileStyle) -> bytes:
         "points": model.nodes.tolist(),
         "point_ids": list(model.node_marks),
         "elements": elements,
-        "panels": model.triangles.tolist(),
+        "panels": model.panel_loops,
         "supports": [_support(model, node) for node in model.supported.tolist()],
     }
     if model.truss is not None:

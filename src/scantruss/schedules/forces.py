@@ -62,6 +62,7 @@ def grid_of_structure(truss: Truss) -> tuple[Grid, np.ndarray]:
     grid = Grid(
         nodes=truss.nodes / truss.scale,
         triangles=truss.triangles,
+        panels=truss.panels,
         fixed=np.zeros(len(truss.nodes), bool),
         origin=truss.origin / truss.scale,
         unit="m",

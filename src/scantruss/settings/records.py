@@ -16,6 +16,7 @@ from ..selection import FORMS, RETURNS
 SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
 SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
+CELLS = ("triangle", "quad", "hexagon")
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
@@ -91,6 +92,7 @@ class MemberSettings(_Checked):
         "member lengths that vary over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
         unit="scan unit",
     )
+    cells: str = _setting("triangle", "what the panels are: triangles, quads or hexagons", choices=CELLS)
     method: str = _setting("default", "default: the improved method; paper: the paper to the letter", choices=METHODS)
     effort: str = _setting(
         "normal",
