@@ -86,14 +86,12 @@ class _Collapsing:
         if self.held[b] == AT_REST_THERE or not at_edge or (self.held[b] != FREE and not on_chain):
             return False
         around_a, around_b = self.neighbours(a), self.neighbours(b)
-        if len(around_a & around_b) != len(at_edge) or len(around_a | around_b) < 5:
+        if len(around_a & around_b) != len(at_edge) or len(around_a | around_b) < 3 + len(at_edge):
             return False
         if on_chain and len(self.chain[a] & self.chain[b]):
             return False
         gone = {v for t in at_edge for v in self.triangles[t] or ()} - {a, b}
-        if any(len(self.of_node[v]) <= (2 if self.chain[v] else 3) for v in gone if len(self.of_node[v]) > 1) and any(
-            not self.chain[v] and len(self.of_node[v]) <= 3 for v in gone
-        ):
+        if any(not self.chain[v] and len(self.of_node[v]) <= 3 for v in gone):  # two triangles would lie on each other
             return False
         if any(len(self.of_node[v]) <= 1 for v in gone):  # a triangle at a corner stays
             return False
@@ -118,7 +116,9 @@ class _Collapsing:
         root = np.array([self.find(v) for v in range(len(self.into))])
         kept, inverse = np.unique(root, return_inverse=True)
         held = self.mesh.held[kept]
-        mean = np.stack([np.bincount(inverse, places[:, k]) for k in range(3)], axis=1) / np.bincount(inverse)[:, None]
+        counts = (self.mesh.held == held[inverse]).astype(float)  # a node of the boundary stays there
+        mean = np.stack([np.bincount(inverse, counts * places[:, k]) for k in range(3)], axis=1)
+        mean /= np.bincount(inverse, counts)[:, None]
         nodes = np.where((held == AT_REST_THERE)[:, None], self.mesh.nodes[kept], mean)
         number = np.full(len(self.into), -1)
         number[kept] = np.arange(len(kept))

@@ -7,14 +7,12 @@ import numpy as np
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
 from ..improve.working_mesh import WorkingMesh
+from ..kernels.cells.quads import energy_of_quads, settle_quads, try_quads
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
 from .fine_mesh import ALONG, AT_REST_THERE, FREE
-from .quad_settle import energy_of_quads, settle_quads
 
-import os
-LENGTHS, ANGLES = float(os.environ.get('QL','3.0')), float(os.environ.get('QA','0.5'))  # weights of lengths and of angles while quads are improved
-LAST_LENGTHS, LAST_ANGLES = 3.0, 0.5  # the same in the end
+LENGTHS, ANGLES = 3.0, 0.55  # weights of lengths and of angles in the energy
 STRIDE = 1.5  # over-relaxation
 ENOUGH = 2e-5  # gain of energy a node in a sweep below which nodes have settled
 
@@ -39,6 +37,7 @@ class QuadMesh:
         for q, corners in enumerate(self.quads):
             for v in corners:
                 self.at[v].add(q)
+        self.degree = np.array([len(each) for each in self.at], np.int64)
         self.chains = {tuple(sorted(pair)) for pair in chains.tolist()}
 
     def live(self) -> np.ndarray:
@@ -46,16 +45,10 @@ class QuadMesh:
         return np.array([corners for corners in self.quads if corners], np.int64)
 
     def shares(self, quads: np.ndarray) -> np.ndarray:
-        """Return the weight of each side of some quads (Q, 4), which may have others beside them."""
-        if not self.chains:
-            return np.full(quads.shape, 0.5)
-        low = np.minimum(quads, np.roll(quads, -1, axis=1))
-        high = np.maximum(quads, np.roll(quads, -1, axis=1))
-        rows = [
-            [1.0 if len(self.at[a] & self.at[b]) == 1 else 0.5 for a, b in zip(x, y, strict=True)]
-            for x, y in zip(low.tolist(), high.tolist(), strict=True)
-        ]
-        return np.array(rows).reshape(-1, 4)
+        """Return the weight of each side of all quads (Q, 4)."""
+        count, (start, end) = len(self.nodes), (quads, np.roll(quads, -1, axis=1))
+        twice = np.isin(start * count + end, end * count + start)
+        return np.where(twice, 0.5, 1.0)
 
     def settle(self, sweeps: int, lengths: float = LENGTHS, angles: float = ANGLES, stride: float = STRIDE, enough: float = ENOUGH) -> None:
         """Move all nodes downhill."""
@@ -86,6 +79,16 @@ class QuadMesh:
         share = self.shares(quads) if share is None else share
         energy_of_quads(self.nodes, quads, share, self.patches, self.desired, lengths, angles, out)
         return out
+
+    def try_quads(
+        self, before: list[list[int]], after: list[list[int]], rim: np.ndarray, sweeps: int, join: int = -1, joined: int = -1
+    ) -> float:  # fmt: skip
+        """Return by how much the energy grows where some quads replace others; the nodes around stay where they have settled."""
+        grown: float = try_quads(
+            self.nodes, np.array(before), np.array(after), self.degree, rim, self.held, self.curve, self.arc, self.patches,
+            self.curves, self.desired, LENGTHS, ANGLES, sweeps, STRIDE, ENOUGH, join, joined,
+        )  # fmt: skip
+        return grown
 
     def renew(self, near: float) -> None:
         """Fit a new patch to each node farther from the centre of its own than `near` members."""

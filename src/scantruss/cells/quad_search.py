@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +12,22 @@ from .quad_mesh import QuadMesh
 
 SETTLED_RINGS = 2  # rings of quads around a move whose nodes settle in a trial
 TRIAL_SWEEPS = 8  # sweeps of a trial
+BARRIER = 0.6  # most energy that the first of two moves may cost
 LEAST_GAIN = 1e-3  # least energy that a move must gain
 ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # most rounds of the search
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
 MOST_MEMBERS = 6  # most members at a node inside
 
 
+#: kind, nodes touched, new corners of quads (-1: a new quad), quads more, the nodes merged or split
+Move = tuple[str, set[int], dict[int, list[int]], int, Any]
+
+
 class Search:
     """A search over a mesh of quads."""
 
-    def __init__(self, mesh: QuadMesh, price: float) -> None:
+    def __init__(self, mesh: QuadMesh, price: float, far: bool = False) -> None:
+        self.far = far  # whether moves that cost energy are followed by another
         self.mesh = mesh
         self.price = price  # energy of a quad more or less
         self.kept = self.trials = 0
@@ -74,13 +81,12 @@ class Search:
                 on[a] = on[b] = True
         return on
 
-    def around(self, nodes: set[int], rings: int) -> tuple[list[int], set[int]]:
-        """Return the quads within some rings of nodes, and the nodes inside these rings."""
+    def around(self, nodes: set[int], rings: int) -> list[int]:
+        """Return the quads within some rings of nodes."""
         mesh, inner = self.mesh, set(nodes)
         for _ in range(rings - 1):
             inner |= {v for u in inner for q in mesh.at[u] for v in mesh.quads[q]}
-        found = sorted({q for v in inner for q in mesh.at[v]})
-        return found, inner
+        return sorted({q for v in inner for q in mesh.at[v]})
 
     def is_chain(self, a: int, b: int) -> bool:
         return (min(a, b), max(a, b)) in self.mesh.chains
@@ -154,7 +160,7 @@ class Search:
     def splits(self, v: int) -> list[tuple]:
         """Changes that split a node inside in two, with a quad between them."""
         mesh = self.mesh
-        if self.rim[v] or mesh.held[v] != FREE or not mesh.free or any(self.is_chain(v, w) for w in self.ring_of(v) or []):
+        if self.rim[v] or mesh.held[v] != FREE or not mesh.free or not mesh.at[v] or any(self.is_chain(v, w) for w in self.ring_of(v) or []):
             return []
         ring = self.ring_of(v)
         if ring is None:
@@ -214,51 +220,88 @@ class Search:
 
     # trials -----------------------------------------------------------------------------------------------------------
 
-    def try_move(self, move: tuple | None) -> bool:
-        """Make a move and settle around it; take it back unless the energy falls."""
+    def try_move(self, move: Move | None, allowed: float = -LEAST_GAIN) -> float | None:
+        """Make a move and settle around it; take it back unless the energy grows by less than `allowed`; return by how much if it stays."""
         if move is None:
-            return False
+            return None
         kind, touched, new, grown, pair = move
         mesh = self.mesh
         self.trials += 1
         old_nodes = {v for v in touched if mesh.at[v]} | ({pair[1]} if kind == "collapse" else set())
-        ids, _ = self.around(old_nodes, SETTLED_RINGS)
-        before_quads = np.array([mesh.quads[q] for q in ids])
-        before = float(mesh.energies(before_quads).sum())
-        everything = np.unique(before_quads)
-        saved_nodes, saved_arc = mesh.nodes[everything].copy(), mesh.arc[everything].copy()
+        ids = self.around(old_nodes, SETTLED_RINGS)
+        before = [mesh.quads[q] for q in ids]
+        places = np.array(sorted({v for corners in before for v in corners}), np.int64)
+        kept = places, mesh.nodes[places], mesh.arc[places]
         undo = self._apply(new)
-        if kind == "collapse":
-            a, c = pair
-            if mesh.held[a] == FREE:
-                mesh.nodes[a] = 0.5 * (mesh.nodes[a] + mesh.nodes[c])
-        elif kind == "split":
-            v, fresh = pair
+        if kind == "split":
             mesh.free.pop()
-            self._new_node(v, fresh)
-        after_ids = [q for q in ids if mesh.quads[q]] + [q for q in undo[1]]
-        quads = np.array([mesh.quads[q] for q in after_ids])
-        count = np.bincount(quads.ravel(), minlength=len(mesh.at))
-        some = np.array([v for v in np.unique(quads).tolist() if count[v] == len(mesh.at[v]) and mesh.held[v] != AT_REST_THERE], np.int64)
-        share = mesh.shares(quads)
-        mesh.settle_some(quads, some, TRIAL_SWEEPS, share=share)
-        after = float(mesh.energies(quads, share).sum())
-        if after < before + grown * self.price - LEAST_GAIN:
-            self.kept += 1
-            self.clock += 1
-            for v in np.unique(quads).tolist():
-                self.stamp[v] = self.clock
-            if kind == "collapse":
-                mesh.free.append(pair[1])
-                mesh.held[pair[1]] = FREE
-            if kind == "split":
-                self.ideals[pair[1]] = 4
-            return True
+            self._new_node(*pair)
+        after = [mesh.quads[q] for q in [*ids, *undo[1]] if mesh.quads[q]]
+        joins = pair if kind == "collapse" else (-1, -1)
+        growth = mesh.try_quads(before, after, self.rim, TRIAL_SWEEPS, *joins) - grown * self.price
+        self.last = kind, pair, undo, kept, [*places.tolist(), *touched]
+        if growth >= allowed:
+            self.take_back(self.last)
+            return None
+        if kind == "collapse":
+            mesh.free.append(pair[1])
+        elif kind == "split":
+            self.ideals[pair[1]] = 4
+        return growth
+
+    def take_back(self, made: tuple[Any, ...]) -> None:
+        """Take the last move back."""
+        kind, pair, undo, (places, nodes, arc), _ = made
+        mesh = self.mesh
         self._undo(undo)
         if kind == "split":
             mesh.free.append(pair[1])
-        mesh.nodes[everything], mesh.arc[everything] = saved_nodes, saved_arc
+        elif kind == "collapse" and mesh.free and mesh.free[-1] == pair[1]:
+            mesh.free.pop()
+        mesh.nodes[places], mesh.arc[places] = nodes, arc
+
+    def note(self, touched: Iterable[int]) -> None:
+        """Note that a move is kept: what was tried around it may be tried again."""
+        self.kept += 1
+        self.clock += 1
+        for v in touched:
+            self.stamp[v] = self.clock
+
+    def try_for_good(self, move: Move | None) -> bool:
+        """Make a move if the energy falls."""
+        growth = self.try_move(move, BARRIER if self.far else -LEAST_GAIN)
+        if growth is None:
+            return False
+        first = self.last
+        if growth < -LEAST_GAIN:
+            self.note(first[4])
+            return True
+        for then in self.moves_after(move):
+            if self.try_move(then, -growth - LEAST_GAIN) is not None:
+                self.note([*first[4], *self.last[4]])
+                return True
+        self.take_back(first)
         return False
+
+    def moves_after(self, move: Move) -> Iterator[Move]:
+        """Yield the moves that may follow one: turns and collapses at the nodes that it has made irregular."""
+        mesh = self.mesh
+        odd = [v for v in sorted(move[1]) if mesh.at[v] and self.charge(v)]
+        seen = set()
+        for v in odd:
+            for q in sorted(mesh.at[v]):
+                corners = mesh.quads[q]
+                for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+                    for way in (1, 2):
+                        if (key := (min(a, b), max(a, b), way)) not in seen and v in (a, b):
+                            seen.add(key)
+                            if (found := self.turn(*key)) is not None:
+                                yield found
+                for k in (0, 1):
+                    if (q, k) not in seen:
+                        seen.add((q, k))
+                        if mesh.quads[q] and (found := self.collapse(q, k)) is not None:
+                            yield found
 
     def _new_node(self, v: int, fresh: int) -> None:
         mesh = self.mesh
@@ -278,10 +321,12 @@ class Search:
             old[q] = mesh.quads[q]
             for v in mesh.quads[q]:
                 mesh.at[v].discard(q)
+                mesh.degree[v] -= 1
         for q, corners in zip(old, new.values(), strict=True):
             mesh.quads[q] = corners
             for v in corners:
                 mesh.at[v].add(q)
+                mesh.degree[v] += 1
         return old, fresh
 
     def _undo(self, undo: tuple[dict[int, list[int]], list[int]]) -> None:
@@ -289,10 +334,12 @@ class Search:
         for q in old:
             for v in mesh.quads[q]:
                 mesh.at[v].discard(q)
+                mesh.degree[v] -= 1
         for q, corners in old.items():
             mesh.quads[q] = corners
             for v in corners:
                 mesh.at[v].add(q)
+                mesh.degree[v] += 1
         for _ in fresh:
             mesh.quads.pop()
 
@@ -316,7 +363,7 @@ class Search:
                 for k in (0, 1):
                     corners = mesh.quads[q]
                     if corners and self.untried(("c", q, k), corners):
-                        self.try_move(self.collapse(q, k))
+                        self.try_for_good(self.collapse(q, k))
             sides = {
                 (min(a, b), max(a, b))
                 for q in mesh.at[v]
@@ -325,12 +372,12 @@ class Search:
             for a, b in sorted(sides):
                 for way in (1, 2):
                     if self.untried(("t", a, b, way), [a, b]):
-                        self.try_move(self.turn(a, b, way))
+                        self.try_for_good(self.turn(a, b, way))
             if mesh.at[v]:
                 for w in [v, *(self.ring_of(v) or [])] if not self.rim[v] else [v]:
                     if self.untried(("s", w), [w]):
                         for _, _, _, i, span in self.splits(w):
-                            if self.try_move(self.split(w, i, span)):
+                            if self.try_for_good(self.split(w, i, span)):
                                 break
         return self.kept - kept
 
@@ -338,10 +385,10 @@ class Search:
 def search_quads(mesh: QuadMesh, effort: str, report: Callable[[float], None]) -> None:
     """Search until no move is kept, in rounds, and settle after each."""
     for number in range(ROUNDS[effort]):
-        report(0.3 + 0.6 * number / ROUNDS[effort])
+        report(number / ROUNDS[effort])
         quads = mesh.live()
         price = float(min(mesh.energies(quads).mean(), 0.25))
-        search = Search(mesh, price)
+        search = Search(mesh, price, far=number > 0 and effort != 'quick')
         kept = search.round()
         mesh.renew(0.4)
         mesh.settle(30)

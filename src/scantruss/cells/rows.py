@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, identity
@@ -19,10 +20,15 @@ from .fine_mesh import AT_REST_THERE, FREE, FineMesh
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
 LATTICE_TURNS = 30  # the same of the lattice
-DIFFUSION = 0.7  # square of the distance over which a turn diffuses directions [members]
-LATTICE_DIFFUSION = 0.7  # the same of the lattice
 HELD_WEIGHT = 30.0  # weight of what the boundary and lines ask of the lattice, against one edge
 LEAST_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
+
+
+class RowStart(NamedTuple):
+    """Squares of the distances over which a turn diffuses [members]: where they are large, irregular nodes are fewer."""
+
+    directions: float
+    lattice: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +43,13 @@ class Rows:
     offset: np.ndarray  #: (F, 2) way to the nearest node of the lattice in the axes of the node [members]
 
 
-def find_rows(mesh: FineMesh, guide: tuple[np.ndarray, np.ndarray] | None = None) -> Rows:
+def find_rows(mesh: FineMesh, start: RowStart, guide: tuple[np.ndarray, np.ndarray] | None = None) -> Rows:
     """Return the rows of quads on a fine mesh.
 
     Parameters
     ----------
     mesh : FineMesh
+    start : RowStart
     guide : (F, 3) directions and (F,) their weights, optional
         Directions that the rows should follow inside.
     """
@@ -50,12 +57,12 @@ def find_rows(mesh: FineMesh, guide: tuple[np.ndarray, np.ndarray] | None = None
     i, j = mesh.edges.T
     way = mesh.nodes[j] - mesh.nodes[i]
     bend = np.arctan2(_dot(way, second[j]), _dot(way, first[j])) - np.arctan2(_dot(way, second[i]), _dot(way, first[i]))
-    angle = _directions(mesh, first, second, bend, guide)
+    angle = _directions(mesh, first, second, bend, start.directions, guide)
     along = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
     across = np.cross(mesh.normals, along)
     turn, step = _passage(-way, along[i], across[i], along[j], across[j], mesh.length[i], mesh.length[j])
     step = -step
-    offset = _offsets(_lattice(mesh, along, across, turn, step))
+    offset = _offsets(_lattice(mesh, along, across, turn, step, start.lattice))
     return Rows(angle, along, across, turn, step, offset)
 
 
@@ -124,6 +131,7 @@ def _directions(
     first: np.ndarray,
     second: np.ndarray,
     bend: np.ndarray,
+    diffusion: float,
     guide: tuple[np.ndarray, np.ndarray] | None,
 ) -> np.ndarray:
     """Return the angle of the first axis in the frame of each node (F,)."""
@@ -151,7 +159,7 @@ def _directions(
         aim[0], strength[0] = 1.0, 1e-3
     pull = csc_matrix((strength.astype(complex), (np.arange(count), np.arange(count))), shape=(count, count))
     field = splu(laplacian + pull + 1e-9 * identity(count)).solve(strength * aim)
-    rate = 1.0 / DIFFUSION
+    rate = 1.0 / diffusion
     solver = splu((laplacian + pull + rate * identity(count)).tocsc())
     for _ in range(DIRECTION_TURNS):
         unit = field / np.maximum(np.abs(field), 1e-300)
@@ -160,11 +168,12 @@ def _directions(
 
 
 def _lattice(
-    mesh: FineMesh, along: np.ndarray, across: np.ndarray, turn: np.ndarray, step: np.ndarray
+    mesh: FineMesh, along: np.ndarray, across: np.ndarray, turn: np.ndarray, step: np.ndarray, diffusion: float
 ) -> np.ndarray:
     """Return the phases of the lattice at each node, in its axes, as cosine and sine (F, 2, 2)."""
     count, (i, j) = len(mesh.nodes), mesh.edges.T
-    rows, columns, values = [np.arange(4 * count)], [np.arange(4 * count)], [np.repeat(_degrees(mesh), 4).astype(float)]
+    degree = np.bincount(mesh.edges.ravel(), minlength=count)
+    rows, columns, values = [np.arange(4 * count)], [np.arange(4 * count)], [np.repeat(degree, 4).astype(float)]
     # coordinate p of the first node is coordinate `source` of the second, or its negative
     for p in (0, 1):
         source = (p + turn) % 2
@@ -195,7 +204,7 @@ def _lattice(
     held = pull * aim.ravel()
     extra = csc_matrix((pull, (np.arange(4 * count), np.arange(4 * count))), shape=matrix.shape)
     field = splu((matrix + extra + 1e-6 * identity(4 * count)).tocsc()).solve(held)
-    rate = 1.0 / LATTICE_DIFFUSION
+    rate = 1.0 / diffusion
     solver = splu((matrix + extra + rate * identity(4 * count)).tocsc())
     for _ in range(LATTICE_TURNS):
         pairs = field.reshape(-1, 2)
@@ -207,10 +216,6 @@ def _lattice(
 def _offsets(field: np.ndarray) -> np.ndarray:
     """Return the way to the nearest node of the lattice for phases (F, 2, 2) (F, 2) [members]."""
     return -np.arctan2(field[:, :, 1], field[:, :, 0]) / (2 * math.pi)
-
-
-def _degrees(mesh: FineMesh) -> np.ndarray:
-    return np.bincount(mesh.edges.ravel(), minlength=len(mesh.nodes))
 
 
 def offsets_of_edges(mesh: FineMesh, rows: Rows) -> np.ndarray:

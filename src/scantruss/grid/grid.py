@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PROVENANCE = {"settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
-    "_member_of_side", "half_edge_edges", "panel_loops",
+    "_member_of_side", "half_edge_edges", "panel_loops", "edge_panels", "panel_members",
 }  # fmt: skip
 
 

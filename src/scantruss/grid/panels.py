@@ -83,6 +83,21 @@ def corner_angles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
     return np.where(panels >= 0, angles, np.nan)
 
 
+def side_lengths_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
+    """Return the length of each side of panels, from node k to the next (P, K), NaN where there is none [scan unit]."""
+    found = np.full(panels.shape, np.nan)
+    start, end = sides_of(panels).T
+    found[panels >= 0] = np.linalg.norm(nodes[end] - nodes[start], axis=1)
+    return found
+
+
+def across_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
+    """Return the distance from each node of a panel to the next but one (P, K), NaN where it has no such node [scan unit]."""
+    size, column = sizes_of(panels)[:, None], np.arange(panels.shape[1])[None]
+    other = np.take_along_axis(panels, np.where(column < size, (column + 2) % size, 0), axis=1)
+    return np.where(panels >= 0, np.linalg.norm(nodes[panels] - nodes[other], axis=2), np.nan)
+
+
 def area_vectors_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
     """Return the area vector of each panel (P, 3), along its mean normal [scan unit^2]."""
     sides = sides_of(panels)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..kernels.mesh import figures
-from .panels import corner_angles_of, loops_of, sides_of
+from .panels import corner_angles_of, loops_of, panel_of_triangles, sides_of
 
 
 class GridTables:
@@ -116,6 +116,23 @@ class GridTables:
         two = count > 1
         table[two, 1] = triangle[order[start[two] + 1]]
         return table
+
+    @cached_property
+    def edge_panels(self) -> np.ndarray:
+        """(E, 2) the panels at each member, -1 where the boundary is."""
+        if self.panels is None:
+            return self.edge_triangles
+        owner = np.append(panel_of_triangles(self.panels), -1)
+        return owner[self.edge_triangles]
+
+    @cached_property
+    def panel_members(self) -> np.ndarray:
+        """(P, K) the member at each side of each panel, from its node k to the next, -1 where it has none."""
+        table = self.panel_table
+        sides, count = np.sort(sides_of(table), axis=1), max(len(self.nodes), 1)
+        found = np.full(table.shape, -1)
+        found[table >= 0] = np.searchsorted(self.edges @ [count, 1], sides @ [count, 1])
+        return found
 
     @cached_property
     def boundary_loops(self) -> list[np.ndarray]:

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from scantruss.runtime.jit import kernel
-from scantruss.kernels.boundary.curves import Curves, slide
-from scantruss.kernels.geometry.vectors import Vector, cross, dot, row, subtract, vector_in
-from scantruss.kernels.surface.local_surface import CENTRE, NORMAL, onto_patch
+from ...runtime.jit import kernel
+from ..boundary.curves import Curves, slide
+from ..geometry.vectors import Vector, cross, dot, row, subtract, vector_in
+from ..surface.local_surface import CENTRE, NORMAL, onto_patch
 
 FLAT = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
 QUAD_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
@@ -188,3 +188,81 @@ def energy_of_quads(
         out[q] = energy
         total += energy
     return total
+
+
+@kernel
+def shares_of(quads: np.ndarray, rim: np.ndarray, share: np.ndarray) -> None:
+    """Fill in the weight of each side of some quads (Q, 4): 1 on the boundary, 1/2 where another quad has it too or may have."""
+    count = 4 * len(quads)
+    for i in range(count):
+        q, k = i // 4, i % 4
+        a, b = quads[q, k], quads[q, (k + 1) % 4]
+        share[q, k] = 0.5
+        if rim[a] and rim[b]:
+            alone = True
+            for j in range(count):
+                p, m = j // 4, j % 4
+                alone = alone and not (quads[p, m] == b and quads[p, (m + 1) % 4] == a)
+            if alone:
+                share[q, k] = 1.0
+
+
+@kernel
+def try_quads(
+    nodes: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
+    degree: np.ndarray,
+    rim: np.ndarray,
+    held: np.ndarray,
+    curve: np.ndarray,
+    arc: np.ndarray,
+    patches: np.ndarray,
+    curves: Curves,
+    desired: np.ndarray,
+    lengths: float,
+    angles: float,
+    sweeps: int,
+    stride: float,
+    enough: float,
+    join: int,
+    joined: int,
+) -> float:
+    """Return by how much the energy of some quads grows that are put in the place of others, once their inner nodes have settled.
+
+    Parameters
+    ----------
+    before, after : (Q, 4) the quads around a move, without it and with it
+    degree : (V,) quads at each node after the move; nodes all of whose quads are among them settle
+    join, joined : node that another was merged with, which starts between them; -1 for none
+    """
+    share, out = np.empty((len(before), 4)), np.empty(len(before))
+    shares_of(before, rim, share)
+    old = energy_of_quads(nodes, before, share, patches, desired, lengths, angles, out)
+    if join >= 0 and held[join] == 0:
+        for k in range(3):
+            nodes[join, k] = 0.5 * (nodes[join, k] + nodes[joined, k])
+    count = len(after)
+    share, out = np.empty((count, 4)), np.empty(count)
+    shares_of(after, rim, share)
+    flat = after.copy().reshape(4 * count)
+    order = np.argsort(flat, kind="mergesort")
+    some, start, of = np.empty(4 * count, np.int64), np.zeros(4 * count + 1, np.int64), np.empty(4 * count, np.int64)
+    found, taken, i = 0, 0, 0
+    while i < 4 * count:  # each turn goes on to the next node
+        v, j = flat[order[i]], i
+        while j < 4 * count and flat[order[j]] == v:  # each turn goes on by a corner
+            j += 1
+        if j - i == degree[v] and held[v] < 2:
+            for k in range(i, j):
+                of[taken] = order[k] // 4
+                taken += 1
+            some[found] = v
+            found += 1
+            start[found] = taken
+        i = j
+    settle_quads(
+        nodes, after, share, of[:taken], start[: found + 1], some[:found], held, curve, arc, patches, curves,
+        desired, lengths, angles, sweeps, stride, enough,
+    )  # fmt: skip
+    return energy_of_quads(nodes, after, share, patches, desired, lengths, angles, out) - old
