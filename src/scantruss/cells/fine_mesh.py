@@ -65,18 +65,24 @@ def fine_mesh(grid: Grid, mesh: WorkingMesh, parts: int) -> FineMesh:
     within = count + on_edge.size + np.arange(len(triangles) * len(inner)).reshape(len(triangles), len(inner))
     share = np.arange(1, parts)[:, None] / parts
     of_edge = np.tile(np.concatenate([1 - share, share, 0 * share], axis=1), (len(edges), 1))
-    of_inner = np.tile(np.array([(parts - i - j, i, j) for i, j in inner], float).reshape(-1, 3) / parts, (len(triangles), 1))
+    of_inner = np.tile(
+        np.array([(parts - i - j, i, j) for i, j in inner], float).reshape(-1, 3) / parts, (len(triangles), 1)
+    )
     shares = np.concatenate([np.tile([1.0, 0.0, 0.0], (count, 1)), of_edge, of_inner])
-    owners = np.concatenate([
-        np.tile(np.arange(count)[:, None], 3),
-        np.repeat(edges[:, [0, 1, 0]], parts - 1, axis=0),
-        np.repeat(triangles, len(inner), axis=0),
-    ])
+    owners = np.concatenate(
+        [
+            np.tile(np.arange(count)[:, None], 3),
+            np.repeat(edges[:, [0, 1, 0]], parts - 1, axis=0),
+            np.repeat(triangles, len(inner), axis=0),
+        ]
+    )
     nodes = np.einsum("fc,fcx->fx", shares, grid.nodes[owners])
     own = owners[np.arange(len(owners)), shares.argmax(axis=1)]
 
     held = np.full(len(nodes), FREE)
-    held[:count] = np.where(net.kind[:count] == INTERIOR, FREE, np.where(net.kind[:count] == ON_CURVE, ALONG, AT_REST_THERE))
+    held[:count] = np.where(
+        net.kind[:count] == INTERIOR, FREE, np.where(net.kind[:count] == ON_CURVE, ALONG, AT_REST_THERE)
+    )
     chain = (grid.edge_uses == 1) | grid.edge_on_line
     held[on_edge[chain].ravel()] = ALONG
     for v in range(count, len(nodes)):

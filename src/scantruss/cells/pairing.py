@@ -29,16 +29,27 @@ def pairs_of(mesh: LatticeMesh) -> tuple[np.ndarray, np.ndarray]:
     a, b = one // 3, other // 3
     edges, each = len(one), len(triangles)
     matrix = csr_matrix(
-        (np.ones(2 * edges + each), (np.concatenate([a, b, np.arange(each)]), np.concatenate([np.tile(np.arange(edges), 2), edges + np.arange(each)]))),
+        (
+            np.ones(2 * edges + each),
+            (
+                np.concatenate([a, b, np.arange(each)]),
+                np.concatenate([np.tile(np.arange(edges), 2), edges + np.arange(each)]),
+            ),
+        ),
         shape=(each, edges + each),
     )
     found = linprog(
         np.concatenate([-gain, np.full(each, SINGLE_COST)]),
-        A_eq=matrix, b_eq=np.ones(each), bounds=(0.0, 1.0), method="highs-ds",
+        A_eq=matrix,
+        b_eq=np.ones(each),
+        bounds=(0.0, 1.0),
+        method="highs-ds",
     )
     value = found.x[:edges]
     is_free, taken = np.ones(each, np.bool_), np.zeros(edges, np.bool_)
-    for e in np.lexsort((-gain, -np.rint(4 * value))).tolist():  # the whole ones first, then of each odd ring all but one
+    for e in np.lexsort(
+        (-gain, -np.rint(4 * value))
+    ).tolist():  # the whole ones first, then of each odd ring all but one
         if is_free[a[e]] and is_free[b[e]] and (value[e] > 0.25 or gain[e] > 0.3):
             is_free[a[e]] = is_free[b[e]] = False
             taken[e] = True

@@ -12,9 +12,9 @@ from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
 from .fine_mesh import ALONG, AT_REST_THERE, FREE
 
-LENGTHS, ANGLES = 3.0, 0.55  # weights of lengths and of angles in the energy
-STRIDE = 1.5  # over-relaxation
-ENOUGH = 2e-5  # gain of energy a node in a sweep below which nodes have settled
+QUAD_LENGTHS, QUAD_ANGLES = 3.0, 0.55  # weights of lengths and of angles in the energy
+QUAD_RELAXATION = 1.5  # over-relaxation
+GAIN_AT_REST = 2e-5  # gain of energy a node in a sweep below which nodes have settled
 
 
 class QuadMesh:
@@ -50,15 +50,22 @@ class QuadMesh:
         twice = np.isin(start * count + end, end * count + start)
         return np.where(twice, 0.5, 1.0)
 
-    def settle(self, sweeps: int, lengths: float = LENGTHS, angles: float = ANGLES, stride: float = STRIDE, enough: float = ENOUGH) -> None:
+    def settle(
+        self,
+        sweeps: int,
+        lengths: float = QUAD_LENGTHS,
+        angles: float = QUAD_ANGLES,
+        stride: float = QUAD_RELAXATION,
+        enough: float = GAIN_AT_REST,
+    ) -> None:
         """Move all nodes downhill."""
         quads = self.live()
         some = np.unique(quads)
         self.settle_some(quads, some[self.held[some] != AT_REST_THERE], sweeps, lengths, angles, stride, enough)
 
     def settle_some(
-        self, quads: np.ndarray, some: np.ndarray, sweeps: int, lengths: float = LENGTHS, angles: float = ANGLES,
-        stride: float = STRIDE, enough: float = ENOUGH, share: np.ndarray | None = None,
+        self, quads: np.ndarray, some: np.ndarray, sweeps: int, lengths: float = QUAD_LENGTHS, angles: float = QUAD_ANGLES,
+        stride: float = QUAD_RELAXATION, enough: float = GAIN_AT_REST, share: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """Move some nodes downhill; all quads at them must be among those given."""
         share = self.shares(quads) if share is None else share
@@ -67,13 +74,23 @@ class QuadMesh:
         begin = np.searchsorted(flat[order], some)
         end = np.searchsorted(flat[order], some, side="right")
         start = np.concatenate([[0], np.cumsum(end - begin)])
-        of = np.concatenate([order[b:e] for b, e in zip(begin.tolist(), end.tolist(), strict=True)]) // 4 if len(some) else np.zeros(0, np.int64)
+        of = (
+            np.concatenate([order[b:e] for b, e in zip(begin.tolist(), end.tolist(), strict=True)]) // 4
+            if len(some)
+            else np.zeros(0, np.int64)
+        )
         settle_quads(
             self.nodes, quads, share, of, start, some, self.held, self.curve, self.arc, self.patches, self.curves,
             self.desired, lengths, angles, sweeps, stride, enough,
         )  # fmt: skip
 
-    def energies(self, quads: np.ndarray, share: np.ndarray | None = None, lengths: float = LENGTHS, angles: float = ANGLES) -> np.ndarray:
+    def energies(
+        self,
+        quads: np.ndarray,
+        share: np.ndarray | None = None,
+        lengths: float = QUAD_LENGTHS,
+        angles: float = QUAD_ANGLES,
+    ) -> np.ndarray:
         """Return the energy of each quad (Q,)."""
         out = np.zeros(len(quads))
         share = self.shares(quads) if share is None else share
@@ -86,16 +103,45 @@ class QuadMesh:
         """Return by how much the energy grows where some quads replace others; the nodes around stay where they have settled."""
         grown: float = try_quads(
             self.nodes, np.array(before), np.array(after), self.degree, rim, self.held, self.curve, self.arc, self.patches,
-            self.curves, self.desired, LENGTHS, ANGLES, sweeps, STRIDE, ENOUGH, join, joined,
+            self.curves, self.desired, QUAD_LENGTHS, QUAD_ANGLES, sweeps, QUAD_RELAXATION, GAIN_AT_REST, join, joined,
         )  # fmt: skip
         return grown
+
+    def change(self, new: dict[int, list[int]]) -> tuple[dict[int, list[int]], list[int]]:
+        """Give some quads other corners, none where one goes, key -1 for a new one; returns those before and the new quads."""
+        old, fresh = {}, []
+        for q, corners in new.items():
+            number = q
+            if q < 0:
+                number = len(self.quads)
+                self.quads.append([])
+                fresh.append(number)
+            old[number] = self.quads[number]
+            for v in self.quads[number]:
+                self.at[v].discard(number)
+                self.degree[v] -= 1
+            self.quads[number] = corners
+        for number in old:
+            for v in self.quads[number]:
+                self.at[v].add(number)
+                self.degree[v] += 1
+        return old, fresh
+
+    def add_node(self, beside: int, fresh: int) -> None:
+        """Put a new node near another, on the way to the others of its quads."""
+        self.patches[fresh], self.desired[fresh] = self.patches[beside], self.desired[beside]
+        self.held[fresh], self.fixed[fresh] = FREE, False
+        others = [w for q in sorted(self.at[fresh]) for w in self.quads[q] if w not in (fresh, beside)]
+        self.nodes[fresh] = 0.6 * self.nodes[beside] + 0.4 * self.nodes[others].mean(axis=0)
 
     def renew(self, near: float) -> None:
         """Fit a new patch to each node farther from the centre of its own than `near` members."""
         used = np.unique(self.live())
         away = np.linalg.norm(self.nodes[used] - self.patches[used, CENTRE : CENTRE + 3], axis=1)
         for v in used[away > near * self.desired[used]].tolist():
-            fit_patch(self.surface, self.patches[v], int(self.patches[v, NEAREST_SAMPLE]), tuple(self.nodes[v].tolist()))
+            fit_patch(
+                self.surface, self.patches[v], int(self.patches[v, NEAREST_SAMPLE]), tuple(self.nodes[v].tolist())
+            )
 
     def grid(self, like: Grid) -> Grid:
         """Return the quads as a grid with all else as in another; nodes without a quad are dropped."""

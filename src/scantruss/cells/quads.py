@@ -20,7 +20,8 @@ from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
 from .quad_search import search_quads
-from .rows import RowStart, find_rows, lattice_places, offsets_of_edges, spread_rows
+from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
+from .stops import at_stops
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -28,8 +29,14 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-AT_STOP = 0.6  # distance up to which a node of the boundary is that of a corner [members]
-ROW_STARTS = (RowStart(0.7, 4.0), RowStart(3.0, 0.5), RowStart(0.7, 1.0), RowStart(3.0, 6.0), RowStart(0.3, 0.3), RowStart(1.5, 2.0))
+ROW_STARTS = (
+    RowStart(0.7, 4.0),
+    RowStart(3.0, 0.5),
+    RowStart(0.7, 1.0),
+    RowStart(3.0, 6.0),
+    RowStart(0.3, 0.3),
+    RowStart(1.5, 2.0),
+)
 STARTS_TRIED = {"quick": 1, "normal": 2, "best": 6}  # of them, for each effort
 PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
 FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 60, 60  # most sweeps before the search and in the end
@@ -54,7 +61,7 @@ def quads_of(
     samples, boundary, constraints
         What it was made with.
     settings : Settings
-        `effort`.
+        `effort`, `rows`.
 
     Returns
     -------
@@ -73,11 +80,12 @@ def quads_of(
     grid = at_stops(grid, boundary.stops, settings.length)
     mesh = opened(grid)
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
+    guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
     starts, made = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
         share = number / len(starts)
         report(0.9 * share)
-        first, work = _laid(grid, coarse, fine, start, opened)
+        first, work = _laid(grid, coarse, fine, start, guide, opened)
         before = work.grid(first).quality
         search_quads(work, settings.effort, lambda part, share=share: report(0.9 * (share + part / len(starts))))
         made.append((float(work.energies(work.live()).mean()), number, first, work, before))
@@ -99,10 +107,15 @@ def quads_of(
 
 
 def _laid(
-    grid: Grid, coarse: FineMesh, fine: FineMesh, start: RowStart, opened: Callable[[Grid], WorkingMesh]
+    grid: Grid,
+    coarse: FineMesh,
+    fine: FineMesh,
+    start: RowStart,
+    guide: Guide | None,
+    opened: Callable[[Grid], WorkingMesh],
 ) -> tuple[Grid, QuadMesh]:
     """Return the quads of one start as a grid, and the same settled but not yet searched."""
-    rows = spread_rows(find_rows(coarse, start), coarse, fine)
+    rows = spread_rows(find_rows(coarse, start, guide), coarse, fine)
     lattice = collapse(fine, lattice_places(fine, rows), offsets_of_edges(fine, rows))
     panels = Panels(lattice, *pairs_of(lattice))
     panels.lead_all()
@@ -116,19 +129,6 @@ def _laid(
         work.settle(FIRST_SWEEPS)
         work.renew(FIRST_NEAR)
     return first, work
-
-
-def at_stops(grid: Grid, stops: np.ndarray, length: float) -> Grid:
-    """Return a grid whose nodes at corners and ends of lines lie where these are on the boundary curve, which projection left."""
-    rim = np.unique(grid.edges[grid.edge_uses == 1])
-    if not len(stops) or not len(rim):
-        return grid
-    nodes = grid.nodes.copy()
-    for place in stops:
-        away = np.linalg.norm(grid.nodes[rim] - place, axis=1)
-        if away.min() < AT_STOP * length:
-            nodes[rim[away.argmin()]] = place
-    return grid.replace(nodes=nodes)
 
 
 def _grid(like: Grid, nodes: np.ndarray, quads: np.ndarray, fixed: np.ndarray, chains: np.ndarray) -> Grid:

@@ -16,12 +16,24 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, identity
 from scipy.sparse.linalg import splu
 
-from .fine_mesh import AT_REST_THERE, FREE, FineMesh
+from ..improve.working_mesh import WorkingMesh
+from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
+from .fine_mesh import AT_REST_THERE, FineMesh
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
 LATTICE_TURNS = 30  # the same of the lattice
+CURVATURE_WEIGHT = (
+    20.0  # weight of a guide where the principal curvatures differ by one over a member, against one edge
+)
 HELD_WEIGHT = 30.0  # weight of what the boundary and lines ask of the lattice, against one edge
 LEAST_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
+
+
+class Guide(NamedTuple):
+    """Directions that rows should follow."""
+
+    direction: np.ndarray  #: (F, 3) in the tangent planes
+    weight: np.ndarray  #: (F,) against one edge of the fine mesh
 
 
 class RowStart(NamedTuple):
@@ -43,14 +55,14 @@ class Rows:
     offset: np.ndarray  #: (F, 2) way to the nearest node of the lattice in the axes of the node [members]
 
 
-def find_rows(mesh: FineMesh, start: RowStart, guide: tuple[np.ndarray, np.ndarray] | None = None) -> Rows:
+def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> Rows:
     """Return the rows of quads on a fine mesh.
 
     Parameters
     ----------
     mesh : FineMesh
     start : RowStart
-    guide : (F, 3) directions and (F,) their weights, optional
+    guide : Guide, optional
         Directions that the rows should follow inside.
     """
     first, second = _frames(mesh.normals)
@@ -66,10 +78,20 @@ def find_rows(mesh: FineMesh, start: RowStart, guide: tuple[np.ndarray, np.ndarr
     return Rows(angle, along, across, turn, step, offset)
 
 
+def principal_directions(mesh: WorkingMesh, count: int) -> Guide:
+    """Return the direction of greatest curvature at the first nodes of an opened grid, and how much the curvatures differ there."""
+    patch = mesh.patches[:count]
+    u, normal, heights = (patch[:, k : k + size] for k, size in ((TANGENT, 3), (NORMAL, 3), (HEIGHTS, 6)))
+    v = np.cross(normal, u)
+    xx, xy, yy = 2.0 * heights[:, 3], heights[:, 4], 2.0 * heights[:, 5]
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    apart = np.hypot(xx - yy, 2.0 * xy) * mesh.length
+    return Guide(np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v, CURVATURE_WEIGHT * apart)
+
+
 def spread_rows(rows: Rows, coarse: FineMesh, fine: FineMesh) -> Rows:
     """Return the rows on a finer mesh of the same grid as those at the corners of its triangles say."""
     first, second = _frames(fine.normals)
-    c_first, c_second = _frames(coarse.normals)
     total = np.zeros(len(fine.nodes), complex)
     for k in range(3):
         own = fine.owners[:, k]
@@ -132,14 +154,17 @@ def _directions(
     second: np.ndarray,
     bend: np.ndarray,
     diffusion: float,
-    guide: tuple[np.ndarray, np.ndarray] | None,
+    guide: Guide | None,
 ) -> np.ndarray:
     """Return the angle of the first axis in the frame of each node (F,)."""
     count, (i, j) = len(mesh.nodes), mesh.edges.T
     carried = np.exp(-4j * bend)  # from the second node to the first
     ones = np.ones(len(i))
     laplacian = coo_matrix(
-        (np.concatenate([ones, ones, -carried, -carried.conj()]), (np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i]))),
+        (
+            np.concatenate([ones, ones, -carried, -carried.conj()]),
+            (np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])),
+        ),
         shape=(count, count),
     ).tocsc()
     aim = np.zeros(count, complex)
@@ -152,9 +177,8 @@ def _directions(
     aim /= np.maximum(np.abs(aim), 1e-300)
     strength = np.where((ends > 0) & (size > LEAST_AGREEMENT), 1e4, 0.0)
     if guide is not None:
-        wanted = np.exp(4j * np.arctan2(_dot(guide[0], second), _dot(guide[0], first)))
-        free = strength == 0.0
-        aim[free], strength[free] = wanted[free], guide[1][free]
+        wanted = np.exp(4j * np.arctan2(_dot(guide.direction, second), _dot(guide.direction, first)))
+        aim, strength = wanted, guide.weight.copy()
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
     pull = csc_matrix((strength.astype(complex), (np.arange(count), np.arange(count))), shape=(count, count))
@@ -234,6 +258,3 @@ def lattice_places(mesh: FineMesh, rows: Rows) -> np.ndarray:
     """Return the place of the lattice node nearest to each node of the fine mesh (F, 3)."""
     offset = rows.offset * mesh.length[:, None]
     return mesh.nodes + offset[:, :1] * rows.along + offset[:, 1:] * rows.across
-
-
-__all__ = ["FREE", "Rows", "find_rows", "lattice_places", "offsets_of_edges"]

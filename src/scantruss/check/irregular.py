@@ -6,8 +6,9 @@ manifold grid, with d members at a node,
 
     sum over the interior (6 - d) + sum over the boundary (k + 1 - d) = 6 * Euler number - sum over the boundary (3 - k)
 
-of triangles, and the same with 4 and 2 for 6 and 3, and 90 degrees, of quads; so at least as many members must be missing or too many as the right side says, in each piece for itself. That is what is forced;
-what is there beyond it may still pay, where the surface is strongly curved.
+of triangles, and the same with 4 and 2 for 6 and 3, and 90 degrees, of quads; so at least as many members must be missing or too many
+as the right side says, in each piece for itself. That is what is forced; what is there beyond it may still pay, where the surface is
+strongly curved. Of hexagons, the sides of the panels inside are counted.
 """
 
 from __future__ import annotations

@@ -104,7 +104,9 @@ def _draw(model: Model, to: _Entities, radius: float, mean: float) -> None:
     faces = zip(map(_one_line, model.panel_marks), model.panel_loops, strict=True)
     for mark, loop in faces:
         marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
-        for begin in range(1, len(loop) - 2 + len(loop) % 2, 2):  # a face has four corners at most: more are a fan of faces
+        for begin in range(
+            1, len(loop) - 2 + len(loop) % 2, 2
+        ):  # a face has four corners at most: more are a fan of faces
             a, b, c, d = loop[0], loop[begin], loop[begin + 1], loop[min(begin + 2, len(loop) - 1)]
             hidden = 1 * (begin > 1) + 8 * (begin + 2 < len(loop) - 1)
             places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][d] + f" 70\n{hidden}\n" * bool(hidden)

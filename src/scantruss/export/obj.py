@@ -7,14 +7,13 @@ import numpy as np
 from .. import __version__
 from ..grid.grid import Grid
 
-
-_KINDS = {"triangle": "triangular", "quad": "quadrangular", "hexagon": "hexagonal"}  # of a grid truss, by its cells
+GRID_KINDS = {"triangle": "triangular", "quad": "quadrangular", "hexagon": "hexagonal"}  # of a grid truss, by its cells
 
 
 def header_lines(grid: Grid) -> list[str]:
     """Return what the comments of a file say: the program, unit, length and counts; no dates and no file names."""
     lines = [
-        f"ScanTruss {__version__}: {_KINDS[grid.cells]} grid truss",
+        f"ScanTruss {__version__}: {GRID_KINDS[grid.cells]} grid truss",
         f"unit: {grid.unit or 'not known'}",
         f"nodes: {len(grid.nodes)}, members: {len(grid.edges)}, {grid.panels_are}: {len(grid.panel_table)}",
     ]

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-CELL_NAMES = {"triangle": "triangles", "quad": "quads", "hexagon": "hexagons"}  # what panels of each kind of cells are called
-REGULAR_MEMBERS = {"triangle": 6, "quad": 4, "hexagon": 3}  # members at a regular node inside
+CELL_NAMES = {
+    "triangle": "triangles",
+    "quad": "quads",
+    "hexagon": "hexagons",
+}  # what panels of each kind of cells are called
+REGULAR_MEMBERS = {4: 4, 5: 3}  # members at a regular node inside, by the most nodes of a panel: of quads, of more
 
 
 def loops_of(panels: np.ndarray) -> list[list[int]]:
@@ -119,7 +123,9 @@ def shape_qualities_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
     size = sizes_of(panels)
     sides = sides_of(panels)
     squares = np.bincount(
-        np.repeat(np.arange(len(panels)), size), ((nodes[sides[:, 0]] - nodes[sides[:, 1]]) ** 2).sum(axis=1), len(panels)
+        np.repeat(np.arange(len(panels)), size),
+        ((nodes[sides[:, 0]] - nodes[sides[:, 1]]) ** 2).sum(axis=1),
+        len(panels),
     )
     areas = np.linalg.norm(area_vectors_of(nodes, panels), axis=1)
     return 4.0 * np.tan(np.pi / size) * areas / np.where(squares > 0, squares, 1.0)

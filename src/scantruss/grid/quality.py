@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .panels import planarity_of, shape_qualities_of
+from .panels import REGULAR_MEMBERS, planarity_of, shape_qualities_of
 from .tables import GridTables
 
 
@@ -34,7 +34,9 @@ class GridQuality:
     regular: float | None = (
         None  #: share of interior nodes with four members of quads, three of hexagons; None of triangles
     )
-    planarity_max: float | None = None  #: largest distance of a corner from the plane of its panel, over the mean diagonal there
+    planarity_max: float | None = (
+        None  #: largest distance of a corner from the plane of its panel, over the mean diagonal there
+    )
 
     def __str__(self) -> str:
         """Return shape and length in one line."""
@@ -108,6 +110,8 @@ def measure_quality(grid: GridTables) -> GridQuality:
         unit=grid.unit,
         stretch_mean=None if stretches is None else float(stretches.mean()),
         stretch_cv=None if stretches is None else float(stretches.std() / stretches.mean()),
-        regular=None if grid.panels is None else _mean(valence[interior] == (4 if grid.panels.shape[1] == 4 else 3)),
+        regular=None
+        if grid.panels is None
+        else _mean(valence[interior] == REGULAR_MEMBERS[min(grid.panels.shape[1], 5)]),
         planarity_max=None if grid.panels is None else float(planarity_of(grid.nodes, grid.panels).max(initial=0.0)),
     )

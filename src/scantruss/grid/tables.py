@@ -15,7 +15,9 @@ class GridTables:
 
     nodes: np.ndarray  #: (V, 3) float64 [scan unit]
     triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
-    panels: np.ndarray | None  #: (P, K) int64 nodes of panels of more than three, filled up with -1; None: the triangles are the panels
+    panels: (
+        np.ndarray | None
+    )  #: (P, K) int64 nodes of panels of more than three, filled up with -1; None: the triangles are the panels
     lines: np.ndarray  #: (K, 2) members along fixed lines, ridges
     deviation: np.ndarray | None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     desired: np.ndarray | None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]

@@ -61,7 +61,9 @@ def double_layer(grid: Grid, depth: float, *, second: str = "dual", along: str =
     if not (0 < depth < math.inf):
         raise InputError(f"the depth of a double layer must be positive, got {depth!r}")
     if grid.panels is not None:
-        raise InputError(f"a double layer needs a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle")
+        raise InputError(
+            f"a double layer needs a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle"
+        )
     if len(grid.triangles) == 0 or not (grid.topology.manifold and grid.topology.orientable):
         raise InputError("a double layer needs a manifold, oriented grid with triangles")
     triangles, count = grid.triangles, len(grid.nodes)

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..check.folds import fold_angles
 from ..errors import InputError
-from ..grid.panels import across_of
 from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
+from ..grid.panels import across_of
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .bolts import NO_BOLTS, PITCHES, bolted_radii, choose_bolts
@@ -106,7 +106,9 @@ def schedule(
             sides=sides,
             fold=inner_folds(grid),
             node_types=node_types,
-            panel_types=cluster_panels(sides, settings.tolerance, None if grid.panels is None else size * across_of(grid.nodes, grid.panels)),
+            panel_types=cluster_panels(
+                sides, settings.tolerance, None if grid.panels is None else size * across_of(grid.nodes, grid.panels)
+            ),
             length_types=cluster_lengths(cut, settings.tolerance, kind),
             node_marks=marks[0],
             member_marks=marks[1],

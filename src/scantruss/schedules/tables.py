@@ -283,7 +283,8 @@ def _panel_types(parts: Parts) -> Schedule:
     types, one = parts.panel_types, parts.panel_types.representative
     return _types(
         "Panel types", "PT", types, parts.panel_marks, "mm",
-        *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(parts.sides.shape[1])), column("area of one", "m2", _areas(parts)[one]),
+        *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(parts.sides.shape[1])),
+        column("area of one", "m2", _areas(parts)[one]),
     )  # fmt: skip
 
 

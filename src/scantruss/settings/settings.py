@@ -61,6 +61,10 @@ class Settings(
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         super().__post_init__()
+        if self.cells != "quad" and self.rows != "boundary":
+            raise InputError(f"rows {self.rows} needs cells quad, got {self.cells}")
+        if self.planar and self.cells == "triangle":
+            raise InputError("planar needs cells quad or hexagon; triangles always are")
         object.__setattr__(self, "fixed", check_positions(self.fixed))
         object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
         object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))

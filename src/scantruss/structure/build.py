@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, numbered
+from ..grid.panels import turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
-from ..grid.panels import turned_panels
 from ..settings import UNITS
 from .catalogue import Material, Section, find_material, find_section
 from .loads import cases_of, usual_combinations

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
+from ..grid.panels import loops_of, table_of
 from ..runtime.ours import MARK
 from .catalogue import Material, Section
 from .report import StructureReport
 from .statics import Solution
-from ..grid.panels import loops_of, table_of
 from .truss import Combination, LoadCase, Truss
 
 STRUCTURE_FORMAT = "scantruss-structure"
