@@ -1,4 +1,4 @@
-"""How even grids of quads and hexagons are: uv run python -m benchmarks.quads FILE:LENGTH ... [--cells quad] [--planar] [--effort normal]."""
+"""How even grids of quads and hexagons are: python -m benchmarks.quads FILE:LENGTH ... [--cells quad] [--planar] [--effort normal]."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import scantruss as st
 from scantruss.boundary.find import find_boundary
 from scantruss.grid.grid import Grid
 from scantruss.grid.panels import planarity_of
+from scantruss.pipeline import grid_from_cloud
 from scantruss.scan.cloud import PointCloud
 from scantruss.surface.samples import sample_surface
 
@@ -97,7 +98,7 @@ def main() -> None:
         for each in (settings.replace(cells="triangle", rows="boundary", planar=False), settings):
             cloud = PointCloud.from_array(st.read_points(path).points)
             begin = process_time()
-            grid = st.grid_from_cloud(cloud, each)
+            grid = grid_from_cloud(cloud, each)
             spent.append(process_time() - begin)
         print(f"{Path(path).stem:24s} | {evenness(grid, cloud, settings, spent[1], spent[0])}", flush=True)
 

@@ -22,7 +22,7 @@ class Panels:
         self.held = mesh.held.tolist()
         self.chains = {tuple(sorted(pair)) for pair in mesh.chains.tolist()}
         self.corners: list[list[int]] = quads.tolist() + singles.tolist()
-        self.left = {}
+        self.left: dict[tuple[int, int], int] = {}
         for p, corners in enumerate(self.corners):
             self._enter(p, corners)
 
@@ -56,7 +56,8 @@ class Panels:
 
     def _way(self, start: int) -> list[tuple[int, int]]:
         """Return the edges, as seen from the panel before each, over which the cheapest way leads."""
-        cost, before, queue = {start: 0.0}, {}, [(0.0, start, -1, -1)]
+        before: dict[int, tuple[int, int]] = {}
+        cost, queue = {start: 0.0}, [(0.0, start, -1, -1)]
         while queue:  # ends: each panel is settled once
             spent, p, a, b = heapq.heappop(queue)
             if (a, b) != (-1, -1) and ((b, a) not in self.left or (p != start and len(self.corners[p]) == 3)):

@@ -81,15 +81,18 @@ def quads_of(
     mesh = opened(grid)
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
-    starts, made = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
+    starts, tried = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
-        share = number / len(starts)
-        report(0.9 * share)
+
+        def report_part(part: float, number: int = number) -> None:
+            report(0.9 * (number + part) / len(starts))
+
+        report_part(0.0)
         first, work = _laid(grid, coarse, fine, start, guide, opened)
         before = work.grid(first).quality
-        search_quads(work, settings.effort, lambda part, share=share: report(0.9 * (share + part / len(starts))))
-        made.append((float(work.energies(work.live()).mean()), number, first, work, before))
-    _, _, first, work, before = min(made, key=lambda each: each[:2])
+        search_quads(work, settings.effort, report_part)
+        tried.append((float(work.energies(work.live()).mean()), number, first, work, before))
+    _, _, first, work, before = min(tried, key=lambda each: each[:2])
     work.renew(LAST_NEAR)
     work.settle(LAST_SWEEPS_OF_QUADS)
     last = work.grid(first)

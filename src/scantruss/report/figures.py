@@ -61,7 +61,7 @@ def count_holes(grid: Grid) -> int:
 
 def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
     """Return the figures of Table 2: name, before, after optimization."""
-    rows = (
+    rows: tuple[tuple[str, str, str], ...] = (
         ("shape quality, mean", "shape_mean", "{:.4f}"),
         ("shape quality, std", "shape_std", "{:.4f}"),
         ("shape quality, smallest", "shape_min", "{:.3f}"),
