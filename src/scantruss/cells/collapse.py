@@ -117,7 +117,7 @@ class _Collapsing:
         kept, inverse = np.unique(root, return_inverse=True)
         held = self.mesh.held[kept]
         counts = (self.mesh.held == held[inverse]).astype(float)  # a node of the boundary stays there
-        mean = np.stack([np.bincount(inverse, counts * places[:, k]) for k in range(3)], axis=1)
+        mean: np.ndarray = np.stack([np.bincount(inverse, counts * places[:, k]) for k in range(3)], axis=1)
         mean = mean / np.bincount(inverse, counts)[:, None]
         nodes = np.where((held == AT_REST_THERE)[:, None], self.mesh.nodes[kept], mean)
         number = np.full(len(self.into), -1)

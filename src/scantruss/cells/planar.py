@@ -60,8 +60,8 @@ def _to_planes(nodes: np.ndarray, panels: np.ndarray, owner: np.ndarray, corner:
     """Return the sum of the ways of each node to the mean planes of its panels (V, 3)."""
     normal = area_vectors_of(nodes, panels)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    middle = np.stack([np.bincount(owner, nodes[corner, k], len(panels)) for k in range(3)], axis=1)
-    middle /= np.bincount(owner, minlength=len(panels))[:, None]
+    middle: np.ndarray = np.stack([np.bincount(owner, nodes[corner, k], len(panels)) for k in range(3)], axis=1)
+    middle = middle / np.bincount(owner, minlength=len(panels))[:, None]
     off = ((nodes[corner] - middle[owner]) * normal[owner]).sum(axis=1)
     move = np.zeros_like(nodes)
     np.add.at(move, corner, -off[:, None] * normal[owner])
