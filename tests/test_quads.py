@@ -12,7 +12,7 @@ from scantruss.cells.collapse import LatticeMesh
 from scantruss.cells.lead import Panels
 from scantruss.cells.pairing import pairs_of
 from scantruss.cli.main import main
-from scantruss.errors import InputError
+from scantruss.errors import FormatError, InputError
 from scantruss.export.json import encode_json, read_grid
 from scantruss.grid.grid import Grid
 from scantruss.grid.panels import (
@@ -94,7 +94,7 @@ def test_the_same_scan_gives_the_same_bytes_and_json_holds_all(tmp_path: Path) -
     assert encode_json(read) == text and read.cells == "quad"
     damaged = text.replace(b'"panels": [\n[', b'"panels": [\n[0, ', 1)
     (tmp_path / "damaged.json").write_bytes(damaged)
-    with pytest.raises(InputError, match="damaged grid"):
+    with pytest.raises(FormatError, match="damaged grid"):
         read_grid(tmp_path / "damaged.json")
 
 
@@ -118,7 +118,7 @@ def test_files_hold_quads(tmp_path: Path) -> None:
 
     read = meshio.read(tmp_path / "quads.vtu")
     assert {cells.type: len(cells.data) for cells in read.cells} == {"line": len(grid.edges), "quad": len(faces)}
-    assert (tmp_path / "quads.dxf").read_text().count("3DFACE") == len(faces)
+    assert (tmp_path / "quads.dxf").read_text().count("\n  0\n3DFACE\n") == len(faces)
 
 
 def test_the_command_makes_quads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
