@@ -26,7 +26,7 @@ CURVATURE_WEIGHT = (
     20.0  # weight of a guide where the principal curvatures differ by one over a member, against one edge
 )
 HELD_WEIGHT = 30.0  # weight of what the boundary and lines ask of the lattice, against one edge
-LEAST_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
+LEAST_CHAIN_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
 
 
 class Guide(NamedTuple):
@@ -44,7 +44,7 @@ class RowStart(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class LatticeRows:
     """Axes and lattice at each node of a fine mesh."""
 
     angle: np.ndarray  #: (F,) of the first axis in the frame of the node
@@ -55,7 +55,7 @@ class Rows:
     offset: np.ndarray  #: (F, 2) way to the nearest node of the lattice in the axes of the node [members]
 
 
-def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> Rows:
+def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> LatticeRows:
     """Return the rows of quads on a fine mesh.
 
     Parameters
@@ -75,7 +75,7 @@ def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> Ro
     turn, step = _passage(-way, along[i], across[i], along[j], across[j], mesh.length[i], mesh.length[j])
     step = -step
     offset = _offsets(_lattice(mesh, along, across, turn, step, start.lattice))
-    return Rows(angle, along, across, turn, step, offset)
+    return LatticeRows(angle, along, across, turn, step, offset)
 
 
 def principal_directions(mesh: WorkingMesh, count: int) -> Guide:
@@ -89,7 +89,7 @@ def principal_directions(mesh: WorkingMesh, count: int) -> Guide:
     return Guide(np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v, CURVATURE_WEIGHT * apart)
 
 
-def spread_rows(rows: Rows, coarse: FineMesh, fine: FineMesh) -> Rows:
+def spread_rows(rows: LatticeRows, coarse: FineMesh, fine: FineMesh) -> LatticeRows:
     """Return the rows on a finer mesh of the same grid as those at the corners of its triangles say."""
     first, second = _frames(fine.normals)
     total = np.zeros(len(fine.nodes), complex)
@@ -114,7 +114,7 @@ def spread_rows(rows: Rows, coarse: FineMesh, fine: FineMesh) -> Rows:
     turn, step = _passage(
         fine.nodes[i] - fine.nodes[j], along[i], across[i], along[j], across[j], fine.length[i], fine.length[j]
     )
-    return Rows(angle, along, across, turn, -step, offset)
+    return LatticeRows(angle, along, across, turn, -step, offset)
 
 
 def _passage(
@@ -175,7 +175,7 @@ def _directions(
     ends = np.bincount(mesh.chains.ravel(), minlength=count)
     size = np.abs(aim) / np.maximum(ends, 1)
     aim /= np.maximum(np.abs(aim), 1e-300)
-    strength = np.where((ends > 0) & (size > LEAST_AGREEMENT), 1e4, 0.0)
+    strength = np.where((ends > 0) & (size > LEAST_CHAIN_AGREEMENT), 1e4, 0.0)
     if guide is not None:
         wanted = np.exp(4j * np.arctan2(_dot(guide.direction, second), _dot(guide.direction, first)))
         aim, strength = wanted, guide.weight.copy()
@@ -242,7 +242,7 @@ def _offsets(field: np.ndarray) -> np.ndarray:
     return -np.arctan2(field[:, :, 1], field[:, :, 0]) / (2 * math.pi)
 
 
-def offsets_of_edges(mesh: FineMesh, rows: Rows) -> np.ndarray:
+def offsets_of_edges(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
     """Return the way from the lattice node of the first to that of the second node of each edge, in the axes of the first (E, 2)."""
     i, j = mesh.edges.T
     other, turn = rows.offset[j], rows.turn
@@ -254,7 +254,7 @@ def offsets_of_edges(mesh: FineMesh, rows: Rows) -> np.ndarray:
     return rows.step + np.stack([u, v], axis=1) - rows.offset[i]
 
 
-def lattice_places(mesh: FineMesh, rows: Rows) -> np.ndarray:
+def lattice_places(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
     """Return the place of the lattice node nearest to each node of the fine mesh (F, 3)."""
     offset = rows.offset * mesh.length[:, None]
     return mesh.nodes + offset[:, :1] * rows.along + offset[:, 1:] * rows.across

@@ -17,7 +17,7 @@ SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths
 SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 CELLS = ("triangle", "quad", "hexagon")
-ROWS = ("boundary", "curvature")
+ROW_GUIDES = ("boundary", "curvature")
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
@@ -97,7 +97,7 @@ class MemberSettings(_Checked):
     rows: str = _setting(
         "boundary",
         "what the rows of quads follow inside: the boundary, or the directions of least and greatest curvature",
-        choices=ROWS,
+        choices=ROW_GUIDES,
     )
     planar: bool = _setting(
         False, "make quads or hexagons planar, as far as nodes within a tenth of a member of the scan allow it"
