@@ -68,14 +68,19 @@ def with_cells(
         return grid
     make = quads_of if settings.cells == "quad" else hexagons_of
     made = make(grid, samples, boundary, constraints, settings, progress=progress)
+    judged = settings
+    if (
+        settings.cells == "hexagon"
+    ):  # members of the boundary are as long as those of the triangles; the certificate says so
+        judged = settings.replace(max_length=TRIANGLE_MEMBER * settings.max_length)
     if not settings.planar:
-        return certified(made.replace(settings=settings), samples, boundary, settings)
+        return certified(made.replace(settings=settings), samples, boundary, judged)
     surface = with_own_scratch(samples.surface)
     lines = constraints.lines if settings.cells == "quad" else NO_LINES
     mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, settings.length, lines)
     flat = make_planar(mesh, made)
     flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
-    found = certified(flat.replace(settings=settings), samples, boundary, settings)
+    found = certified(flat.replace(settings=settings), samples, boundary, judged)
     return with_warning_of_planes(found)
 
 
