@@ -23,6 +23,7 @@ COMMANDS = (
     "grid {shell} demo.obj --length 1",
     "grid {bust} bust.obj --length 24",
     "grid shell.npy shell.obj --length 1",
+    "grid shell.npy quads.obj --length 1 --cells quad",
     "clean shell.npy clean.ply",
     "thin clean.ply -o thin.ply --spacing 0.2",
 )

@@ -20,6 +20,7 @@ LAYERS = (  # lowest first; a module imports from its own row and from rows abov
     ("grid",),  # the record, which front, improve and check share
     ("front",),
     ("improve", "check"),
+    ("cells",),
     ("pipeline", "candidates", "hope"),
     ("structure", "layouts", "schedules", "setout", "export", "sweep"),
     ("report", "studio", "cli", "__main__"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from .boundary.find import find_boundary
 from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
+from .cells.make import settings_of_triangles, with_cells
 from .check.certify import certified
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
@@ -231,14 +232,16 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     FrontError
         No grid of this attempt passes the checks.
     """
-    settings = attempt.settings
+    wanted = attempt.settings
+    settings = settings_of_triangles(wanted)
     samples = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
     samples, boundary = find_boundary(samples, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
     boundary, constraints = find_constraints(samples, boundary, settings, attempt.faults)  # Sec. 4.2, lines, ridges
     fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
-    return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)  # certificate
+    best = best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)  # certificate
+    return with_cells(best, samples, boundary, constraints, wanted, progress=progress)  # quads, hexagons
 
 
 class Stopwatch:

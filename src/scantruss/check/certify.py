@@ -198,13 +198,13 @@ def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarr
 def _extremes(grid: Grid, settings: Settings) -> dict[str, Any]:
     """Return the worst members, angles, fold and fixed node, and how many irregular nodes there are."""
     halves = grid.nodes[grid.edges].mean(axis=1)
-    corners = grid.nodes[grid.triangles].reshape(-1, 3)
+    corners = grid.nodes[grid.panel_table].reshape(-1, 3)
     irregular, forced = count_irregular(grid)
     return {
         "shortest_member": _worst(grid.lengths, halves, grid, -1.0),
         "longest_member": _worst(grid.lengths, halves, grid),
-        "smallest_angle": _worst(grid.angles.ravel(), corners, grid, -1.0),
-        "largest_angle": _worst(grid.angles.ravel(), corners, grid),
+        "smallest_angle": _worst(grid.corner_angles.ravel(), corners, grid, -1.0),
+        "largest_angle": _worst(grid.corner_angles.ravel(), corners, grid),
         "sharpest_fold": _worst(fold_angles(grid), halves, grid, -1.0),
         "fixed_error": _fixed_error(grid, settings),
         "irregular": irregular,

@@ -6,8 +6,9 @@ manifold grid, with d members at a node,
 
     sum over the interior (6 - d) + sum over the boundary (k + 1 - d) = 6 * Euler number - sum over the boundary (3 - k)
 
-so at least as many members must be missing or too many as the right side says, in each piece for itself. That is what is forced;
-what is there beyond it may still pay, where the surface is strongly curved.
+of triangles, and the same with 4 and 2 for 6 and 3, and 90 degrees, of quads; so at least as many members must be missing or too many
+as the right side says, in each piece for itself. That is what is forced; what is there beyond it may still pay, where the surface is
+strongly curved. Of hexagons, the sides of the panels inside are counted.
 """
 
 from __future__ import annotations
@@ -27,12 +28,26 @@ def count_irregular(grid: Grid) -> tuple[int, int]:
     count = len(grid.nodes)
     edges, uses = grid.edges, grid.edge_uses
     members = np.bincount(edges.ravel(), minlength=count)
-    angle = np.bincount(grid.triangles.ravel(), grid.angles.ravel(), minlength=count)
-    room = np.maximum(np.floor(angle / 60.0 + 0.5), 1.0).astype(np.int64)
+    if grid.cells == "hexagon":
+        return _irregular_panels(grid)
+    regular, right = (6, 60.0) if grid.panels is None else (4, 90.0)
+    angle = np.bincount(grid.panel_table.ravel(), grid.corner_angles.ravel(), minlength=count)
+    room = np.maximum(np.floor(angle / right + 0.5), 1.0).astype(np.int64)
     on_boundary = np.zeros(count, bool)
     on_boundary[edges[uses != 2].ravel()] = True
-    charge = np.where(on_boundary, room + 1, 6) - members
+    charge = np.where(on_boundary, room + 1, regular) - members
     charge[members == 0] = 0
     piece = component_labels(count, edges[:, 0], edges[:, 1])
     forced = np.bincount(piece, charge)
     return int(np.abs(charge).sum()), int(np.abs(forced).sum())
+
+
+def _irregular_panels(grid: Grid) -> tuple[int, int]:
+    """Return the sides too few or too many of the panels that lie inside, and how many of them the sum of all charges forces."""
+    on_boundary = np.zeros(len(grid.nodes), bool)
+    on_boundary[grid.edges[grid.edge_uses != 2].ravel()] = True
+    panels = grid.panel_table
+    inside = ~(on_boundary[panels] & (panels >= 0)).any(axis=1)
+    charge = 6 - (panels[inside] >= 0).sum(axis=1)
+    forced = int(abs(charge.sum())) if inside.all() else 0  # what the boundary bears is not known
+    return int(np.abs(charge).sum()), forced

@@ -72,15 +72,17 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     free = ~grid.fixed[grid.edges].all(axis=1)
     halves = grid.nodes[grid.edges].mean(axis=1) + grid.origin
     lengths = grid.lengths[free] / at_nodes[grid.edges].mean(axis=1)[free]
-    shapeable = ~grid.fixed[grid.triangles].all(axis=1)
-    corners = grid.nodes[grid.triangles[shapeable]].reshape(-1, 3) + grid.origin
+    panels = grid.panel_table
+    angles = np.where((grid.fixed[panels] | (panels < 0)).all(axis=1)[:, None], np.nan, grid.corner_angles)
+    shapeable = np.isfinite(angles)
+    corners = grid.nodes[panels[shapeable]] + grid.origin
     folds = fold_angles(grid)
     measured = np.isfinite(found.nodes) & ~grid.fixed
     if settings.boundary:  # its nodes lie where the user says
         measured[grid.edges[grid.edge_uses == 1]] = False
     off = np.maximum(found.nodes - NOISES_OFF * found.noise, 0.0)[measured] / at_nodes[measured]
     return [
-        Figure("angle", grid.angles[shapeable].ravel(), corners, settings.min_angle, WARN_ANGLE,
+        Figure("angle", angles[shapeable], corners, settings.min_angle, WARN_ANGLE,
                "has an angle of {:.1f} degrees", largest=False),
         Figure("short", lengths, halves[free], settings.min_length, WARN_SHORT,
                "has a member of {:.2f} desired lengths", largest=False),

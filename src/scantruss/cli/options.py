@@ -171,7 +171,8 @@ def describe(spec: Field[Any]) -> str:
 
 #: everyday settings, and those that matter only to `--method paper` and fronts without a lattice; the rest is for experts
 EVERY_DAY = (
-    "length", "effort", "prefer", "unit", "classes", "crop", "piece", "boundary", "fill_holes", "fixed", "fixed_lines", "ridge_angle",
+    "length", "cells", "effort", "prefer", "unit", "classes", "crop", "piece", "boundary", "fill_holes", "fixed", "fixed_lines",
+    "ridge_angle",
 )  # fmt: skip
 PAPER_ONLY = (
     "advance_from", "shape_weight", "size_weight", "length_weight", "search_range", "nearness", "merge_angle", "case3",

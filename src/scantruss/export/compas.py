@@ -38,7 +38,7 @@ def encode_compas(model: Model, style: FileStyle) -> bytes:
         "attributes": common, "default_node_attributes": zero, "default_edge_attributes": {}, "node": nodes, "edge": edges,
         "max_node": len(nodes) - 1,
     }  # fmt: skip
-    faces = {str(number): corners for number, corners in enumerate(model.triangles.tolist())}
+    faces = {str(number): corners for number, corners in enumerate(model.panel_loops)}
     mesh = {
         "attributes": common, "default_vertex_attributes": zero, "default_edge_attributes": {}, "default_face_attributes": {},
         "vertex": dict(zip(nodes, places, strict=True)), "face": faces,

@@ -101,10 +101,16 @@ def _draw(model: Model, to: _Entities, radius: float, mean: float) -> None:
         to.add("LINE", layer, f"100\nAcDbLine\n{corners[0][start]}{corners[1][end]}{marked}")
         place = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
         to.add("TEXT", "marks members", f"100\nAcDbText\n{place}{height}  1\n{mark}\n100\nAcDbText\n")
-    for mark, (a, b, c) in zip(map(_one_line, model.panel_marks), model.triangles.tolist(), strict=True):
+    faces = zip(map(_one_line, model.panel_marks), model.panel_loops, strict=True)
+    for mark, loop in faces:
         marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
-        places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][c]
-        to.add("3DFACE", "panels", f"100\nAcDbFace\n{places}{marked}")
+        for begin in range(
+            1, len(loop) - 2 + len(loop) % 2, 2
+        ):  # a face has four corners at most: more are a fan of faces
+            a, b, c, d = loop[0], loop[begin], loop[begin + 1], loop[min(begin + 2, len(loop) - 1)]
+            hidden = 1 * (begin > 1) + 8 * (begin + 2 < len(loop) - 1)
+            places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][d] + f" 70\n{hidden}\n" * bool(hidden)
+            to.add("3DFACE", "panels", f"100\nAcDbFace\n{places}{marked}")
     for mark, place in zip(map(_one_line, model.node_marks), nodes.tolist(), strict=True):
         to.insert("NODE", "nodes", place, radius, {"MARK": (mark, "marks nodes")})
     for node in model.supported.tolist():

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..structure.truss import area_vectors
 from .bodies import Bodies, member_axes
 from .ifc_file import Ifc, Profiles
 from .part21 import Ref, Word, typed
@@ -139,16 +140,17 @@ def _ball(ifc: Ifc, radius: float) -> tuple[Ref, Ref]:
 
 
 def _panels(ifc: Ifc, place: Ref) -> list[Ref]:
-    """Add the panels: triangles without thickness."""
+    """Add the panels: triangles without thickness, two or more for one of more than three nodes."""
     model, add = ifc.model, ifc.add
-    corners = (model.local * model.metres)[model.triangles]
-    areas = (
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    ).tolist()
+    nodes, count = model.local * model.metres, [len(loop) - 2 for loop in model.panel_loops]
+    pieces = np.split(model.triangles, np.cumsum(count)[:-1]) if count else []
     made = []
-    for mark, area, triangle in zip(model.panel_marks, areas, corners.tolist(), strict=True):
-        places = add("IFCCARTESIANPOINTLIST3D", triangle)
-        face = add("IFCTRIANGULATEDFACESET", places, None, Word(".F."), ((1, 2, 3),), None)
+    for mark, loop, own in zip(model.panel_marks, model.panel_loops, pieces, strict=True):
+        places = add("IFCCARTESIANPOINTLIST3D", nodes[loop].tolist())
+        number = {node: k for k, node in enumerate(loop, 1)}
+        index = tuple(tuple(number[node] for node in each) for each in own.tolist())
+        area = float(np.linalg.norm(area_vectors(nodes, own), axis=1).sum())
+        face = add("IFCTRIANGULATEDFACESET", places, None, Word(".F."), index, None)
         shape = add("IFCSHAPEREPRESENTATION", ifc.body, "Body", "Tessellation", (face,))
         shapes = add("IFCPRODUCTDEFINITIONSHAPE", None, None, (shape,))
         plate = ifc.root("IFCPLATE", "panel", mark, mark, None, "panel", place, shapes, mark, NOT_DEFINED)

@@ -21,6 +21,7 @@ from ..errors import FormatError, InputError
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet, sets_of
+from ..grid.panels import panel_of_triangles, table_of
 from ..grid.quality import GridQuality
 from ..runtime.ours import BYTES_WITH_MARK
 from ..settings import UNITS, Settings
@@ -64,6 +65,8 @@ def encode_json(grid: Grid) -> bytes:
         "triangles": grid.triangles.tolist(),
         "deviation": deviation and [_number(d) for d in deviation],
     }
+    if grid.panels is not None:
+        values["panels"] = grid.panel_loops
     if grid.desired is not None:
         values["desired"] = np.asarray(grid.desired, float).tolist()
     parts = [
@@ -72,7 +75,7 @@ def encode_json(grid: Grid) -> bytes:
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")
 
 
-ROW_ARRAYS = ("nodes", "members", "triangles", "boundary_loops", "lines", "fixed_lines", "ridges")
+ROW_ARRAYS = ("nodes", "members", "triangles", "panels", "boundary_loops", "lines", "fixed_lines", "ridges")
 
 
 def _number(value: Any) -> Any:
@@ -174,6 +177,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
     return Grid(
         nodes=nodes,
         triangles=triangles,
+        panels=_panels(values.get("panels"), triangles, len(nodes)),
         fixed=fixed,
         lines=_ids(values.get("lines", []), "lines", len(nodes), 2),
         line_sets=(
@@ -189,6 +193,20 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         before=None if before is None else GridQuality(**before, unit=unit),
         certificate=None if certificate is None else Certificate.from_dict(certificate),
     )
+
+
+def _panels(given: Any, triangles: np.ndarray, limit: int) -> np.ndarray | None:
+    """Return the table of panels of more than three nodes, checked against their triangles; None where there are none."""
+    if given is None:
+        return None
+    loops = [_ids(loop, "panels", limit, 1).ravel().tolist() for loop in given]
+    if any(len(set(loop)) != len(loop) or len(loop) < 3 for loop in loops):
+        raise ValueError("a panel must have three different nodes or more")
+    panels = table_of(loops)
+    owner = panel_of_triangles(panels)
+    if len(owner) != len(triangles) or not (triangles[:, :, None] == panels[owner][:, None]).any(axis=2).all():
+        raise ValueError("the triangles must be those of the panels, one after the other")
+    return panels
 
 
 def _line_sets(given: Any, kind: str, limit: int) -> list[LineSet]:

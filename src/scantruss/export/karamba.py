@@ -27,7 +27,7 @@ def encode_karamba(model: Model, style: FileStyle) -> bytes:
             f'{{"id": {_quoted_word(mark)}, "nodes": {ends}, "group": {groups[group]}{more}}}'
             for mark, ends, group, more in table
         ],
-        "panels": list(map(str, model.triangles.tolist())),
+        "panels": list(map(str, model.panel_loops)),
         "supports": [_text_of(_support(model, node)) for node in model.supported.tolist()],
     }
     if model.truss is not None:

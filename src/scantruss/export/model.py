@@ -15,6 +15,7 @@ from ..grid.grid import Grid
 from ..grid.groups import member_groups
 from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.marks import member_marks, node_marks, numbered, panel_marks
+from ..grid.panels import loops_of
 from ..settings import UNITS
 from ..structure.groups import member_groups_of
 from ..structure.layered import grid_of_layers
@@ -38,6 +39,7 @@ class Model:
     origin: np.ndarray  #: (3,) float64, in the frame of the scan
     members: np.ndarray  #: (M, 2) int64, start and end
     triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
+    panels: np.ndarray  #: (P, K) int64 nodes of the panels, filled up with -1: the triangles, or quads or hexagons
     unit: str  #: mm, cm, m, inch, foot, or "" where it is not known; m of a structure
     node_marks: tuple[str, ...]
     member_marks: tuple[str, ...]
@@ -63,6 +65,11 @@ class Model:
     def lengths(self) -> np.ndarray:
         """(M,) system lengths."""
         return np.linalg.norm(self.local[self.members[:, 1]] - self.local[self.members[:, 0]], axis=1)
+
+    @cached_property
+    def panel_loops(self) -> list[list[int]]:
+        """The nodes of each panel."""
+        return loops_of(self.panels)
 
     @property
     def supported(self) -> np.ndarray:
@@ -119,6 +126,7 @@ def model_of_grid(grid: Grid, cloud: PointCloud | None = None) -> Model:
         origin=np.asarray(grid.origin, np.float64),
         members=np.asarray(grid.edges, np.int64),
         triangles=np.asarray(grid.triangles, np.int64),
+        panels=np.asarray(grid.panel_table, np.int64),
         unit=grid.unit,
         node_marks=tuple(node_marks(grid)),
         member_marks=tuple(member_marks(grid)),
@@ -151,10 +159,11 @@ def model_of_truss(
         origin=truss.origin,
         members=truss.members,
         triangles=truss.triangles,
+        panels=truss.panel_table,
         unit="m",
         node_marks=truss.node_marks,
         member_marks=truss.member_marks,
-        panel_marks=tuple(numbered("P", len(truss.triangles), 4)),
+        panel_marks=tuple(numbered("P", len(truss.panel_table), 4)),
         groups=groups,
         group_of=group_of,
         node_sets=truss.node_sets,
@@ -269,6 +278,7 @@ def _grid_of(truss: Truss) -> Grid:
     return Grid(
         nodes=truss.nodes,
         triangles=truss.triangles,
+        panels=truss.panels,
         fixed=fixed,
         origin=truss.origin,
         unit="m",

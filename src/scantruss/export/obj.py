@@ -7,13 +7,15 @@ import numpy as np
 from .. import __version__
 from ..grid.grid import Grid
 
+GRID_KINDS = {"triangle": "triangular", "quad": "quadrangular", "hexagon": "hexagonal"}  # of a grid truss, by its cells
+
 
 def header_lines(grid: Grid) -> list[str]:
     """Return what the comments of a file say: the program, unit, length and counts; no dates and no file names."""
     lines = [
-        f"ScanTruss {__version__}: triangular grid truss",
+        f"ScanTruss {__version__}: {GRID_KINDS[grid.cells]} grid truss",
         f"unit: {grid.unit or 'not known'}",
-        f"nodes: {len(grid.nodes)}, members: {len(grid.edges)}, triangles: {len(grid.triangles)}",
+        f"nodes: {len(grid.nodes)}, members: {len(grid.edges)}, {grid.panels_are}: {len(grid.panel_table)}",
     ]
     if grid.settings is not None:
         longest = "" if grid.desired is None else f" to {float(np.max(grid.desired, initial=0.0))!r}"
@@ -27,12 +29,12 @@ def encode_obj(grid: Grid, elements: str = "faces") -> bytes:
     Parameters
     ----------
     grid : Grid
-    elements : faces for the triangles, lines for the members, or both; members that are sides of no triangle are always there
+    elements : faces for the panels, lines for the members, or both; members that are sides of no panel are always there
     """
     lines = [f"# {line}" for line in header_lines(grid)]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in grid.scan_nodes.tolist()]
     if elements in ("faces", "both"):
-        lines += [f"f {a} {b} {c}" for a, b, c in (grid.triangles + 1).tolist()]
+        lines += ["f " + " ".join(str(node + 1) for node in loop) for loop in grid.panel_loops]
     members = grid.edges if elements in ("lines", "both") else grid.edges[grid.edge_uses == 0]
     lines += [f"l {a} {b}" for a, b in (members + 1).tolist()]
     return ("\n".join(lines) + "\n").encode("ascii")

@@ -6,7 +6,9 @@
   const nodes = new Float64Array(bytes(data.nodes)), members = new Int32Array(bytes(data.members));
   const triangles = new Int32Array(bytes(data.triangles));
   const scan = new Uint16Array(bytes(data.scan.points));
-  const counts = { nodes: nodes.length / 3, members: members.length / 2, panels: triangles.length / 3 };
+  const counts = { nodes: nodes.length / 3, members: members.length / 2, panels: data.loops ? data.loops.length : triangles.length / 3 };
+  const owner = data.loops ? data.loops.flatMap((loop, k) => Array(loop.length - 2).fill(k)) : null; // the panel of each triangle
+  const sides = (k) => { const loop = data.loops ? data.loops[k] : [0, 1, 2].map((j) => triangles[3 * k + j]); return loop.flatMap((v, j) => [v, loop[(j + 1) % loop.length]]); };
   const KINDS = ["nodes", "members", "panels"];
   const canvas = $("canvas"), gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
   if (!gl) { $("row").textContent = "This browser shows no 3D view (WebGL 2); the figures below hold all the same."; return; }
@@ -68,8 +70,8 @@
   };
   const each = { nodes: 1, members: 1, panels: 3 };
   const paint = (kind, color) => {
-    const out = new Uint8Array(4 * each[kind] * counts[kind]);
-    for (let k = 0; k < counts[kind]; k++) for (let j = 0, c = color(k); j < each[kind]; j++) out.set(c, 4 * (k * each[kind] + j));
+    const count = kind === "panels" ? triangles.length / 3 : counts[kind], out = new Uint8Array(4 * each[kind] * count);
+    for (let k = 0; k < count; k++) for (let j = 0, c = color(kind === "panels" && owner ? owner[k] : k); j < each[kind]; j++) out.set(c, 4 * (k * each[kind] + j));
     return buffer(out);
   };
   const code = (kind) => (k) => { const n = k * 3 + KINDS.indexOf(kind) + 1; return [n & 255, n >> 8 & 255, n >> 16 & 255, 255]; };
@@ -127,7 +129,7 @@
     if (shown("panels")) {
       use(faces); gl.uniform1f(faces.at("shade"), picking ? 0 : 1); gl.uniform3f(faces.at("eye"), ...eye);
       bind(faces, "a", places.panels, 3); bind(faces, "color", paints.panels, 4, { bytes: true });
-      gl.drawArrays(gl.TRIANGLES, 0, 3 * counts.panels);
+      gl.drawArrays(gl.TRIANGLES, 0, triangles.length);
     }
     if (!picking && shown("scan")) spots(places.scan, [...rgb("--dot").map((v) => v / 255), 1], scan.length / 3, 1.6, 1e-4);
     if (shown("members")) strokes(places.members, paints.members, counts.members, picking ? 8 : 2.6);
@@ -135,7 +137,7 @@
     if (!picking && selected) {
       const color = [...rgb("--pick").map((v) => v / 255), 1], [kind, k] = selected;
       if (kind === "nodes") { const one = buffer(new Float32Array(at(k))); spots(one, color, 1, 15, 1e-3); gl.deleteBuffer(one); }
-      const ends = kind === "members" ? [members[2 * k], members[2 * k + 1]] : kind === "panels" ? [0, 1, 1, 2, 2, 0].map((j) => triangles[3 * k + j]) : [];
+      const ends = kind === "members" ? [members[2 * k], members[2 * k + 1]] : kind === "panels" ? sides(k) : [];
       if (ends.length) { const some = buffer(new Float32Array(ends.flatMap(at))); gl.depthFunc(gl.ALWAYS); strokes(some, color, ends.length / 2, 6); gl.depthFunc(gl.LESS); gl.deleteBuffer(some); }
     }
     if (!picking) pins(m);

@@ -41,6 +41,7 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
         "nodes": _packed(model.local, "<f8"),
         "members": _packed(model.members, "<i4"),
         "triangles": _packed(model.triangles, "<i4"),
+        **({"loops": model.panel_loops} if model.panels.shape[1] > 3 else {}),
         "scan": _scan(model),
         "tables": {
             kind: [each._asdict() for each in columns]
@@ -54,7 +55,7 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
     title = f"Grid truss, {len(model.local):,} nodes" if grid is not None else f"Structure, {len(model.local):,} nodes"
     parts = [
         f"<h1>{escape(title)}</h1>",
-        f'<p class="below">{len(model.members):,} members, {len(model.triangles):,} panels'
+        f'<p class="below">{len(model.members):,} members, {len(model.panels):,} panels'
         f"{f', in {model.unit}' if model.unit else ''}</p>",
         '<h2><label for="coloring">Colour</label></h2><select id="coloring"></select><p>',
         *(

@@ -11,7 +11,7 @@ import numpy as np
 from ..check.folds import fold_angles
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
-from ..grid.quality import shape_qualities
+from ..grid.panels import planarity_of, shape_qualities_of, side_lengths_of
 from .model import Model
 
 COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, words, middle of a diverging scale
@@ -57,7 +57,7 @@ class Pin(NamedTuple):
 
 def tables_of(model: Model) -> Tables:
     """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan."""
-    unit, ends, corners = model.unit, model.members, model.triangles
+    unit, ends, corners = model.unit, model.members, model.panels
     valence = np.bincount(ends.ravel(), minlength=len(model.local))
     nodes = [column("node", "", model.node_marks)]
     nodes += [column(axis, unit, model.nodes[:, k]) for k, axis in enumerate("xyz")]
@@ -68,13 +68,16 @@ def tables_of(model: Model) -> Tables:
         column("group", "", [model.groups[k] for k in model.group_of.tolist()]),
         column("length", unit, model.lengths),
     ]
-    sides = np.linalg.norm(model.local[np.roll(corners, -1, axis=1)] - model.local[corners], axis=2)
+    sides, width = side_lengths_of(model.local, corners), range(corners.shape[1])
+    marks = [*model.node_marks, ""]
     panels = [
         column("panel", "", model.panel_marks),
-        *(column(f"node {k + 1}", "", _marks(model, corners[:, k])) for k in range(3)),
-        *(column(f"side {k + 1}", unit, sides[:, k]) for k in range(3)),
-        column("quality", "", shape_qualities(model.local, corners)),
+        *(column(f"node {k + 1}", "", [marks[v] for v in corners[:, k].tolist()]) for k in width),
+        *(column(f"side {k + 1}", unit, sides[:, k]) for k in width),
+        column("quality", "", shape_qualities_of(model.local, corners)),
     ]
+    if corners.shape[1] > 3:
+        panels.append(column("off its plane / diagonal", "", planarity_of(model.local, corners)))
     if model.truss is not None:
         held = np.isin(np.arange(len(model.local)), model.supported)
         nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))

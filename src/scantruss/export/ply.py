@@ -9,7 +9,7 @@ from .obj import header_lines
 
 
 def encode_ply(grid: Grid) -> bytes:
-    """Return a binary little endian PLY file: double coordinates, one `vertex_indices` list per triangle."""
+    """Return a binary little endian PLY file: double coordinates, one `vertex_indices` list per panel."""
     header = [
         "ply",
         "format binary_little_endian 1.0",
@@ -18,11 +18,9 @@ def encode_ply(grid: Grid) -> bytes:
         "property double x",
         "property double y",
         "property double z",
-        f"element face {len(grid.triangles)}",
+        f"element face {len(grid.panel_table)}",
         "property list uchar int vertex_indices",
         "end_header",
     ]
-    faces = np.zeros(len(grid.triangles), np.dtype([("count", "u1"), ("nodes", "<i4", 3)]))
-    faces["count"] = 3
-    faces["nodes"] = grid.triangles
-    return ("\n".join(header) + "\n").encode("ascii") + grid.scan_nodes.astype("<f8").tobytes() + faces.tobytes()
+    faces = b"".join(bytes([len(loop)]) + np.array(loop, "<i4").tobytes() for loop in grid.panel_loops)
+    return ("\n".join(header) + "\n").encode("ascii") + grid.scan_nodes.astype("<f8").tobytes() + faces

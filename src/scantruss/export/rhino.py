@@ -63,7 +63,8 @@ def encode_3dm(model: Model, style: FileStyle) -> bytes:
         mesh.Vertices.UseDoublePrecisionVertices = True
         for place in model.nodes.tolist():
             mesh.Vertices.AddPoint3d(*place)
-        for face in model.triangles.tolist():
+        faces = model.panel_loops if model.panels.shape[1] <= 4 else model.triangles.tolist()
+        for face in faces:
             mesh.Faces.AddFace(*face)
         file.Objects.AddMesh(mesh, attributes("panels", "panels", {"first": model.panel_marks[0]}))
     return _without_dates(base64.b64decode(file.Encode(rhino3dm.File3dmWriteOptions())))

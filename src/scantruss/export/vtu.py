@@ -1,4 +1,4 @@
-"""VTU for ParaView and the like: members as lines, panels as triangles, with what is known of them; binary as base64."""
+"""VTU for ParaView and the like: members as lines, panels as triangles, quads or polygons, with what is known of them; binary as base64."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from .style import FileStyle
 from .workbook import NOT_IN_XML
 
 TYPES = {"float64": "Float64", "int64": "Int64", "uint8": "UInt8"}
-LINE_CELL, TRIANGLE_CELL = 3, 5  #: of VTK's cells
+LINE_CELL, TRIANGLE_CELL, POLYGON_CELL, QUAD_CELL = 3, 5, 7, 9  #: of VTK's cells
 NOT_IN_COMMENTS = re.compile("--|[\x00-\x08\x0b-\x1f\ufffe\uffff]|-$")
 
 
 def encode_vtu(model: Model, style: FileStyle) -> bytes:
     """Return the file of an unstructured grid in the frame of the scan; `id` counts members and panels, each from 0."""
-    members, panels = len(model.members), len(model.triangles)
-    ends = np.concatenate([2 * np.arange(1, members + 1), 2 * members + 3 * np.arange(1, panels + 1)])
+    members, panels = len(model.members), len(model.panels)
+    size = (model.panels >= 0).sum(axis=1)
+    ends = np.concatenate([2 * np.arange(1, members + 1), 2 * members + np.cumsum(size)])
+    kind = np.where(size == 3, TRIANGLE_CELL, np.where(size == 4, QUAD_CELL, POLYGON_CELL))
     cells = {
-        "connectivity": np.concatenate([model.members.ravel(), model.triangles.ravel()]),
+        "connectivity": np.concatenate([model.members.ravel(), model.panels[model.panels >= 0]]),
         "offsets": ends,
-        "types": np.repeat([LINE_CELL, TRIANGLE_CELL], [members, panels]).astype(np.uint8),
+        "types": np.concatenate([np.full(members, LINE_CELL), kind]).astype(np.uint8),
     }
     fixed = np.zeros(len(model.local), np.int64)
     fixed[model.supported] = 1
@@ -68,7 +70,7 @@ def encode_vtu(model: Model, style: FileStyle) -> bytes:
 
 def _of_members(model: Model, values: np.ndarray) -> np.ndarray:
     """Return values of members, and NaN for the panels."""
-    return np.concatenate([values, np.full(len(model.triangles), np.nan)])
+    return np.concatenate([values, np.full(len(model.panels), np.nan)])
 
 
 def _section(name: str, arrays: dict[str, np.ndarray]) -> list[str]:

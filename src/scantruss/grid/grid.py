@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .line_sets import LineSet
+from .panels import CELL_NAMES
 from .quality import GridQuality, measure_quality
 from .tables import GridTables
 from .topology import Topology, measure_topology
@@ -34,12 +35,13 @@ PROVENANCE = {
 }  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
+    "_member_of_side", "half_edge_edges", "panel_loops", "edge_panels", "panel_members",
 }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Grid(GridTables):
-    """A triangular grid truss: its nodes lie on the scan, its edges are the members."""
+    """A grid truss: its nodes lie on the scan, the sides of its panels are the members."""
 
     nodes: np.ndarray  #: (V, 3) float64 [scan unit], relative to `origin`
     triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
@@ -55,6 +57,8 @@ class Grid(GridTables):
     desired: np.ndarray | None = (
         None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
     )
+    #: (P, K) int64 nodes of quads or hexagons, filled up with -1, whose triangles `triangles` are; None: the triangles are the panels
+    panels: np.ndarray | None = None
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)
     certificate: Certificate | None = None  #: what was checked against the scan
@@ -64,9 +68,17 @@ class Grid(GridTables):
         """Say what it is made of, not every number."""
         unit = f" {self.unit}" if self.unit else ""
         length = f" of {self.lengths.mean():.4g}{unit}" if len(self.edges) else ""
-        return (
-            f"Grid({len(self.nodes):,} nodes, {len(self.edges):,} members{length}, {len(self.triangles):,} triangles)"
-        )
+        return f"Grid({len(self.nodes):,} nodes, {len(self.edges):,} members{length}, {len(self.panel_table):,} {self.panels_are})"
+
+    @property
+    def cells(self) -> str:
+        """What the panels are: triangle, quad or hexagon."""
+        return "triangle" if self.panels is None else "quad" if self.panels.shape[1] == 4 else "hexagon"
+
+    @property
+    def panels_are(self) -> str:
+        """What the panels are called: triangles, quads or hexagons."""
+        return CELL_NAMES[self.cells]
 
     def replace(self, **changes: Any) -> Grid:
         """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of.
@@ -75,11 +87,13 @@ class Grid(GridTables):
         """
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
             changes = {"certificate": None, **changes}
+        if "triangles" in changes:
+            changes = {"panels": None, **changes}
         copy = replace(self, **changes)
         known = {name: value for name, value in vars(self).copy().items() if name not in vars(copy)}
         if changes.keys() <= PROVENANCE:
             vars(copy).update(known)
-        elif "triangles" not in changes and len(copy.nodes) == len(self.nodes):
+        elif changes.keys().isdisjoint(("triangles", "panels")) and len(copy.nodes) == len(self.nodes):
             vars(copy).update({name: known[name] for name in OF_TRIANGLES & known.keys()})
         return copy
 

@@ -25,5 +25,5 @@ def member_marks(grid: GridTables) -> list[str]:
 
 
 def panel_marks(grid: GridTables) -> list[str]:
-    """Return the mark of each panel, one for each triangle: P0001, P0002, and so on."""
-    return numbered("P", len(grid.triangles), 4)
+    """Return the mark of each panel: P0001, P0002, and so on."""
+    return numbered("P", len(grid.panel_table), 4)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .panels import REGULAR_MEMBERS, planarity_of, shape_qualities_of
 from .tables import GridTables
 
 
@@ -30,6 +31,12 @@ class GridQuality:
         None  #: mean of member lengths over those desired there; None where one length is desired
     )
     stretch_cv: float | None = None  #: their standard deviation over their mean
+    regular: float | None = (
+        None  #: share of interior nodes with four members of quads, three of hexagons; None of triangles
+    )
+    planarity_max: float | None = (
+        None  #: largest distance of a corner from the plane of its panel, over the mean diagonal there
+    )
 
     def __str__(self) -> str:
         """Return shape and length in one line."""
@@ -46,6 +53,8 @@ class GridQuality:
         del values["unit"]
         if self.stretch_mean is None:
             del values["stretch_mean"], values["stretch_cv"]
+        if self.regular is None:
+            del values["regular"], values["planarity_max"]
         return values
 
 
@@ -75,8 +84,10 @@ def measure_quality(grid: GridTables) -> GridQuality:
     """Return the figures of Table 2 and more; NaN-free, zeros for an empty grid."""
     edges, lengths = grid.edges, grid.lengths
     some = len(grid.triangles) > 0
-    shape = shape_qualities(grid.nodes, grid.triangles) if some else np.zeros(1)
-    angles = grid.angles if some else np.zeros(1)
+    shape = np.zeros(1)
+    if some:
+        shape = (shape_qualities if grid.panels is None else shape_qualities_of)(grid.nodes, grid.panel_table)
+    angles = grid.corner_angles if some else np.zeros(1)
     lengths = lengths if some else np.zeros(1)
     valence = np.bincount(edges.ravel(), minlength=len(grid.nodes))
     interior = valence > 0
@@ -91,12 +102,16 @@ def measure_quality(grid: GridTables) -> GridQuality:
         length_mean=mean,
         length_std=float(lengths.std()),
         length_cv=float(lengths.std()) / mean if mean > 0 else 0.0,
-        angle_min=float(angles.min()),
-        angle_max=float(angles.max()),
+        angle_min=float(np.nanmin(angles)),
+        angle_max=float(np.nanmax(angles)),
         valence6=_mean(valence[interior] == 6),
         node_deviation_mean=float(deviation.mean()) if len(deviation) else None,
         node_deviation_max=float(deviation.max()) if len(deviation) else None,
         unit=grid.unit,
         stretch_mean=None if stretches is None else float(stretches.mean()),
         stretch_cv=None if stretches is None else float(stretches.std() / stretches.mean()),
+        regular=None
+        if grid.panels is None
+        else _mean(valence[interior] == REGULAR_MEMBERS[min(grid.panels.shape[1], 5)]),
+        planarity_max=None if grid.panels is None else float(planarity_of(grid.nodes, grid.panels).max(initial=0.0)),
     )

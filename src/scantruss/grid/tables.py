@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..kernels.mesh import figures
+from .panels import corner_angles_of, loops_of, panel_of_triangles, sides_of
 
 
 class GridTables:
@@ -14,6 +15,9 @@ class GridTables:
 
     nodes: np.ndarray  #: (V, 3) float64 [scan unit]
     triangles: np.ndarray  #: (T, 3) int64, anticlockwise seen from outside
+    panels: (
+        np.ndarray | None
+    )  #: (P, K) int64 nodes of panels of more than three, filled up with -1; None: the triangles are the panels
     lines: np.ndarray  #: (K, 2) members along fixed lines, ridges
     deviation: np.ndarray | None  #: (V,) distance of each node from the scan, NaN over closed holes [scan unit]
     desired: np.ndarray | None  #: (V,) desired member length at each node, where it is not the same for all [scan unit]
@@ -33,15 +37,47 @@ class GridTables:
         """(K,) distances from the scan of all nodes that are not over closed holes; none before they are measured."""
         return np.zeros(0) if self.deviation is None else self.deviation[~np.isnan(self.deviation)]
 
+    @cached_property
+    def _member_of_side(self) -> np.ndarray:
+        """(S,) the member that each side of a triangle is, -1 for a diagonal of a panel."""
+        ends = self._half_edges[1]
+        if self.panels is None:
+            return np.arange(len(ends))
+        count = max(len(self.nodes), 1)
+        low, high = np.sort(sides_of(self.panels), axis=1).T
+        found = np.isin(ends[:, 0] * count + ends[:, 1], low * count + high)
+        return np.where(found, np.cumsum(found) - 1, -1)
+
+    @cached_property
+    def triangulated(self) -> GridTables:
+        """The same surface with each side of a triangle as an edge, also the diagonals of panels."""
+        return self if self.panels is None else _Triangulated(self)
+
+    @cached_property
+    def panel_loops(self) -> list[list[int]]:
+        """The nodes of each panel, anticlockwise seen from outside."""
+        loops: list[list[int]] = self.triangles.tolist() if self.panels is None else loops_of(self.panels)
+        return loops
+
     @property
+    def panel_table(self) -> np.ndarray:
+        """(P, K) the nodes of each panel, filled up with -1."""
+        return self.triangles if self.panels is None else self.panels
+
+    @cached_property
+    def corner_angles(self) -> np.ndarray:
+        """(P, K) the angle of each panel at each of its nodes, NaN where it has none [degree]."""
+        return self.angles if self.panels is None else corner_angles_of(self.nodes, self.panels)
+
+    @cached_property
     def half_edge_edges(self) -> np.ndarray:
-        """(3 T,) the edge of each half-edge; half-edge k of triangle t (from its node k on) stands at k T + t."""
-        return self._half_edges[2]
+        """(3 T,) the member at each half-edge, -1 for a diagonal of a panel; half-edge k of triangle t stands at k T + t."""
+        return self._half_edges[2] if self.panels is None else self._member_of_side[self._half_edges[2]]
 
     @cached_property
     def edge_uses(self) -> np.ndarray:
-        """(E,) the number of triangles at each member."""
-        return np.bincount(self.half_edge_edges, minlength=len(self.edges))
+        """(E,) the number of panels at each member."""
+        return np.bincount(self.half_edge_edges[self.half_edge_edges >= 0], minlength=len(self.edges))
 
     @cached_property
     def edge_on_line(self) -> np.ndarray:
@@ -54,7 +90,7 @@ class GridTables:
     @property
     def edges(self) -> np.ndarray:
         """(E, 2) the members, smaller node first, sorted."""
-        return self._half_edges[1]
+        return self._half_edges[1] if self.panels is None else self._half_edges[1][self._member_of_side >= 0]
 
     @property
     def members(self) -> np.ndarray:
@@ -69,6 +105,9 @@ class GridTables:
     @cached_property
     def edge_triangles(self) -> np.ndarray:
         """(E, 2) the triangles at each member, -1 where the boundary is; (E, 2) needs a manifold grid."""
+        if self.panels is not None:
+            every: np.ndarray = self.triangulated.edge_triangles[self._member_of_side >= 0]
+            return every
         _, edges, inverse = self._half_edges
         triangle = np.tile(np.arange(len(self.triangles)), 3)
         order = np.argsort(inverse, kind="stable")
@@ -82,10 +121,27 @@ class GridTables:
         return table
 
     @cached_property
+    def edge_panels(self) -> np.ndarray:
+        """(E, 2) the panels at each member, -1 where the boundary is."""
+        if self.panels is None:
+            return self.edge_triangles
+        owner = np.append(panel_of_triangles(self.panels), -1)
+        return owner[self.edge_triangles]
+
+    @cached_property
+    def panel_members(self) -> np.ndarray:
+        """(P, K) the member at each side of each panel, from its node k to the next, -1 where it has none."""
+        table = self.panel_table
+        sides, count = np.sort(sides_of(table), axis=1), max(len(self.nodes), 1)
+        found = np.full(table.shape, -1)
+        found[table >= 0] = np.searchsorted(self.edges @ [count, 1], sides @ [count, 1])
+        return found
+
+    @cached_property
     def boundary_loops(self) -> list[np.ndarray]:
         """Ordered node ids of each boundary loop, in the direction of its triangles."""
         ends, _, inverse = self._half_edges
-        single = self.edge_uses[inverse] == 1
+        single = np.bincount(inverse)[inverse] == 1
         following: dict[int, list[int]] = {}
         for a, b in ends[single].tolist():
             following.setdefault(a, []).append(b)
@@ -116,3 +172,12 @@ class GridTables:
         if self.desired is None:
             return self.lengths / length
         return self.lengths / self.desired[self.edges].mean(axis=1)
+
+
+class _Triangulated(GridTables):
+    """The triangles of a grid of other panels."""
+
+    def __init__(self, grid: GridTables) -> None:
+        self.nodes, self.triangles, self.lines = grid.nodes, grid.triangles, grid.lines
+        self.deviation, self.desired, self.unit, self.origin = grid.deviation, grid.desired, grid.unit, grid.origin
+        self.panels = None

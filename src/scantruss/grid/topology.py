@@ -28,6 +28,7 @@ class Topology:
 
 def _links(grid: GridTables) -> tuple[np.ndarray, np.ndarray]:
     """Return the pairs of half-edges that lie on one edge, each half-edge with the next of its edge."""
+    grid = grid.triangulated
     order = np.argsort(grid.half_edge_edges, kind="stable")
     sorted_edges = grid.half_edge_edges[order]
     same = np.flatnonzero(sorted_edges[1:] == sorted_edges[:-1])
@@ -66,6 +67,7 @@ def wound_alike(grid: GridTables) -> np.ndarray:
 
 def pinched_nodes(grid: GridTables) -> np.ndarray:
     """Return the nodes whose triangles are more than one fan, joined over edges at the node."""
+    grid = grid.triangulated
     count = len(grid.triangles)
     corners = grid.triangles.T.ravel()  # corner k of triangle t stands at k * count + t, as does the half-edge k
     one, other = _links(grid)
@@ -87,6 +89,7 @@ def measure_topology(grid: GridTables) -> Topology:
     Nodes without a triangle do not count. Manifold: no edge has more than two triangles, the triangles at each node
     are one fan, and no triangle is there twice or has a node twice.
     """
+    grid = grid.triangulated
     triangles, edges, uses = grid.triangles, grid.edges, grid.edge_uses
     if len(triangles) == 0:
         return Topology(components=0, boundary_loops=0, euler=0, manifold=True, orientable=True)

@@ -98,6 +98,10 @@ def double_layer(
             raise InputError(f"the depth of a double layer must be positive, got {each!r}")
     if not 1 <= len(depths) < MOST_LAYERS:
         raise InputError(f"a grid can have 2 to {MOST_LAYERS} layers, got {len(depths)} depths")
+    if grid.panels is not None:
+        raise InputError(
+            f"a double layer needs a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle"
+        )
     if len(grid.triangles) == 0 or not (grid.topology.manifold and grid.topology.orientable):
         raise InputError("a double layer needs a manifold, oriented grid with triangles")
     normals = smoothed_normals(grid)

@@ -106,6 +106,10 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         raise InputError(f"the tolerance of families is a share of the mean member, 0.01% to 20%, got {tolerance!r}")
     if count < 1:
         raise InputError(f"the number of families must be 1 or more, got {count}")
+    if grid.panels is not None:
+        raise InputError(
+            f"families need a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle"
+        )
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError("families of members need a manifold grid with members")
     mean = float(grid.lengths.mean())

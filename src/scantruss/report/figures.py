@@ -38,6 +38,7 @@ def report_of(grid: Grid, points: int) -> dict[str, Any]:
         "nodes": len(grid.nodes),
         "members": len(grid.edges),
         "triangles": len(grid.triangles),
+        **({} if grid.panels is None else {"panels": len(grid.panels), "cells": grid.cells}),
         "line_members": len(grid.lines),
         "fixed_lines": sets_of(grid, FIXED_LINE),
         "ridges": sets_of(grid, RIDGE),
@@ -60,7 +61,7 @@ def count_holes(grid: Grid) -> int:
 
 def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
     """Return the figures of Table 2: name, before, after optimization."""
-    rows = (
+    rows: tuple[tuple[str, str, str], ...] = (
         ("shape quality, mean", "shape_mean", "{:.4f}"),
         ("shape quality, std", "shape_std", "{:.4f}"),
         ("shape quality, smallest", "shape_min", "{:.3f}"),
@@ -73,6 +74,12 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
         ("largest angle", "angle_max", "{:.1f}"),
         ("nodes of six members", "valence6", "{:.0%}"),
     )
+    if grid.cells != "triangle":
+        rows = (
+            *rows[:-1],
+            (f"nodes of {'four' if grid.cells == 'quad' else 'three'} members", "regular", "{:.0%}"),
+            ("panels off their plane", "planarity_max", "{:.2%}"),
+        )
     after, before = grid.quality.to_dict(), grid.before.to_dict() if grid.before is not None else {}
     unit = f" [{grid.unit}]" if grid.unit else ""
     return [
@@ -91,7 +98,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     topology = grid.topology
     loops = topology.boundary_loops
     lines = [
-        f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.triangles)} triangles from {points} points",
+        f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.panel_table)} {grid.panels_are} from {points} points",
         f"{topology.components} {'piece' if topology.components == 1 else 'pieces'}, "
         + (
             f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {count_holes(grid)} of them holes"

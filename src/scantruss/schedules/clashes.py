@@ -137,7 +137,7 @@ def _folds(parts: Parts) -> list[WarningRow]:
     limit = parts.settings.least_fold
     rows: list[WarningRow] = []
     for member in np.flatnonzero(fold < limit * (1.0 - SAME_SIZE)).tolist():
-        one, two = parts.grid.edge_triangles[member].tolist()
+        one, two = parts.grid.edge_panels[member].tolist()
         place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
         rows.append(
             ("sharp fold", parts.member_marks[member], f"{parts.panel_marks[one]} {parts.panel_marks[two]}",

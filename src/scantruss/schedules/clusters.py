@@ -111,14 +111,27 @@ def _cluster(
     return _sorted_by_count(of, np.array(representative, np.int64), misfit)
 
 
-def cluster_panels(sides: np.ndarray, tolerance: float) -> Clusters:
-    """Return the types of panels by their sides (T, 3), anticlockwise, wherever one begins; the misfit is that of the worst side."""
+def cluster_panels(sides: np.ndarray, tolerance: float, across: np.ndarray | None = None) -> Clusters:
+    """Return the types of panels by their sides, anticlockwise, wherever one begins; the misfit is that of the worst side.
+
+    Parameters
+    ----------
+    sides : (P, K) lengths, NaN where a panel has no such side [mm]
+    tolerance : largest misfit of one type [mm]
+    across : (P, K) distances from node k to node k + 2 of panels of more than three nodes, which have to agree too
+    """
+    size = np.isfinite(sides).sum(axis=1)
+    sizes = [sides] if across is None else [sides, across]
 
     def misfits(item: int, others: np.ndarray) -> np.ndarray:
-        turned = np.stack([np.roll(sides[item], -k) for k in range(3)])
-        return np.abs(sides[others][:, None] - turned).max(axis=2).min(axis=1)
+        count = int(size[item])
+        far = np.zeros((len(others), count))
+        for values in sizes:
+            turned = np.stack([np.roll(values[item, :count], -k) for k in range(count)])
+            far = np.maximum(far, np.abs(values[others, None, :count] - turned).max(axis=2))
+        return far.min(axis=1)
 
-    keys = np.column_stack([np.full(len(sides), 3), np.sort(sides, axis=1)])
+    keys = np.column_stack([size, *(np.nan_to_num(np.sort(values, axis=1)) for values in sizes)])
     return _cluster(keys, tolerance, misfits, len(sides), np.arange(len(sides)))
 
 

@@ -12,6 +12,7 @@ from ..check.folds import fold_angles
 from ..errors import InputError
 from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
+from ..grid.panels import across_of
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .bolts import NO_BOLTS, PITCHES, bolted_radii, choose_bolts
@@ -85,8 +86,8 @@ def schedule(
     radius = np.where(joints.valence > 0, _radii(needed, node_types, settings.ball), 0.0)
     length = grid.lengths * size
     cut = length - radius[grid.edges].sum(axis=1)
-    corners = grid.nodes[grid.triangles]
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2) * size
+    members = grid.panel_members
+    sides = np.where(members >= 0, length[members], np.nan)
     return all_tables(
         Parts(
             grid=grid,
@@ -105,7 +106,9 @@ def schedule(
             sides=sides,
             fold=inner_folds(grid),
             node_types=node_types,
-            panel_types=cluster_panels(sides, settings.tolerance),
+            panel_types=cluster_panels(
+                sides, settings.tolerance, None if grid.panels is None else size * across_of(grid.nodes, grid.panels)
+            ),
             length_types=cluster_lengths(cut, settings.tolerance, kind),
             node_marks=marks[0],
             member_marks=marks[1],

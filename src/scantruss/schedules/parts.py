@@ -44,7 +44,7 @@ class Parts:
     radius: np.ndarray  #: (V,) radius of the balls; 0 without members
     length: np.ndarray  #: (E,)
     cut: np.ndarray  #: (E,) length without the balls
-    sides: np.ndarray  #: (T, 3) from node k to node k + 1
+    sides: np.ndarray  #: (P, K) from node k to the next, NaN where a panel has no such side
     fold: np.ndarray  #: (E,) angle between the panels on their inner side; 180 level, NaN at the boundary [degree]
     node_types: Clusters
     panel_types: Clusters

@@ -10,6 +10,8 @@ import numpy as np
 
 from ..grid.groups import BOUNDARY, INNER, member_groups
 from ..grid.marks import numbered
+from ..grid.panels import diagonals_of, panel_of_triangles, planarity_of
+from ..structure.truss import area_vectors
 from .bolts import bolt_mark
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
@@ -214,30 +216,47 @@ def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray
 
 
 def _areas(parts: Parts) -> np.ndarray:
-    """Return the area of each panel (T,) [m2]."""
-    a, b, c = (parts.grid.nodes[parts.grid.triangles[:, k]] for k in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0 * (parts.size / 1000.0) ** 2
+    """Return the area of each panel (P,) [m2]."""
+    grid = parts.grid
+    areas = np.linalg.norm(area_vectors(grid.nodes, grid.triangles), axis=1)
+    if grid.panels is not None:
+        areas = np.bincount(panel_of_triangles(grid.panels), areas, len(grid.panels))
+    return areas * (parts.size / 1000.0) ** 2
 
 
 def _panels(parts: Parts) -> Schedule:
     """One row for each panel; side 1 runs from node 1 to node 2, and so on."""
     grid = parts.grid
-    sides = grid.half_edge_edges.reshape(3, -1).T
-    neighbour = grid.edge_triangles[sides].sum(axis=2) - np.arange(len(sides))[:, None]  # -1 beyond the boundary
+    sides, panels = grid.panel_members, grid.panel_table
+    width = range(panels.shape[1])
+    neighbour = grid.edge_panels[sides].sum(axis=2) - np.arange(len(sides))[:, None]  # -1 beyond the boundary
+    neighbour[sides < 0] = -1
+    fold = np.where(sides >= 0, parts.fold[sides], np.nan)
     marks = [*parts.panel_marks, None]
+    corners = [*parts.node_marks, None]
     return Schedule(
         "Panels",
         (
             column("panel", "", parts.panel_marks),
-            *(column(f"node {k + 1}", "", _of(parts.node_marks, grid.triangles[:, k])) for k in range(3)),
+            *(column(f"node {k + 1}", "", [corners[v] for v in panels[:, k].tolist()]) for k in width),
             column("panel type", "", _of(_type_marks("PT", parts.panel_types), parts.panel_types.of)),
-            *(column(f"side {k + 1}", "mm", parts.sides[:, k]) for k in range(3)),
-            *(column(f"angle {k + 1}", DEGREE, grid.angles[:, k]) for k in range(3)),
+            *(column(f"side {k + 1}", "mm", parts.sides[:, k]) for k in width),
+            *(column(f"angle {k + 1}", DEGREE, grid.corner_angles[:, k]) for k in width),
+            *_out_of_plane(parts),
             column("area", "m2", _areas(parts), summed=True),
-            *(column(f"neighbour {k + 1}", "", [marks[t] for t in neighbour[:, k].tolist()]) for k in range(3)),
-            *(column(f"fold {k + 1}", DEGREE, parts.fold[sides[:, k]]) for k in range(3)),
+            *(column(f"neighbour {k + 1}", "", [marks[t] for t in neighbour[:, k].tolist()]) for k in width),
+            *(column(f"fold {k + 1}", DEGREE, fold[:, k]) for k in width),
         ),
     )
+
+
+def _out_of_plane(parts: Parts) -> list[Column]:
+    """Return how far the corners of panels of more than three nodes lie off their mean planes; nothing of triangles."""
+    panels, nodes = parts.grid.panels, parts.grid.nodes
+    if panels is None:
+        return []
+    off = planarity_of(nodes, panels) * diagonals_of(nodes, panels) * parts.size
+    return [column("off its plane", "mm", off)]
 
 
 def _types(title: str, letters: str, types: Clusters, marks: Sequence[str], unit: str, *more: Column) -> Schedule:
@@ -277,9 +296,18 @@ def _panel_types(parts: Parts) -> Schedule:
     types, one = parts.panel_types, parts.panel_types.representative
     return _types(
         "Panel types", "PT", types, parts.panel_marks, "mm",
-        *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(3)), column("area of one", "m2", _areas(parts)[one]),
-        _images("PT", types, panel_images(types, parts.sides, parts.settings.tolerance)),
+        *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(parts.sides.shape[1])),
+        column("area of one", "m2", _areas(parts)[one]),
+        *_panel_images(parts),
     )  # fmt: skip
+
+
+def _panel_images(parts: Parts) -> list[Column]:
+    """Return the column of the types of triangles that are mirror images; none for other panels, whose sides do not tell."""
+    types = parts.panel_types
+    if parts.grid.panels is not None:
+        return []
+    return [_images("PT", types, panel_images(types, parts.sides, parts.settings.tolerance))]
 
 
 def _lengths(parts: Parts) -> Schedule:

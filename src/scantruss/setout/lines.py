@@ -54,10 +54,6 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
     node = np.where(share < AT_NODE, start[cut], np.where(share > 1 - AT_NODE, end[cut], -1))
     points = places[start[cut]] + share[:, None] * (places[end[cut]] - places[start[cut]])
     points = np.where(node[:, None] >= 0, places[node], points)
-    at = np.full(len(grid.edges), -1)
-    at[cut] = np.arange(len(cut))
-    sides = at[grid.half_edge_edges.reshape(3, -1).T]
-    crossed = np.sort(sides[(sides >= 0).sum(axis=1) == 2], axis=1)[:, 1:]
     order = np.lexsort((cut, points[:, 2], points[:, 1 - axis]))
     first = np.ones(len(order), bool)  # of several members that meet at a node the first stands
     seen: set[int] = set()
@@ -65,7 +61,7 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
         first[rank] = number < 0 or number not in seen
         seen.add(number)
     order = order[first]
-    segments = np.concatenate([points[crossed], _inner_segments(grid, places, axis, plane[1])])
+    segments = np.concatenate([_segments(grid, places, off), _inner_segments(grid, places, axis, plane[1])])
     return SectionLine(name, axis, plane[1], cut[order], node[order], points[order], segments)
 
 
@@ -87,6 +83,20 @@ def _inner_segments(grid: Grid, places: np.ndarray, axis: int, place: float) -> 
             share = (off[cut] / (off[cut] - beyond[cut]))[:, None]
             found.append((corners[cut] + share * (following[cut] - corners[cut]))[None])
     return np.concatenate(found)
+
+
+def _segments(grid: Grid, places: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Return the parts (S, 2, 3) of a section within triangles, by the distances of the nodes from its plane (V,)."""
+    surface, side = grid.triangulated, off >= 0
+    start, end = surface.edges.T
+    cut = np.flatnonzero(side[start] != side[end])
+    share = (off[start[cut]] / (off[start[cut]] - off[end[cut]]))[:, None]
+    share = np.where(share < AT_NODE, 0.0, np.where(share > 1 - AT_NODE, 1.0, share))
+    points = places[start[cut]] + share * (places[end[cut]] - places[start[cut]])
+    at = np.full(len(surface.edges), -1)
+    at[cut] = np.arange(len(cut))
+    sides = at[surface.half_edge_edges.reshape(3, -1).T]
+    return points[np.sort(sides[(sides >= 0).sum(axis=1) == 2], axis=1)[:, 1:]]
 
 
 def unroll(grid: Grid, places: np.ndarray) -> list[Unrolled]:

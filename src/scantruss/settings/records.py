@@ -16,6 +16,8 @@ from ..selection import FORMS, RETURNS
 SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
 SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
+CELLS = ("triangle", "quad", "hexagon")
+ROW_GUIDES = ("boundary", "curvature")
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
@@ -90,6 +92,15 @@ class MemberSettings(_Checked):
         "",
         "member lengths that vary over the scan: curvature:MIN:MAX, or lengths given at places (x, y, z, length)",
         unit="scan unit",
+    )
+    cells: str = _setting("triangle", "what the panels are: triangles, quads or hexagons", choices=CELLS)
+    rows: str = _setting(
+        "boundary",
+        "what the rows of quads follow inside: the boundary, or the directions of least and greatest curvature",
+        choices=ROW_GUIDES,
+    )
+    planar: bool = _setting(
+        False, "make quads or hexagons planar, as far as nodes within a tenth of a member of the scan allow it"
     )
     method: str = _setting("default", "default: the improved method; paper: the paper to the letter", choices=METHODS)
     effort: str = _setting(

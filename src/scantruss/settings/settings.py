@@ -63,6 +63,10 @@ class Settings(
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
             raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
         super().__post_init__()
+        if self.cells != "quad" and self.rows != "boundary":
+            raise InputError(f"rows {self.rows} needs cells quad, got {self.cells}")
+        if self.planar and self.cells == "triangle":
+            raise InputError("planar needs cells quad or hexagon; triangles always are")
         object.__setattr__(self, "fixed", check_positions(self.fixed))
         for name in ("fill_at", "no_ridge_at"):
             object.__setattr__(self, name, check_places(name, getattr(self, name)))

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, numbered
+from ..grid.panels import turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
 from ..settings import UNITS
@@ -60,7 +61,8 @@ def truss_of_grid(
     if lengths.min() <= 0:
         raise InputError(f"member {marks[int(lengths.argmin())]} has no length; a structure needs nodes apart")
     areas = area_vectors(nodes, triangles)
-    if areas[:, 2].sum() < -1e-9 * np.abs(areas).sum():  # a shell is loaded from above
+    turned = bool(areas[:, 2].sum() < -1e-9 * np.abs(areas).sum())
+    if turned:  # a shell is loaded from above
         triangles, areas = triangles[:, ::-1].copy(), -areas
     node_normals = np.zeros_like(nodes)
     for corner in triangles.T:
@@ -69,6 +71,7 @@ def truss_of_grid(
         nodes=nodes,
         members=members,
         triangles=triangles,
+        panels=None if grid.panels is None else turned_panels(grid.panels) if turned else grid.panels,
         node_normals=_unit(node_normals),
         member_normals=_unit(_at_members(grid, _unit(areas))),
         sections=(find_section(section) if isinstance(section, str) else section,),
@@ -162,7 +165,8 @@ def _joints(joints: str | float) -> tuple[bool, float]:
 def _at_members(grid: Grid, normals: np.ndarray) -> np.ndarray:
     """Return the (E, 3) sums of the normals of the triangles at each member."""
     total = np.zeros((len(grid.edges), 3))
-    np.add.at(total, grid.half_edge_edges, np.tile(normals, (3, 1)))
+    at = grid.half_edge_edges
+    np.add.at(total, at[at >= 0], np.tile(normals, (3, 1))[at >= 0])
     return total
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
+from ..grid.panels import loops_of, table_of
 from ..layouts.double_layer import Layers
 from ..runtime.ours import MARK
 from .catalogue import Material, Section
@@ -48,6 +49,7 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         "node_marks": list(truss.node_marks),
         "member_marks": list(truss.member_marks),
         "node_sets": truss.node_sets,
+        **({} if truss.panels is None else {"panels": loops_of(truss.panels)}),
         **({"member_sets": truss.member_sets} if truss.member_sets else {}),
         **({"layers": vars(truss.layers)} if truss.layers else {}),
         **{name: getattr(truss, name) for name in _ARRAYS},
@@ -168,8 +170,10 @@ def _truss_of(values: dict[str, Any]) -> Truss:
             if load is not None and len(load) != (count if name in ("nodal", "settlement") else members):
                 raise ValueError(f"the load case {each['name']} has {len(load)} rows of {name}")
         cases.append(LoadCase(str(each["name"]), str(each["action"]), float(each["self_weight"]), **loads))
+    loops = values.get("panels")
     return Truss(
         **arrays,
+        panels=None if loops is None else table_of([_ids(np.array(loop), count).tolist() for loop in loops]),
         sections=sections,
         material=Material(**values["material"]),
         end_stiffness=_array(values["end_stiffness"], 4).reshape(members, 2, 2),

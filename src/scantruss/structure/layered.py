@@ -35,6 +35,7 @@ def grid_of_triangles(truss: Truss, scale: float = 1.0) -> Grid:
     return Grid(
         nodes=truss.nodes / scale,
         triangles=truss.triangles,
+        panels=truss.panels,
         fixed=np.zeros(len(truss.nodes), bool),
         origin=truss.origin / scale,
         unit="m",

@@ -59,6 +59,7 @@ class Truss:
     material: Material
     supports: np.ndarray  #: (V, 6) stiffness of the supports; inf is held, 0 is free [N/m, Nm/rad]
     end_stiffness: np.ndarray  #: (M, 2, 2) rotational springs at start and end, about y and z; inf is rigid [Nm/rad]
+    panels: np.ndarray | None = None  #: (P, K) int64 nodes of quads or hexagons, filled up with -1; None: the triangles
     pinned: bool = False  #: members carry axial forces only, and nodes do not turn
     cases: tuple[LoadCase, ...] = ()
     combinations: tuple[Combination, ...] = ()
@@ -101,6 +102,11 @@ class Truss:
     def mass(self) -> float:
         """Mass of all members, without an allowance for the nodes [kg]."""
         return float(self.member_mass.sum())
+
+    @property
+    def panel_table(self) -> np.ndarray:
+        """(P, K) the nodes of each panel, filled up with -1."""
+        return self.triangles if self.panels is None else self.panels
 
     @cached_property
     def triangle_areas(self) -> np.ndarray:

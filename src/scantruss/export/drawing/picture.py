@@ -147,7 +147,7 @@ def caption_of(grid: Grid) -> str:
     """Return the figures of a grid in one line."""
     quality = grid.quality
     return (
-        f"{len(grid.nodes)} nodes   {len(grid.edges)} members   {len(grid.triangles)} triangles      "
+        f"{len(grid.nodes)} nodes   {len(grid.edges)} members   {len(grid.panel_table)} {grid.panels_are}      "
         f"member length {quality.length_mean:.4g} ± {quality.length_std:.2g} {grid.unit}".rstrip()
         + f"      shape quality {quality.shape_mean:.3f} ± {quality.shape_std:.3f}"
     )

@@ -1,0 +1,1 @@
+"""Grids of quads and hexagons, made of a finished grid of triangles."""

@@ -1,0 +1,104 @@
+"""Grids of quads and hexagons, made of a finished grid of triangles, with certificates of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..check.certify import certified
+from ..check.limits import PLACES_KEPT
+from ..constraints.network import NO_LINES
+from ..grid.certificate import Fault, place_of
+from ..grid.grid import Grid
+from ..grid.panels import planarity_of
+from ..improve.working_mesh import WorkingMesh
+from ..runtime.progress import Progress
+from ..surface.scratch import with_own_scratch
+from .hexagons import TRIANGLE_MEMBER, hexagons_of
+from .planar import PLANAR_ENOUGH, make_planar
+from .quads import quads_of
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..constraints.find import Constraints
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
+
+
+def settings_of_triangles(settings: Settings) -> Settings:
+    """Return the settings of the triangles that the cells are made of: larger ones for hexagons, made with little effort for quads."""
+    if settings.cells == "quad":
+        return settings.replace(effort="quick")
+    if settings.cells == "hexagon":
+        closed = settings.closed_boundary_length
+        return settings.replace(length=TRIANGLE_MEMBER * settings.length, fill_holes=closed)
+    return settings
+
+
+def with_cells(
+    grid: Grid,
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> Grid:
+    """Return the grid of the cells that the settings ask for, made of one of triangles, with its certificate.
+
+    Parameters
+    ----------
+    grid : Grid
+        Of triangles, that passes the checks.
+    samples, boundary, constraints
+        What it was made with.
+    settings : Settings
+        `cells`, `planar`.
+    progress : callable, optional
+        Called with ("cells", share); may raise to stop.
+
+    Raises
+    ------
+    FrontError
+        The grid does not pass the checks.
+    """
+    if settings.cells == "triangle":
+        return grid
+    make = quads_of if settings.cells == "quad" else hexagons_of
+    made = make(grid, samples, boundary, constraints, settings, progress=progress)
+    judged = settings
+    if (
+        settings.cells == "hexagon"
+    ):  # members of the boundary are as long as those of the triangles; the certificate says so
+        judged = settings.replace(max_length=TRIANGLE_MEMBER * settings.max_length)
+    if not settings.planar:
+        return certified(made.replace(settings=settings), samples, boundary, judged)
+    surface = with_own_scratch(samples.surface)
+    lines = constraints.lines if settings.cells == "quad" else NO_LINES
+    mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, settings.length, lines)
+    flat = make_planar(mesh, made)
+    flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
+    found = certified(flat.replace(settings=settings), samples, boundary, judged)
+    return with_warning_of_planes(found)
+
+
+def with_warning_of_planes(grid: Grid) -> Grid:
+    """Return a grid with a warning of the panels that the surface does not let be planar, the worst first."""
+    assert grid.certificate is not None and grid.panels is not None
+    off = planarity_of(grid.nodes, grid.panels)
+    bent = np.flatnonzero(off > PLANAR_ENOUGH)
+    if not len(bent):
+        return grid
+    worst = bent[np.argsort(-off[bent], kind="stable")]
+    middles = [grid.nodes[grid.panel_loops[p]].mean(axis=0) + grid.origin for p in worst[:PLACES_KEPT].tolist()]
+    first, *others = map(place_of, middles)
+    words = (
+        f"has {len(bent)} of {len(off)} panels that the surface does not let be planar, a corner {off[worst[0]]:.2%} of the"
+        " diagonal off"
+    )
+    if grid.cells == "quad" and grid.settings is not None and grid.settings.rows != "curvature":
+        words += "; --rows curvature turns the rows to where they can be"
+    warning = Fault("plane", words, first, tuple(others))
+    return grid.replace(certificate=replace(grid.certificate, warnings=(*grid.certificate.warnings, warning)))

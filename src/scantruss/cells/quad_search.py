@@ -1,0 +1,150 @@
+"""Local search of the topology of quads: each move is kept where it lowers the energy, or where another after it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from .quad_mesh import QuadMesh
+from .quad_moves import NO_PAIR, Move, Moves
+
+RINGS_SETTLED = 2  # rings of quads around a move whose nodes settle in a trial
+TRIAL_SWEEPS = 8  # most sweeps of a trial
+BARRIER = 0.6  # most energy that the first of two moves may cost
+LEAST_GAIN = 1e-3  # least energy that a move must gain
+MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
+ROUNDS_OF_EFFORT = {"quick": 2, "normal": 6, "best": 12}  # most rounds of the search
+RENEWED_IN_SEARCH = (
+    0.4  # distance of a node from the centre of its patch that gets it a new one after a round [members]
+)
+SWEEPS_AFTER_ROUND = 30  # most sweeps of all nodes after a round
+
+
+class Made(NamedTuple):
+    """A move that was made, and what was there before."""
+
+    move: Move
+    quads: dict[int, list[int]]  #: corners before, of quads that were there
+    fresh: list[int]  #: quads that were not
+    places: np.ndarray  #: (K,) nodes that may have moved
+    nodes: np.ndarray  #: (K, 3) where they were
+    arc: np.ndarray  #: (K,) the same on their curves
+    growth: float  #: of the energy
+
+
+class Search:
+    """A round of the search over a mesh of quads."""
+
+    def __init__(self, mesh: QuadMesh, price: float, twice: bool) -> None:
+        self.mesh, self.moves = mesh, Moves(mesh)
+        self.price = price  # energy of a quad more or less
+        self.twice = twice  # whether moves that cost energy are followed by another
+        self.kept = self.clock = 0
+        self.stamp = [0] * len(mesh.at)  # when each node was last changed
+        self.done: dict[tuple[int | str, ...], int] = {}  # when each move was last tried
+
+    def make(self, move: Move, allowed: float) -> Made | None:
+        """Make a move and settle around it; take it back and return None unless the energy grows by less than allowed."""
+        mesh = self.mesh
+        kept, other = move.pair
+        inner = {v for v in move.touched if mesh.at[v]}
+        for _ in range(RINGS_SETTLED - 1):
+            inner |= {v for u in inner for q in mesh.at[u] for v in mesh.quads[q]}
+        ids = sorted({q for v in inner for q in mesh.at[v]})
+        before = [mesh.quads[q] for q in ids]
+        places = np.array(sorted({v for corners in before for v in corners}), np.int64)
+        old_nodes, old_arc = mesh.nodes[places], mesh.arc[places]
+        old, fresh = mesh.change(move.quads)
+        if move.kind == "split":
+            mesh.free.pop()
+            mesh.add_node(kept, other)
+            self.moves.rim[other], self.moves.ideals[other] = False, 4
+        after = [mesh.quads[q] for q in [*ids, *fresh] if mesh.quads[q]]
+        join = move.pair if move.kind == "collapse" else NO_PAIR
+        growth = mesh.try_quads(before, after, self.moves.rim, TRIAL_SWEEPS, *join) - move.growth * self.price
+        if move.kind == "collapse":
+            mesh.free.append(other)
+        made = Made(move, old, fresh, places, old_nodes, old_arc, growth)
+        if growth < allowed:
+            return made
+        self.take_back(made)
+        return None
+
+    def take_back(self, made: Made) -> None:
+        """Take the last move back."""
+        mesh = self.mesh
+        mesh.change(made.quads)
+        del mesh.quads[len(mesh.quads) - len(made.fresh) :]
+        if made.move.kind == "split":
+            mesh.free.append(made.move.pair[1])
+        elif made.move.kind == "collapse":
+            mesh.free.pop()
+        mesh.nodes[made.places], mesh.arc[made.places] = made.nodes, made.arc
+
+    def keep(self, *made: Made) -> None:
+        """Note that moves are kept: what was tried around them may be tried again."""
+        self.kept += 1
+        self.clock += 1
+        for each in made:
+            for v in (*each.places.tolist(), *each.move.touched):
+                self.stamp[v] = self.clock
+
+    def try_move(self, move: Move | None) -> bool:
+        """Make a move if the energy falls by it, or by it and another after it."""
+        if move is None:
+            return False
+        first = self.make(move, BARRIER if self.twice else -LEAST_GAIN)
+        if first is None:
+            return False
+        if first.growth < -LEAST_GAIN:
+            self.keep(first)
+            return True
+        for name in self.moves.after(move):
+            then = self.moves.named(name)
+            second = self.make(then, -first.growth - LEAST_GAIN) if then is not None else None
+            if second is not None:
+                self.keep(first, second)
+                return True
+        self.take_back(first)
+        return False
+
+    def untried(self, key: tuple[int | str, ...], nodes: Iterable[int]) -> bool:
+        """Whether a move has not been tried since one of its nodes changed; notes that it is."""
+        if self.done.get(key, -1) >= max(self.stamp[v] for v in nodes):
+            return False
+        self.done[key] = self.clock
+        return True
+
+    def run(self) -> int:
+        """Try all moves at irregular nodes once; returns how many were kept."""
+        mesh, moves = self.mesh, self.moves
+        for v in [v for v in range(len(mesh.at)) if mesh.at[v] and moves.charge(v)]:
+            for q in sorted(mesh.at[v]):
+                for k in (0, 1):
+                    if mesh.quads[q] and self.untried(("collapse", q, k), mesh.quads[q]):
+                        self.try_move(moves.collapse(q, k))
+            rings = [mesh.quads[q] for q in sorted(mesh.at[v])]
+            sides = {(min(a, b), max(a, b)) for ring in rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)}
+            for a, b in sorted(sides):
+                for way in (1, 2):
+                    if self.untried(("turn", a, b, way), (a, b)):
+                        self.try_move(moves.turn(a, b, way))
+            for w in (v, *moves.ring_of(v)):
+                if mesh.at[w] and self.untried(("split", w), (w,)):
+                    any(self.try_move(move) for move in moves.splits(w))
+        return self.kept
+
+
+def search_quads(mesh: QuadMesh, effort: str, report: Callable[[float], None]) -> None:
+    """Search until no move is kept, in rounds, and settle after each."""
+    rounds = ROUNDS_OF_EFFORT[effort]
+    for number in range(rounds):
+        report(number / rounds)
+        price = float(min(mesh.energies(mesh.live()).mean(), MOST_PRICE))
+        kept = Search(mesh, price, twice=number > 0 and effort != "quick").run()
+        mesh.renew(RENEWED_IN_SEARCH)
+        mesh.settle(SWEEPS_AFTER_ROUND)
+        if kept == 0:
+            break

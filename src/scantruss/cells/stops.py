@@ -1,0 +1,34 @@
+"""Nodes at corners and on the boundary curves, which projections move off them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..grid.grid import Grid
+from ..improve.working_mesh import WorkingMesh
+from ..kernels.boundary.curves import slide
+from ..kernels.mesh.grid import ON_CURVE
+
+AT_STOP = 0.6  # distance up to which a node of the boundary is that of a corner [members]
+
+
+def at_stops(grid: Grid, stops: np.ndarray, length: float) -> Grid:
+    """Return a grid whose nodes at corners and ends of lines lie where these are on the boundary curve, which projection left."""
+    rim = np.unique(grid.edges[grid.edge_uses == 1])
+    if not len(stops) or not len(rim):
+        return grid
+    nodes = grid.nodes.copy()
+    for place in stops:
+        away = np.linalg.norm(grid.nodes[rim] - place, axis=1)
+        if away.min() < AT_STOP * length:
+            nodes[rim[away.argmin()]] = place
+    return grid.replace(nodes=nodes)
+
+
+def slide_back(mesh: WorkingMesh, count: int) -> None:
+    """Bring those of the first `count` nodes that slide back onto their curves."""
+    net = mesh.net
+    for v in np.flatnonzero(net.kind[:count] == ON_CURVE).tolist():
+        reach = 0.5 * mesh.length * net.desired[v]
+        net.arc[v], *place = slide(mesh.curves, net.curve[v], net.arc[v], reach, *net.nodes[v].tolist())
+        net.nodes[v] = place

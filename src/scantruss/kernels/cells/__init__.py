@@ -1,0 +1,1 @@
+"""Quads on the scan."""
