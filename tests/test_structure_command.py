@@ -175,6 +175,27 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
     assert st.read_structure("out.json").lengths.mean() == pytest.approx(2.0, rel=0.05)
 
 
+def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All nodes held, a force without a unit, own combinations that leave out displacements, a factor of buckling below 1."""
+    Path("odd.toml").write_text(
+        'scale = 50\n[[loads]]\ncase = "lamp"\nforce = [0, 0, -2]\nnodes = ["N025"]\n'
+        '[[combinations]]\nname = "mine"\nstate = "ULS"\nfactors = { lamp = 1.5 }\n'
+    )
+    assert run("structure grid.json out.json --settings odd.toml --supports lowest:50") == 0
+    said = capsys.readouterr().out
+    assert "warning: 49 of 49 nodes are held; heights of supports are in metres" in said
+    assert 'force = [0, 0, -2] has no unit and is taken in N; write it as "-2N"' in said
+    assert "have none of SLS" in said and "supports: 49 nodes, 0 to " in said
+    assert (
+        run("structure grid.json out.json --scale 50 --supports corners --loads self,cladding:90kN/m2 --buckling 1")
+        == 0
+    )
+    said = capsys.readouterr().out
+    assert (
+        "it does not carry this load" in said and "analysis of first order" not in said and "nodes are held" not in said
+    )
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -196,6 +217,8 @@ def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
         ("grid.json out.json --loads hail:1kN/m2", "no load 'hail:1kN/m2'; use self, cladding:P"),
         ("grid.json out.json --loads wind:1kN/m2:a", "coefficients of wind are numbers"),
         ("grid.json out.json --loads ,", "no loads"),
+        ("grid.json out.json --loads self,self", "the load self is given 2 times"),
+        ("grid.json out.json --loads snow:-1kN/m2", "snow weighs down and must be positive"),
         ("grid.json out.json --loads no.toml", "cannot read no.toml"),
         ("grid.json out.json --scale 0", "scale must be a positive number"),
         ("grid.json out.json --buckling 99", "numbers of modes, 0 to 50"),

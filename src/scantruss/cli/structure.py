@@ -106,6 +106,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
+    from ..structure.doubts import support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
     from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
@@ -161,6 +162,7 @@ def structure(values: Namespace) -> None:
         [
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
+            support_words(truss),
             *mode_lines(report),
             *([] if buckling or path else ["the stability of the whole is not looked at; --buckling 1 does"]),
             *(f"warning: {words}" for words in report.warnings),
@@ -262,7 +264,10 @@ def _nodes_near(grid: Grid, path: str) -> np.ndarray:
 
 def _notes(settings: StructureSettings) -> list[str]:
     """Return warnings of what was taken for granted."""
+    from ..structure.options import units_taken
+
     words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
+    said = units_taken(settings.loads)
     if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
-        return ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
-    return []
+        said += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return said

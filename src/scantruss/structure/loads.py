@@ -39,6 +39,7 @@ VARIABLE_FACTOR = 1.5  #: of variable actions: EN 1990 table A1.2(B)
 COMPANION = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
 ACTIONS = ("permanent", *COMPANION)
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
+ONCE = ("self", "snow", "half-snow", "temperature")  #: loads of which a second one is a slip
 MOST_COMBINATIONS = 200  #: made without being asked for one by one
 
 
@@ -53,6 +54,12 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
     if not 0 <= node_allowance <= 2:
         raise InputError(f"node_allowance is a share of the members' weight, 0 to 2, got {node_allowance!r}")
     given = [word for word in loads.split(",") if word.strip()] if isinstance(loads, str) else list(loads)
+    words = [str(load).strip().partition(":")[0] for load in given if not isinstance(load, LoadCase | Mapping)]
+    for name in ONCE:
+        if words.count(name) > 1:
+            raise InputError(
+                f"the load {name} is given {words.count(name)} times; give it once, or cases of other names in a file"
+            )
     found: dict[str, LoadCase] = {}
     for load in given:
         if isinstance(load, LoadCase):
@@ -141,6 +148,10 @@ def _of_words(truss: Truss, words: str, node_allowance: float) -> list[LoadCase]
     value = quantity(pressure, PRESSURE, f"{name}, a load on an area,")
     if len(truss.triangles) == 0:
         raise InputError(f"the load {name} acts on an area, and the grid has no triangles")
+    if value < 0 and name != "wind":
+        raise InputError(
+            f"{name} weighs down and must be positive, got {pressure}; loads that lift are wind, or forces in a file"
+        )
     if name == "wind":
         return [_wind(truss, value, coefficient, angle)]
     if coefficient:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -116,6 +116,24 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
                 f"{path} has {name!r} = {value!r}; known are {' '.join(sorted(known | check_names | {'combinations'}))}"
             )
     return StructureSettings(**given, checks=MemberChecks(**checks))
+
+
+def units_taken(loads: str | Sequence[Any]) -> list[str]:
+    """Return warnings of loads in tables that are numbers without a unit; people who write files think in kN."""
+    said = []
+    for table in loads:
+        for kind, unit in (("force", "N"), ("line", "N/m"), ("settlement", "m"), ("lengthening", "m")):
+            given = table.get(kind) if isinstance(table, Mapping) else None
+            numbers = [
+                value
+                for value in (given if isinstance(given, list | tuple) else [given])
+                if isinstance(value, int | float)
+            ]
+            if any(numbers):
+                said.append(
+                    f'{kind} = {given!r} has no unit and is taken in {unit}; write it as "{max(numbers, key=abs):g}{unit}"'
+                )
+    return said
 
 
 def settings_text(settings: StructureSettings) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .doubts import doubts_of
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
 from .modes import Modes
@@ -157,7 +158,7 @@ def report_structure(
             more = each.max(axis=1) > worst
             worst[more], clause[more], load[more] = each.max(axis=1)[more], each.argmax(axis=1)[more], number
     governing = tuple(f"{CLAUSES[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
-    said = [*truss.warnings, *notes]
+    said = [*truss.warnings, *doubts_of(truss), *notes]
     if not strength.known:
         why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
         said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
@@ -167,10 +168,9 @@ def report_structure(
         said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
     said += _limits(truss, figures, checks)
     if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
-        said.append(
-            f"the structure buckles at {least:.3g} times {buckling.of}, less than {checks.buckling_factor:g}: analysis of first"
-            " order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
-        )
+        less = f"the structure buckles at {least:.3g} times {buckling.of}"
+        enough = f"less than {checks.buckling_factor:g}: analysis of first order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
+        said.append(f"{less}: it does not carry this load" if least < 1.0 else f"{less}, {enough}")
     layers = check_layers(truss) if truss.member_sets else None
     said += layers.warnings(truss) if layers is not None else []
     said += path_warnings(path) if path is not None else []

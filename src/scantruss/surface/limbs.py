@@ -224,6 +224,8 @@ class _Parts:
         near = surface.queue[:count].copy()
         normals = surface.normals[near[np.linalg.norm(surface.mean[near] - middle, axis=1) < radius + 0.2 * length]]
         axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
+        if gone[near].all() or not gone[near].any():  # a one-sided surface: no side is cut off there
+            return None
         side = surface.mean[near[gone[near]]].mean(axis=0) - surface.mean[near[~gone[near]]].mean(axis=0)
         axis = axis * np.sign(side @ axis)
         frame = np.stack([*_frame(axis), axis])
