@@ -23,7 +23,6 @@ from .runtime.progress import Progress
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
-from .scan.symmetry import SYMMETRY_TOLERANCE, check_mirror_planes, find_mirror_planes
 from .settings import Settings
 from .surface.samples import sample_surface
 
@@ -130,6 +129,8 @@ def symmetric_grid(
     FrontError
         No grid passes the checks, or the rows do not follow the planes.
     """
+    from .scan.symmetry import SYMMETRY_TOLERANCE, check_mirror_planes, find_mirror_planes
+
     points, tolerance = np.asarray(cloud.points) + cloud.origin, SYMMETRY_TOLERANCE * settings.length
     if isinstance(settings.symmetry, str):
         planes = find_mirror_planes(points, tolerance)

@@ -18,7 +18,6 @@ from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .hexagons import TRIANGLE_MEMBER, hexagons_of
 from .planar import PLANAR_ENOUGH, make_planar
-from .quads import quads_of
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -66,6 +65,8 @@ def with_cells(
     """
     if settings.cells == "triangle":
         return grid
+    from .quads import quads_of  # needs scipy, which other grids do not load
+
     make = quads_of if settings.cells == "quad" else hexagons_of
     made = make(grid, samples, boundary, constraints, settings, progress=progress)
     judged = settings

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, LineSet
-from ..scan.symmetry import MirrorPlane
+
+if TYPE_CHECKING:
+    from ..scan.symmetry import MirrorPlane
 
 ON_PLANE = 0.25  #: farthest node of a cut from its plane [member lengths]
 LEAST_PIECE = 0.5  #: shorter pieces of the line in which a plane meets the grid are left out [member lengths]

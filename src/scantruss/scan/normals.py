@@ -15,8 +15,12 @@ NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit i
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
 NORMALS_PER_THREAD = 1500  # fewest samples that are worth a thread
 LEAST_CERTAIN = 254  # weight of the least certain links
-SEEN_FROM_ABOVE = 0.98  # share of a piece that faces one side of the horizon, from which all of it counts as seen from above
-NEARLY_LEVEL = 0.1  # mean height of a piece along its normals, over the radius of gyration, up to which it is nearly level
+SEEN_FROM_ABOVE = (
+    0.98  # share of a piece that faces one side of the horizon, from which all of it counts as seen from above
+)
+NEARLY_LEVEL = (
+    0.1  # mean height of a piece along its normals, over the radius of gyration, up to which it is nearly level
+)
 STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
