@@ -48,10 +48,14 @@ class GridTables:
         found = np.isin(ends[:, 0] * count + ends[:, 1], low * count + high)
         return np.where(found, np.cumsum(found) - 1, -1)
 
-    @cached_property
+    @property
     def triangulated(self) -> GridTables:
         """The same surface with each side of a triangle as an edge, also the diagonals of panels."""
-        return self if self.panels is None else _Triangulated(self)
+        return self if self.panels is None else self._with_diagonals
+
+    @cached_property
+    def _with_diagonals(self) -> GridTables:
+        return _Triangulated(self)
 
     @cached_property
     def panel_loops(self) -> list[list[int]]:
@@ -131,6 +135,8 @@ class GridTables:
     @cached_property
     def panel_members(self) -> np.ndarray:
         """(P, K) the member at each side of each panel, from its node k to the next, -1 where it has none."""
+        if self.panels is None:
+            return self.half_edge_edges.reshape(3, -1).T
         table = self.panel_table
         sides, count = np.sort(sides_of(table), axis=1), max(len(self.nodes), 1)
         found = np.full(table.shape, -1)
