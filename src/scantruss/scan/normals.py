@@ -15,12 +15,6 @@ NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit i
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
 NORMALS_PER_THREAD = 1500  # fewest samples that are worth a thread
 LEAST_CERTAIN = 254  # weight of the least certain links
-SEEN_FROM_ABOVE = (
-    0.98  # share of a piece that faces one side of the horizon, from which all of it counts as seen from above
-)
-NEARLY_LEVEL = (
-    0.1  # mean height of a piece along its normals, over the radius of gyration, up to which it is nearly level
-)
 STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
@@ -87,24 +81,16 @@ def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> n
 
 
 def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
-    """Turn the normals of each piece, numbered from 0 (S,), away from its centre.
-
-    Upwards where that does not decide (a plate), and where a piece is nearly level and all of it is seen from above: a terrain
-    faces the sky, also a valley.
-    """
+    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards if that does not decide (a plate)."""
     count = np.bincount(piece)
     centre = np.stack([np.bincount(piece, mean[:, c]) / count for c in range(3)], axis=1)
     arm = mean - centre[piece]
     size = np.sqrt(np.bincount(piece, dots(arm, arm)) / count)
     bulge = np.bincount(piece, dots(arm, normals)) / count
     up = np.stack([np.bincount(piece, normals[:, c]) / count for c in range(3)], axis=1)
-    rising = np.bincount(piece, normals[:, 2] > 0.0) / count
     for i in range(len(count)):
         side = bulge[i]
-        seen_from_above = max(rising[i], 1.0 - rising[i]) > SEEN_FROM_ABOVE
-        if seen_from_above and abs(side) < NEARLY_LEVEL * size[i]:
-            side = rising[i] - 0.5
-        elif abs(side) < 0.01 * max(size[i], 1e-300):
+        if abs(side) < 0.01 * max(size[i], 1e-300):
             side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
         if side < 0:
             normals[piece == i] *= -1.0
