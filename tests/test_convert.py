@@ -82,7 +82,7 @@ def test_the_utilization_of_a_structure_goes_along(place: Path, capsys: pytest.C
         ("convert net.json a.jsn", "the nearest is .json"),
         ("convert net.json a.iffc", "the nearest is .ifc"),
         ("convert net.json a.saf.xlsx", "SAF holds structures"),
-            ("convert roof.json a.png", "no format"),
+        ("convert roof.json a.png", "no format"),
         ("convert none.json a.ply", "there is no file none.json"),
         ("convert net.dwg a.ply", "no reader"),
         ("convert net.json net.json", "would overwrite"),
@@ -110,7 +110,7 @@ def test_a_missing_extra_is_one_line_with_the_command(tmp_path: Path, monkeypatc
     monkeypatch.setitem(
         FORMATS, ".odd", FileFormat("ODD", FORMATS[".ply"].encode, library="no_such_module", extra="cad")
     )
-    with pytest.raises(st.FormatError, match=r'no_such_module.*pip install "scantruss\[cad\]"'):
+    with pytest.raises(st.FormatError, match=r"no_such_module.*uv sync --extra cad"):
         check_output(tmp_path / "a.odd")
     assert list(tmp_path.iterdir()) == []
 

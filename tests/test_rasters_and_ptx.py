@@ -118,8 +118,14 @@ def test_damaged_ptx_files_are_refused(change: str, tmp_path: Path) -> None:
 def test_a_geotiff_gives_the_centres_of_its_cells_with_unit_and_system(tmp_path: Path) -> None:
     heights = np.where(np.arange(120) % 7 == 0, -9999.0, plate()[:, 2])
     points = np.column_stack([plate()[:, :2], heights])
-    turned = rasterio.Affine.translation(380_000.0, 5_810_000.0) @ rasterio.Affine.rotation(30) @ rasterio.Affine.scale(3.0, -3.0)
-    (tmp_path / "a.tif").write_bytes(geotiff(points, nodata=-9999.0, transform=turned, tiled=True, blockxsize=16, blockysize=16))
+    turned = (
+        rasterio.Affine.translation(380_000.0, 5_810_000.0)
+        @ rasterio.Affine.rotation(30)
+        @ rasterio.Affine.scale(3.0, -3.0)
+    )
+    (tmp_path / "a.tif").write_bytes(
+        geotiff(points, nodata=-9999.0, transform=turned, tiled=True, blockxsize=16, blockysize=16)
+    )
     cloud = st.read_points(tmp_path / "a.tif")
     slow = [(*(turned @ (k % 12 + 0.5, k // 12 + 0.5)), heights[k]) for k in range(120) if heights[k] != -9999.0]
     np.testing.assert_allclose(cloud.points + cloud.origin, slow, rtol=0, atol=1e-9)
@@ -144,10 +150,12 @@ def test_a_large_raster_is_read_some_rows_at_a_time(tmp_path: Path, monkeypatch:
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
-def test_a_missing_extra_of_a_reader_is_one_line_with_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_extra_of_a_reader_is_one_line_with_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "a.tif").write_bytes(geotiff(plate()))
     monkeypatch.setattr("scantruss.scan.formats.extras.find_spec", lambda name: None)
-    with pytest.raises(st.FormatError, match=r'rasterio.*pip install "scantruss\[terrain\]"'):
+    with pytest.raises(st.FormatError, match=r"rasterio.*uv sync --extra terrain"):
         st.read_points(tmp_path / "a.tif")
 
 
@@ -196,14 +204,19 @@ def test_vtp_and_vtu_files_of_vtk_itself_are_read(form: str, tmp_path: Path) -> 
     vtk = pytest.importorskip("vtk", exc_type=ImportError)
     from vtk.util.numpy_support import numpy_to_vtk
 
-    for grid, writer in ((vtk.vtkPolyData(), vtk.vtkXMLPolyDataWriter()), (vtk.vtkUnstructuredGrid(), vtk.vtkXMLUnstructuredGridWriter())):
+    for grid, writer in (
+        (vtk.vtkPolyData(), vtk.vtkXMLPolyDataWriter()),
+        (vtk.vtkUnstructuredGrid(), vtk.vtkXMLUnstructuredGridWriter()),
+    ):
         places = vtk.vtkPoints()
         places.SetData(numpy_to_vtk(plate(9000), deep=True))
         grid.SetPoints(places)
         grid.GetPointData().SetNormals(numpy_to_vtk(np.tile([0.0, 0.6, 0.8], (9000, 1)), deep=True))
         writer.SetFileName(str(tmp_path / "a"))
         writer.SetInputData(grid)
-        {"ascii": writer.SetDataModeToAscii, "binary": writer.SetDataModeToBinary}.get(form, writer.SetDataModeToAppended)()
+        {"ascii": writer.SetDataModeToAscii, "binary": writer.SetDataModeToBinary}.get(
+            form, writer.SetDataModeToAppended
+        )()
         if form == "raw":
             writer.EncodeAppendedDataOff()
         (writer.SetCompressorTypeToZLib if form == "zlib" else writer.SetCompressorTypeToNone)()

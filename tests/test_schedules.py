@@ -469,6 +469,7 @@ def test_the_command_writes_all_or_nothing(
         ("grid.json c.xlsx", 2, "--tube"),
         ("grid.json --tube 60", 2, "missing OUT"),
         ("grid.json c.xlsx --tube thick", 2, "114.3x5"),
+        ("grid.json c.xlsx --tube CHS60x4 --ball big", 2, "or auto"),
         ("grid.json c.xlsx --tube 60 --ball big", 2, "or auto"),
         ("grid.json c.xlsx --tube 60 --density 7850", 2, "wall"),
         ("grid.json c.xlsx --tube 60 --unit mm", 2, "the grid is in m"),

@@ -16,12 +16,12 @@ import numpy as np
 
 from ..grid.certificate import near
 from ..runtime.ours import MARK
+from ..structure.report import use_words
 from .model import Model
 from .page_tables import Pin, colorings_of, pins_of, tables_of
-from .style import FileStyle
+from .style import PAGE_POINTS, FileStyle
 
 PAGE_FOLDER = Path(__file__).parent
-PAGE_POINTS = 60_000  #: of the scan that are drawn
 PAGE_LAYERS = (("members", True), ("nodes", True), ("panels", True), ("scan", False), ("pins", True))
 
 
@@ -149,7 +149,7 @@ def _figures(model: Model) -> list[tuple[str, str]]:
             most, name = max((result.displacement_max, result.name) for result in service)
             rows.append((f"greatest displacement, {name} [mm]", f"{1e3 * most:.3g}"))
     if model.utilization is not None and np.isfinite(model.utilization).any():
-        rows.append(("greatest utilization", f"{np.nanmax(model.utilization):.2f}"))
+        rows.append(("greatest utilization", use_words(float(np.nanmax(model.utilization)))))
     return rows
 
 

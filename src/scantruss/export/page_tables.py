@@ -12,6 +12,7 @@ from ..check.folds import fold_angles
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.quality import shape_qualities
+from .drawing.structure import OVERUSED
 from .model import Model
 
 COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, words, middle of a diverging scale
@@ -129,7 +130,9 @@ def colorings_of(tables: Tables) -> list[dict[str, Any]]:
     for kind, name, words, middle in COLORINGS:
         values = next((each.values for each in tables[kind] if each.name == name), ())
         if any(value is not None for value in values):
-            more = {} if middle is None else {"middle": middle}
+            more: dict[str, Any] = {} if middle is None else {"middle": middle}
+            if name == "utilization":
+                more["most"] = [1.0, OVERUSED]  # what is more has a colour of its own, as in pictures
             found.append({"kind": kind, "name": name, "words": words, **more})
     return found
 

@@ -161,7 +161,7 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
         )
     for name, value in (("member", member_diameter), ("node", node_diameter)):
         if value >= length:
-            a, b = grid.edges[shortest].tolist()
+            a, b = (node_marks(grid)[k] for k in grid.edges[shortest].tolist())
             raise InputError(
                 f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {length:.4g}{unit} long "
                 f"at scale {scale:g} (nodes {a} and {b}); give a smaller diameter or a larger scale"

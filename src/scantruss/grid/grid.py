@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import words_of_number
 from .line_sets import LineSet
 from .quality import GridQuality, measure_quality
 from .tables import GridTables
@@ -24,7 +25,14 @@ if TYPE_CHECKING:
     from .certificate import Certificate
 
 
-PROVENANCE = {"system", "settings", "before", "certificate", "seconds", "line_sets"}  # fields that no figure of a grid depends on
+PROVENANCE = {
+    "system",
+    "settings",
+    "before",
+    "certificate",
+    "seconds",
+    "line_sets",
+}  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
     "_half_edges", "edge_uses", "edge_triangles", "boundary_loops", "topology",
 }  # fmt: skip
@@ -56,7 +64,7 @@ class Grid(GridTables):
     def __repr__(self) -> str:
         """Say what it is made of, not every number."""
         unit = f" {self.unit}" if self.unit else ""
-        length = f" of {self.lengths.mean():.4g}{unit}" if len(self.edges) else ""
+        length = f" of {words_of_number(self.lengths.mean(), 4)}{unit}" if len(self.edges) else ""
         return (
             f"Grid({len(self.nodes):,} nodes, {len(self.edges):,} members{length}, {len(self.triangles):,} triangles)"
         )

@@ -49,7 +49,7 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     if not suffix_of(path, suffixes):
         near = get_close_matches(path.suffix.lower(), suffixes, 1, 0.6)
         raise FormatError(
-            f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}'
+            f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(set(suffixes)))}'
             + (f"; the nearest is {near[0]}" if near else "")
         )
     folder = path.parent

@@ -19,6 +19,8 @@ from .sizing import SizingRound
 from .statics import CaseResult, Solution
 from .truss import Truss
 
+MOST_UTILIZATION = 1000  #: that is written as a number
+
 
 @dataclass(frozen=True)
 class CaseFigures:
@@ -53,6 +55,12 @@ class StructureReport:
     )
     path: Path | None = None  #: where it was asked for
     layers: LayerChecks | None = None  #: of a double layer
+
+    def __repr__(self) -> str:
+        """Say how much is used and moved, and how many warnings there are."""
+        used = "not checked" if self.utilization is None else f"utilization {self.utilization.max():.3g}"
+        moved = max(case.displacement_max for case in self.cases)
+        return f"StructureReport({self.truss!r}, {used}, moves {1e3 * moved:.3g} mm, {len(self.warnings)} warnings)"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -163,8 +171,10 @@ def report_structure(
         said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
     elif (over := int((worst > 1).sum())) > 0:
         most = int(worst.argmax())
-        words = f"{truss.member_marks[most]} {worst[most]:.2f} by {governing[most]}"
-        said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
+        words = f"{truss.member_marks[most]} {use_words(worst[most])} by {governing[most]}"
+        said.append(
+            f"{over:,} of {len(worst):,} members {'is' if over == 1 else 'are'} used beyond 1, the most {words}"
+        )
     said += _limits(truss, figures, checks)
     if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
         said.append(
@@ -245,10 +255,25 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
             f"{1e3 * case.displacement_max:.3g}",
             f"{case.force_min / 1e3:.4g}",
             f"{case.force_max / 1e3:.4g}",
-            "-" if case.utilization_max is None else f"{case.utilization_max:.2f}",
+            use_words(case.utilization_max),
         )
         for case in cases + chosen
     ]
+
+
+def unlisted_lines(report: StructureReport) -> list[str]:
+    """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
+    more = len(report.cases) - len(structure_lines(report))
+    return [f"and {more:,} more combination{'s' * (more > 1)}, which use the members or move the nodes less"] * (
+        more > 0
+    )
+
+
+def use_words(utilization: float | None) -> str:
+    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
+    if utilization is None:
+        return "-"
+    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"
 
 
 def mode_lines(report: StructureReport) -> list[str]:
