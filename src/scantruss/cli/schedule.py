@@ -183,7 +183,7 @@ def warning_lines(warnings: Schedule) -> list[str]:
         most = f"{words_of_number(value, 4)} {measure}".rstrip() + ("" if at is None else f" at {at}")
         if words == HEAVY_BALLS and limit is not None:
             lines.append(
-                f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} %;"
+                f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} % for its nodes;"
                 f" structure --node-allowance {value / 100:.2f} takes that into account"
             )
         elif limit is None:  # what is never carried at all

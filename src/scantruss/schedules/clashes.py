@@ -18,7 +18,7 @@ SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
 SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
 NO_MOMENT = 1e-6  # [m]: moment over force up to which it is one of rounding
 HEAVY_BALLS = "balls are heavier than the node allowance of the structure"
-HEAVIER = 1.1  # times its allowance for nodes from which the balls of a structure are too heavy for it
+TOO_HEAVY = 1.1  # times its allowance for nodes from which the balls of a structure are too heavy for it
 SOME_WEIGHT = 0.02  # share of the mass of the members up to which balls are not worth a warning
 WarningRow = tuple[Value, ...]
 
@@ -185,6 +185,6 @@ def _heavy_balls(parts: Parts) -> list[WarningRow]:
     truss = parts.forces.truss
     weight = sum(case.self_weight for case in truss.cases)
     share, allowed = float(balls.sum()) / truss.mass, weight - 1.0
-    if weight <= 0.0 or share <= max(HEAVIER * allowed, SOME_WEIGHT):
+    if weight <= 0.0 or share <= max(TOO_HEAVY * allowed, SOME_WEIGHT):
         return []
     return [(HEAVY_BALLS, None, None, 100.0 * share, 100.0 * allowed, "% of the mass of the members", None, None, None)]
