@@ -170,7 +170,9 @@ def test_balls_heavier_than_the_structure_allows_for_are_told_with_what_allows_f
     (said,) = (line for line in warning_lines(made.warnings) if "balls weigh" in line)
     assert f"weigh {100 * share:.0f} % of the members" in said and f"--node-allowance {share:.2f} takes" in said
     allowed = roof(node_allowance=share)
-    assert not any("balls weigh" in line for line in warning_lines(st.schedule(allowed, st.ScheduleSettings()).warnings))
+    assert not any(
+        "balls weigh" in line for line in warning_lines(st.schedule(allowed, st.ScheduleSettings()).warnings)
+    )
 
 
 def test_what_is_said_twice_is_refused() -> None:

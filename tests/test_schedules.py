@@ -505,4 +505,4 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
         assert f"`{spec.name}`" in page
     source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
     kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
-    assert len(kinds) == 11 and all(f"| {kind} |" in page for kind in kinds), kinds
+    assert len(kinds) == 12 and all(f"| {kind} |" in page for kind in kinds), kinds

@@ -255,7 +255,11 @@ def test_combinations_are_those_of_en_1990() -> None:
 
 def test_results_say_what_they_are_in_a_line() -> None:
     solution = solve(shell())
-    for each, words in ((solution, "Solution(Truss("), (solution["self"], "CaseResult('self', moves "), (report_structure(solution), "StructureReport(Truss(")):
+    for each, words in (
+        (solution, "Solution(Truss("),
+        (solution["self"], "CaseResult('self', moves "),
+        (report_structure(solution), "StructureReport(Truss("),
+    ):
         assert repr(each).startswith(words) and len(repr(each)) < 250
 
 

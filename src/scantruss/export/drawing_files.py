@@ -213,7 +213,11 @@ def _map_of(file: Any) -> tuple[np.ndarray, str]:
     to_map = np.eye(4)
     for each in file.by_type("IfcMapConversion") if file.schema != "IFC2X3" else ():
         unit = each.TargetCRS.MapUnit
-        if each.is_a() != "IfcMapConversion" or (unit is not None and unit.Name != "METRE") or each.Scale not in (None, 1.0):
+        if (
+            each.is_a() != "IfcMapConversion"
+            or (unit is not None and unit.Name != "METRE")
+            or each.Scale not in (None, 1.0)
+        ):
             continue  # of other scales or units: the numbers stay those of the file
         x, y = (1.0, 0.0) if each.XAxisAbscissa is None else (each.XAxisAbscissa, each.XAxisOrdinate)
         size = math.hypot(x, y)

@@ -87,13 +87,19 @@
     return { back, right, up };
   };
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const goHome = () => { // as near as the box of all nodes and points fits into the view
+  const goHome = () => { // as near as all nodes fit into the view, in its middle
     camera = { target: [0, 0, 0], distance: 0.01 * size, turn: -0.9, rise: 0.75 }; atHome = true;
     const { back, right, up } = axes(), wide = canvas.width / canvas.height, fit = Math.min(1, wide) * FOCAL / MARGIN;
-    for (let k = 0; k < 8; k++) {
-      const corner = low.map((value, j) => (k >> j & 1 ? high[j] : value) - middle[j]);
-      const off = Math.max(Math.abs(dot(right, corner)) * fit / wide, Math.abs(dot(up, corner)) * fit);
-      camera.distance = Math.max(camera.distance, dot(back, corner) + off);
+    for (let step = 0; step < 4; step++) {
+      const each = Array.from({ length: counts.nodes }, (_, k) => at(k).map((value, j) => value - camera.target[j]));
+      const seen = each.map((p) => [dot(back, p), dot(right, p), dot(up, p)]);
+      camera.distance = seen.reduce((most, [z, x, y]) => Math.max(most, z + Math.max(Math.abs(x) * fit / wide, Math.abs(y) * fit)), 0.01 * size);
+      const middleOf = (j) => {
+        const ends = seen.reduce(([a, b], p) => { const v = p[j] / (camera.distance - p[0]); return [Math.min(a, v), Math.max(b, v)]; }, [Infinity, -Infinity]);
+        return counts.nodes && step < 3 ? camera.distance * (ends[0] + ends[1]) / 2 : 0;
+      };
+      const x = middleOf(1), y = middleOf(2);
+      camera.target = camera.target.map((value, j) => value + x * right[j] + y * up[j]);
     }
   };
   const view = () => {
@@ -180,7 +186,7 @@
     $("legend").hidden = !one || !known.length;
     if (one && known.length) {
       $("what").textContent = choice.words + (one.unit ? ` [${one.unit}]` : "");
-      const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(high - low || Math.abs(high) || 1)), 0), 8);
+      const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(high - low || Math.abs(high) || 1) + 0.05), 0), 8);
       $("ramp").style.background = `linear-gradient(to right, ${stops.map((c, k) => `rgb(${c}) ${(over ? 90 : 100) * k / (stops.length - 1)}%`).join(",")}${over ? `, ${over} 90%` : ""})`;
       $("ends").replaceChildren(...[low, (low + high) / 2, high].map((v, k) => Object.assign(document.createElement("span"), { textContent: v.toFixed(decimals) + (over && k > 1 ? " and more" : "") })));
     }
