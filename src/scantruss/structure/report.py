@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import words_of_number
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
@@ -250,11 +251,11 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     return [
         (
             case.name,
-            f"{case.applied[2] / 1e3:.4g}",
-            f"{case.reactions[2] / 1e3:.4g}",
-            f"{1e3 * case.displacement_max:.3g}",
-            f"{case.force_min / 1e3:.4g}",
-            f"{case.force_max / 1e3:.4g}",
+            words_of_number(case.applied[2] / 1e3, 4),
+            words_of_number(case.reactions[2] / 1e3, 4),
+            words_of_number(1e3 * case.displacement_max, 3),
+            words_of_number(case.force_min / 1e3, 4),
+            words_of_number(case.force_max / 1e3, 4),
             use_words(case.utilization_max),
         )
         for case in cases + chosen
