@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..check.folds import fold_angles
+from ..errors import words_of_number
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.quality import shape_qualities
@@ -147,7 +148,7 @@ def pins_of(certificate: Certificate) -> list[Pin]:
         if fault.where is not None
     ]
     pins += [
-        Pin(name, f"{worst.value:.4g}{' degrees' if of_angle else unit}", worst.where)
+        Pin(name, f"{words_of_number(worst.value, 4)}{' degrees' if of_angle else unit}", worst.where)
         for name, worst, of_angle in certificate.worst_places()
     ]
     return pins + [

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import words_of_place
+from ..errors import words_of_number, words_of_place
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -72,7 +72,7 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     """Return how noisy and how bent the scan is, which lengths pass, and which to take."""
     unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
     bent = (
-        f"R = {radius:.3g}{unit}: 95 % of the scan is bent less"
+        f"R = {words_of_number(radius, 3)}{unit}: 95 % of the scan is bent less"
         if np.isfinite(radius)
         else "no bend beyond its noise was found"
     )
