@@ -20,7 +20,9 @@ def make_picture(path: Path = PLACE) -> None:
     shell, bust = DEMOS["shell"], DEMOS["bust"]
     cloud = read_points(shell.scan, unit=shell.settings.unit)
     grid = grid_from_cloud(cloud, shell.settings)
-    solid = build_solid(grid, member_diameter=MEMBER_DIAMETER, node_diameter=NODE_DIAMETER, scale=shell.scale)
+    solid = build_solid(
+        grid, member_diameter=1e-3 * MEMBER_DIAMETER, node_diameter=1e-3 * NODE_DIAMETER, scale=shell.scale
+    )
     other = grid_from_scan(bust.scan, bust.settings), bust.view, "grid of a bust"
     draw_panels(cloud, grid, solid.vertices, solid.triangles, path, view=shell.view, beside=other)
     with Image.open(path) as image:

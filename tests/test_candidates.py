@@ -220,7 +220,7 @@ def test_the_steps_that_the_readme_shows_give_the_grid_of_the_one_call(
     write_points("shell.ply", shape.points, unit="mm")
     own = {"length": 1.4 * shape.length, "effort": effort, "fixed": [tuple(shape.points[7])], "unit": "mm"}
     names: dict[str, Any] = {"own": own}
-    exec(lines_of_readme().replace("length=4.7, fixed=[(0, 0, 12)]", "**own"), names)
+    exec(lines_of_readme().replace("length=1.0, fixed=[(-14.40, -10.36, 0.01)]", "**own"), names)
     grid, whole = names["grid"], st.grid_from_points(shape.points, names["settings"])
     assert len(names["constraints"].positions) == 1 and len(Path("grid.obj").read_bytes()) > 10_000
     assert grid.nodes.tobytes() == whole.nodes.tobytes() and grid.triangles.tobytes() == whole.triangles.tobytes()

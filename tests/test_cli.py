@@ -90,6 +90,9 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
     ("words", "line"),
     [
         ("cut a b", "no command 'cut'"),
+        ("gird a b", "no command 'gird' (did you mean grid?)"),
+        ("thin scan.xyz out.ply --spacing 1", "missing OUT, the file of the result; write it as -o OUT"),
+        ("splice a.xyz b.xyz c.xyz", "missing OUT, the file of the result; write it as -o OUT"),
         ("grid", "missing SCAN"),
         ("grid scan.xyz", "missing OUT"),
         ("grid scan.xyz a.obj --length", "--length: expected one argument"),
@@ -101,6 +104,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
             "grid scan.xyz a.obj --length 4,7",
             "--length: needs a number, a file of lengths or curvature:MIN:MAX; write 4.7 with a point, not 4,7",
         ),
+        ("grid scan.xyz a.obj --length 1500mm", "in the unit of the scan, without mm"),
         ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),
         ("grid scan.xyz a.obj --length 4 --merge-angle wide", "--merge-angle: needs a number"),
         ("grid scan.xyz a.obj --length 4 --smooth-passes 1.5", "--smooth-passes: needs a whole number"),
@@ -117,6 +121,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
         ("info", "missing SCAN"),
         ("info scan.xyz other.xyz", "too many arguments: other.xyz"),
         ("print grid.json", "missing "),
+        ("print grid.json --scale 1:0", "--scale: needs a scale such as 0.01 or 1:100, got '1:0'"),
         ("demo a b", "too many arguments: b"),
     ],
 )

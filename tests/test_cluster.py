@@ -218,7 +218,7 @@ def test_without_dask_a_scheduler_is_refused_and_processes_serve(monkeypatch: py
     monkeypatch.setattr(module, "find_spec", lambda name: None)
     with open_workers(3) as crew:
         assert isinstance(crew, Processes) and crew.count == 3
-    with pytest.raises(InputError, match=r"needs dask.*scantruss\[cluster\]"):
+    with pytest.raises(InputError, match=r"needs dask.*uv sync --extra cluster"):
         open_workers(scheduler="tcp://127.0.0.1:8786")
 
 

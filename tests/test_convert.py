@@ -110,7 +110,7 @@ def test_a_missing_extra_is_one_line_with_the_command(tmp_path: Path, monkeypatc
     monkeypatch.setitem(
         FORMATS, ".odd", FileFormat("ODD", FORMATS[".ply"].encode, library="no_such_module", extra="cad")
     )
-    with pytest.raises(st.FormatError, match=r'no_such_module.*pip install "scantruss\[cad\]"'):
+    with pytest.raises(st.FormatError, match=r"no_such_module.*uv sync --extra cad"):
         check_output(tmp_path / "a.odd")
     assert list(tmp_path.iterdir()) == []
 

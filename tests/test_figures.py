@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from scantruss import Grid
+from scantruss.errors import words_of_number
 from scantruss.kernels.geometry.components import component_labels
 
 
@@ -22,6 +23,16 @@ def test_angles_are_those_of_textbooks(nodes: np.ndarray) -> None:
             u, w = nodes[t[(k + 1) % 3]] - nodes[t[k]], nodes[t[(k + 2) % 3]] - nodes[t[k]]
             known = np.degrees(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w + 0.0))
             assert angles[k] == pytest.approx(known, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "words"),
+    [(1441.2, 3, "1440"), (17984.6, 4, "17980"), (3.14159, 3, "3.14"), (1e-5, 3, "1e-05"), (2.5e10, 3, "2.5e+10")],
+)
+def test_numbers_for_readers_have_a_power_of_ten_only_where_they_are_huge(
+    value: float, digits: int, words: str
+) -> None:
+    assert words_of_number(value, digits) == words
 
 
 @pytest.mark.kernels

@@ -12,12 +12,14 @@ import pytest
 from browser import open_page
 
 import scantruss as st
-from scantruss.export.formats import model_of
+from scantruss.export.drawing.structure import OVERUSED
+from scantruss.export.formats import losses, model_of
 from scantruss.export.page import encode_page
 from scantruss.export.style import FileStyle
 from scantruss.grid.grid import Grid
 from scantruss.grid.line_sets import FIXED_LINE, LineSet
 from scantruss.scan.cloud import PointCloud
+from scantruss.structure.report import report_structure
 
 
 def sheet(count: int = 6, origin: tuple[float, float, float] = (4.5e5, 5.3e6, 120.0)) -> Grid:
@@ -86,6 +88,16 @@ def test_the_page_asks_nothing_of_the_network_and_its_tags_are_closed() -> None:
     parser = Balanced()
     parser.feed(text)
     assert parser.open == []
+
+
+def test_more_than_one_has_a_colour_of_its_own_and_a_small_scan_is_held_whole() -> None:
+    solution = st.solve(st.Truss.from_grid(sheet(), section="CHS33.7x3.2", supports="boundary", loads="snow:50kN/m2"))
+    page = encode_page(model_of(solution, report=report_structure(solution)), FileStyle())
+    (used,) = (each for each in data_of(page)["colorings"] if each["name"] == "utilization")
+    assert used["most"] == [1.0, OVERUSED]
+    for count, said in ((60_000, []), (60_001, ["HTML holds no more than 60,000 points of the scan"])):
+        cloud = PointCloud(np.zeros((count, 3)), np.zeros(3))
+        assert losses(model_of(sheet(), cloud=cloud), "a.html") == said
 
 
 def test_words_of_a_user_end_no_script() -> None:

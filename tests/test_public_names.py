@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from steps import lines_of_readme
 
@@ -38,6 +39,17 @@ def test_each_public_name_is_there_and_has_a_type() -> None:
 def test_other_names_are_refused() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'no_such_name'"):
         st.no_such_name  # noqa: B018
+
+
+def test_what_is_given_in_the_wrong_place_is_refused_in_one_line() -> None:
+    grid = st.Grid(np.zeros((3, 3)), np.array([[0, 1, 2]]), np.zeros(3, bool), np.zeros(3))
+    with pytest.raises(st.FormatError, match="write needs a grid or structure, then a file name, got Grid as the file"):
+        st.write("a.obj", grid)  # type: ignore[arg-type]
+    with pytest.raises(st.InputError, match="a grid, a structure or its solution is needed, got str"):
+        st.write("a.obj", "b.obj")  # type: ignore[arg-type]
+    for make in (st.grid_from_points, st.grid_from_scan):
+        with pytest.raises(st.InputError, match=r"settings must be Settings, as in .*, got float 1\.5"):
+            make(np.zeros((9, 3)), 1.5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("part", ["steps", "examples"])

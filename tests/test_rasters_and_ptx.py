@@ -155,7 +155,7 @@ def test_a_missing_extra_of_a_reader_is_one_line_with_the_command(
 ) -> None:
     (tmp_path / "a.tif").write_bytes(geotiff(plate()))
     monkeypatch.setattr("scantruss.scan.formats.extras.find_spec", lambda name: None)
-    with pytest.raises(st.FormatError, match=r'rasterio.*pip install "scantruss\[terrain\]"'):
+    with pytest.raises(st.FormatError, match=r"rasterio.*uv sync --extra terrain"):
         st.read_points(tmp_path / "a.tif")
 
 

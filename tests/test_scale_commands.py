@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -303,7 +304,6 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place: Path, tmp_path: Pat
         (("--length", ","), "several, separated by commas"),
         (("--length", "5,5"), "named twice"),
         (("--length", "5", "--effort", "quick,hard"), "effort must be one of"),
-        (("--effort", "quick"), "--length is missing"),
         (("--length", "0.1,0.2"), "no grid came out of 2 trials; the first: length 0.1 is too small"),
     ],
 )
@@ -311,6 +311,19 @@ def test_a_sweep_refuses_in_one_line_and_writes_nothing(
     words: tuple[str, ...], line: str, place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert line in refused(capsys, "sweep", "scan.npy", *words, "-o", "out", "--workers", "1")
+
+
+def test_a_sweep_without_a_length_takes_the_one_that_info_suggests(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(["sweep", "scan.npy", "--effort", "quick", "--prefer", "balance,shapes", "-o", "out", "--workers", "1"])
+        == 0
+    )
+    said = capsys.readouterr()
+    (length,) = re.findall(r"no --length is given; using ([\d.]+)", said.err)
+    for name in ("balance", "shapes"):
+        assert known(st.read_grid(f"out/prefer-{name}.json").settings).length == float(length)
 
 
 def test_a_sweep_into_a_file_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

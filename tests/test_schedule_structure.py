@@ -1,6 +1,7 @@
 """Schedules of structures: forces, bolts and balls by hand, marks and masses of the structure, the command."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from test_schedules import numbers
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.cli.schedule import warning_lines
 from scantruss.schedules.bolts import PITCHES, bolted_radii, choose_bolts, stress_area, tension_resistance
 from scantruss.schedules.forces import grid_of_structure
 from scantruss.structure.json import read_checked
@@ -155,8 +157,22 @@ def test_what_a_structure_lacks_is_warned_of_with_its_place() -> None:
         row[5] is not None for row in found["slender member"]
     )
     assert len(found["bolts are chosen for tension and carry no moments"]) == 1
+    (bolts,) = (line for line in warning_lines(made.warnings) if "no moments" in line)
+    assert re.fullmatch(r"warning: bolts are chosen .* no moments; the greatest is [\d.]+ kNm at M\d+", bolts)
     strong = tension_resistance(64, "4.6") / 1e3
     assert len(found.get("no bolt carries the tension", [])) == (numbers(made.members, "force max") > strong).sum()
+
+
+def test_balls_heavier_than_the_structure_allows_for_are_told_with_what_allows_for_them() -> None:
+    truss = roof()
+    made = st.schedule(truss, st.ScheduleSettings())
+    share = math.fsum(numbers(made.nodes, "mass")) / truss.mass
+    (said,) = (line for line in warning_lines(made.warnings) if "balls weigh" in line)
+    assert f"weigh {100 * share:.0f} % of the members" in said and f"--node-allowance {share:.2f} takes" in said
+    allowed = roof(node_allowance=share)
+    assert not any(
+        "balls weigh" in line for line in warning_lines(st.schedule(allowed, st.ScheduleSettings()).warnings)
+    )
 
 
 def test_what_is_said_twice_is_refused() -> None:

@@ -469,6 +469,7 @@ def test_the_command_writes_all_or_nothing(
         ("grid.json c.xlsx", 2, "--tube"),
         ("grid.json --tube 60", 2, "missing OUT"),
         ("grid.json c.xlsx --tube thick", 2, "114.3x5"),
+        ("grid.json c.xlsx --tube CHS60x4 --ball big", 2, "or auto"),
         ("grid.json c.xlsx --tube 60 --ball big", 2, "or auto"),
         ("grid.json c.xlsx --tube 60 --density 7850", 2, "wall"),
         ("grid.json c.xlsx --tube 60 --unit mm", 2, "the grid is in m"),
@@ -504,4 +505,4 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
         assert f"`{spec.name}`" in page
     source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
     kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
-    assert len(kinds) == 11 and all(f"| {kind} |" in page for kind in kinds), kinds
+    assert len(kinds) == 12 and all(f"| {kind} |" in page for kind in kinds), kinds

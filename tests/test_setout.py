@@ -260,7 +260,7 @@ def test_without_ezdxf_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
         raise ImportError(name)
 
     monkeypatch.setattr("scantruss.setout.files.import_module", missing)
-    with pytest.raises(st.FormatError, match=r'pip install "scantruss\[cad\]"'):
+    with pytest.raises(st.FormatError, match=r"uv sync --extra cad"):
         st.write_setting_out(st.set_out(roof()), tmp_path / "a.dxf")
     assert list(tmp_path.iterdir()) == []
 

@@ -37,6 +37,14 @@ def test_a_length_that_is_no_positive_number_is_refused(length: Any) -> None:
         Settings(length=length)
 
 
+def test_lengths_given_as_a_length_are_told_where_they_belong() -> None:
+    for lengths in ("curvature:1:2", [(0.0, 0.0, 0.0, 1.0)]):
+        with pytest.raises(InputError, match=r"give curvature:MIN:MAX or rows of lengths as length_field"):
+            Settings(length=lengths)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"unknown setting 'lenght' \(did you mean length\?\)"):
+        Settings.from_dict({"lenght": 1.0})
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

@@ -115,4 +115,5 @@ def test_the_command_says_what_it_left_out_and_how_to_keep_it(
     assert main(["grid", "room.xyz", "a.json", "--length", "1.4", "--effort", "quick", "--unit", "m"]) == 0
     said = capsys.readouterr()
     assert "taken for the floor and left out; --piece all keeps it" in said.err
+    assert "too small for this length" not in said.err  # as the floor, which is told by itself
     assert "of the scan," in said.out.splitlines()[0] and "in a floor under the others" in said.out.splitlines()[0]

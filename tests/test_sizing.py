@@ -114,3 +114,5 @@ def test_what_cannot_be_sized_is_refused() -> None:
         size_members(shell(section="R50x100"), 2)
     with pytest.raises(st.InputError, match=r"no section up to CHS\S+ is enough at M\d+"):
         size_members(shell(loads="snow:1000kN/m2"), 2)
+    with pytest.raises(st.InputError, match=r"up to IPE270 .* \(IPE300 and others of class 4 in S355 are left out\)"):
+        size_members(shell(section="IPE200", loads="snow:1000kN/m2"), 2)

@@ -46,6 +46,13 @@ def test_the_demo_saves_the_settings_its_grid_was_made_with(tmp_path: Path) -> N
     assert st.Settings.from_dict(json.loads((tmp_path / "grid.settings.json").read_text())) == made
 
 
+def test_the_model_of_the_demo_is_a_model_in_the_unit_of_its_scan(tmp_path: Path) -> None:
+    grid = dome(4, 1.0, unit="m")
+    save_demo(DEMOS["shell"], tmp_path, grid, cloud_over(grid))
+    size = trimesh.load(tmp_path / "model.3mf", force="mesh").extents
+    np.testing.assert_allclose(size[:2], 0.005 * np.ptp(grid.nodes, axis=0)[:2] + 0.002, rtol=0.01)
+
+
 @pytest.mark.parametrize("suffix", [".3mf", ".stl"])
 @pytest.mark.parametrize("make", GRIDS)
 def test_an_independent_reader_finds_one_watertight_solid_with_every_opening(

@@ -14,6 +14,7 @@ from stopped_runs import ENDS, Command, Run, make_scan, seconds_of, stop_at
 
 from scantruss.runtime import stopping
 from scantruss.runtime.files import SaveTogether, temporary_folder
+from scantruss.runtime.stopping import Stopped, signals_heard
 
 Commands = dict[str, tuple[Command, float]]
 
@@ -158,6 +159,27 @@ def test_only_the_first_signal_is_an_interruption_and_what_is_ignored_stays_so()
             assert stopping.asked() == signal.SIGINT
     finally:
         signal.signal(signal.SIGTERM, kept)
+
+
+def test_a_stop_within_a_callback_that_cannot_raise_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    class Last:
+        def __init__(self, error: type[BaseException]) -> None:
+            self.error = error
+
+        def __del__(self) -> None:
+            raise self.error
+
+    hook = sys.unraisablehook
+    sys.unraisablehook = sys.__unraisablehook__
+    try:
+        with signals_heard():
+            Last(Stopped)
+            assert not capfd.readouterr().err
+            Last(ValueError)
+            assert "ValueError" in capfd.readouterr().err
+        assert sys.unraisablehook is sys.__unraisablehook__
+    finally:
+        sys.unraisablehook = hook
 
 
 def test_a_temporary_folder_goes_with_its_block(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

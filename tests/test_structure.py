@@ -29,6 +29,7 @@ import scantruss as st
 from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
+from scantruss.structure.report import report_structure
 from scantruss.structure.statics import factor_stiffness, solve
 from scantruss.structure.truss import LoadCase, Truss
 
@@ -252,6 +253,16 @@ def test_combinations_are_those_of_en_1990() -> None:
     assert both.applied == pytest.approx(parts)
 
 
+def test_results_say_what_they_are_in_a_line() -> None:
+    solution = solve(shell())
+    for each, words in (
+        (solution, "Solution(Truss("),
+        (solution["self"], "CaseResult('self', moves "),
+        (report_structure(solution), "StructureReport(Truss("),
+    ):
+        assert repr(each).startswith(words) and len(repr(each)) < 250
+
+
 def test_halves_of_snow_never_act_together() -> None:
     for each in shell().combinations:
         assert sum("snow" in name for name, _ in each.factors) <= 1
@@ -261,8 +272,8 @@ def test_halves_of_snow_never_act_together() -> None:
     ("truss", "words"),
     [
         (lambda: Truss.from_grid(fan(40.0), supports="boundary", scale=50, joints="pinned"), r"N001 moves along \(0, 0, 1\)"),
-        (lambda: shell(support_type="roller"), "let the whole structure move"),
-        (lambda: shell(supports="N003"), "let the whole structure move"),
+        (lambda: shell(support_type="roller"), "let the whole structure move; hold more directions"),
+        (lambda: shell(supports="N003"), "let the whole structure move; use more supports"),
         (lambda: shell(supports="N001+N008+N057+N064", joints="pinned"), r"N\d+ moves along .* with it N\d+"),
         (lambda: make_truss([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1), (1, 2)], {0: HINGED, 2: HINGED},
                             forces(3, {1: (1, 0, 0)}), pinned=True), r"N002 moves along"),

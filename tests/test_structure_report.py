@@ -162,6 +162,15 @@ def test_what_is_left_out_of_a_table_is_said(place: Path) -> None:
     assert "Those that use the members or move the nodes most" in text
 
 
+def test_what_the_table_on_the_terminal_leaves_out_is_counted(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(f"b.json --loads {LOADS},wind:9e9kN/m2:-0.7,temperature:30K --report r.json") == 0
+    said = capsys.readouterr().out.splitlines()
+    shown = next(number for number, line in enumerate(said) if line.startswith("and "))
+    cases = json.loads(Path("r.json").read_text())["cases"]
+    assert said[shown].startswith(f"and {len(cases) - shown + 1} more combinations")
+    assert said[4].split()[0] == "wind" and said[4].endswith("> 1000")
+
+
 def test_the_nonlinear_path_is_in_the_report(place: Path) -> None:
     assert run(f"a.html --loads {LOADS} --path worst --path-steps 8 --imperfection mode:20mm --report r.json") == 0
     figures = json.loads(Path("r.json").read_text())

@@ -106,7 +106,7 @@ def test_without_viser_the_command_names_the_extra(
 ) -> None:
     monkeypatch.setattr("scantruss.studio.server.find_spec", lambda name: None)
     assert main(["studio", "--no-open"]) == 2
-    assert 'python -m pip install "scantruss[studio]"' in capsys.readouterr().err
+    assert "uv sync --extra studio" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -50,6 +50,7 @@ class FrontError(ScanTrussError):
         self.where = where
 
 
+MOST_WRITTEN_OUT = 1e9  # size from which a number is written with a power of ten
 Place = tuple[float, float, float]  #: x, y, z in the frame of the scan [scan unit]
 
 
@@ -58,12 +59,31 @@ def words_of_place(where: Iterable[float]) -> str:
     return ", ".join(f"{c:.6g}" if abs(c) < 1000.0 else f"{c:.3f}".rstrip("0").rstrip(".") for c in where)
 
 
+def words_of_number(value: float, digits: int) -> str:
+    """Return a number with so many digits for a reader: 1440, where a format alone would say 1.44e+03."""
+    short = f"{value:.{digits}g}"
+    return f"{float(short):.0f}" if "e+" in short and abs(value) < MOST_WRITTEN_OUT else short
+
+
 class CertificateError(FrontError):
     """A grid has come out that fails its certificate."""
 
 
 class FormatError(ScanTrussError):
     """A file cannot be read or written."""
+
+
+def how_to_install(extra: str) -> str:
+    """Return the command that installs an extra; it is of a clone, as the package is on no index."""
+    return f"uv sync --extra {extra} (in the clone)"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return " (did you mean X?)" with the most similar of the words that are known; "" where none is similar."""
+    from difflib import get_close_matches  # not needed by a run that is told nothing wrong
+
+    near = get_close_matches(word, list(known), 1, 0.7)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 def words_of_error(error: ScanTrussError) -> str:

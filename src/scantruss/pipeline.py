@@ -50,7 +50,7 @@ def grid_from_points(
     Grid
         With `settings`, `before` (quality before the optimization), `certificate` and `seconds` of each stage.
     """
-    started = perf_counter()
+    settings, started = Settings.check(settings), perf_counter()
     cloud = PointCloud.from_array(points, unit=settings.unit)
     spent = perf_counter() - started
     return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
@@ -61,7 +61,7 @@ def grid_from_scan(
 ) -> Grid:
     """Return the grid of a scan file; see `grid_from_points`. One that is larger than memory is thinned while it is read."""
     started = perf_counter()
-    cloud, settings = read_to_fit(path, settings, progress=progress)
+    cloud, settings = read_to_fit(path, Settings.check(settings), progress=progress)
     spent = perf_counter() - started
     return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, LengthError, words_of_place
+from ..errors import InputError, LengthError, words_of_number, words_of_place
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
@@ -143,15 +143,16 @@ def _curve(
     given = np.array(ring, float) - samples.origin
     if (around := length_around(given)) < SHORTEST_BOUNDARY * length:
         raise LengthError(
-            f"boundary {number} is {around:.4g}{unit} long; three members, {SHORTEST_BOUNDARY * length:.4g}{unit}, are needed"
+            f"boundary {number} is {words_of_number(around, 4)}{unit} long; three members,"
+            f" {words_of_number(SHORTEST_BOUNDARY * length, 4)}{unit}, are needed"
         )
     points, vertices = divide_polyline(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
     _, gaps = feet_on_scan(points, narrow_surface(samples, POINTS_UNDER_LINE))
     if (worst := float(gaps.max())) > BRIDGED * length:
         place = words_of_place(points[int(gaps.argmax())] + samples.origin)
         raise LengthError(
-            f"boundary {number} leaves the scan by up to {worst:.4g}{unit}, near ({place});"
-            f" it must stay within half a member, {BRIDGED * length:.4g}{unit}, which the grid bridges"
+            f"boundary {number} leaves the scan by up to {words_of_number(worst, 4)}{unit}, near ({place});"
+            f" it must stay within half a member, {words_of_number(BRIDGED * length, 4)}{unit}, which the grid bridges"
         )
     return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..settings import Settings
+from ..settings import UNITS, Settings
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -23,7 +23,7 @@ class Demo:
 
     file: str  #: in the folder `data`
     settings: Settings
-    scale: float  #: of the printed model [mm per scan unit]
+    scale: float  #: of the printed model
     view: str  #: of the picture, see `PictureStyle`
 
     @property
@@ -33,7 +33,7 @@ class Demo:
 
 
 DEMOS = {
-    "shell": Demo("shell.ply", Settings(length=1.0, unit="m"), 5.0, "-20,30"),  # 1:200, 155 mm long
+    "shell": Demo("shell.ply", Settings(length=1.0, unit="m"), 0.005, "-20,30"),  # 1:200, 160 mm long
     "bust": Demo("nefertiti.ply", Settings(length=24.0, unit="mm"), 0.25, "40,15"),  # 124 mm high
 }
 
@@ -65,6 +65,7 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
     from ..runtime.files import SaveTogether
     from .print import print_apart
 
+    millimetre = 1e-3 / (UNITS[grid.unit] or 1e-3)
     style = FileStyle(views=(demo.view,))
     with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
@@ -75,8 +76,8 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
         print_apart(
             grid,
             save.beside(folder / "model.3mf"),
-            member_diameter=MEMBER_DIAMETER,
-            node_diameter=NODE_DIAMETER,
+            member_diameter=MEMBER_DIAMETER * millimetre,
+            node_diameter=NODE_DIAMETER * millimetre,
             scale=demo.scale,
         )
     return [folder / name for name in RESULTS]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 def families_parser() -> Parser:
     """Options of ``scantruss families``."""
-    from .options import Parser, add_outs, whole_number
+    from .options import Parser, add_outs, share, whole_number
 
     parser = Parser(
         "families",
@@ -45,14 +44,6 @@ def families_parser() -> Parser:
         "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
     )
     return parser
-
-
-def share(text: str) -> float:
-    """Return 0.01 of "1%" or "0.01"."""
-    try:
-        return float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"needs a share such as 1% or 0.01, got {text!r}") from None
 
 
 def families(values: Namespace) -> None:

@@ -220,7 +220,7 @@ def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
         return ""
     unit = f" {cloud.unit}" if cloud.unit else ""
     if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
-        return f"; a grid passes with --length {length:g}{unit} (tried with --effort quick)"
+        return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
     return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: clean or crop the scan where it fails"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
+from ..errors import words_of_number
 from .shared import (
     SCAN_HELP,
     add_memory,
@@ -67,7 +68,7 @@ def info(values: Namespace) -> None:
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
     field = samples.surface.field
-    longest = f" to {settings.length * field.max():.4g}" if settings.length_field else ""
+    longest = f" to {words_of_number(settings.length * field.max(), 4)}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])
     if boundary.loops:
         print_table(("boundary", "length", "corners"), loop_rows(boundary))

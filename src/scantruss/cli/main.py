@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import cast
 
 from .. import __version__
-from ..errors import CertificateError, InputError, ScanTrussError, words_of_error
+from ..errors import CertificateError, InputError, ScanTrussError, did_you_mean, words_of_error
 from ..runtime.stopping import SIGNAL_STATUS, asked, note_told, signals_heard, words_of_stop
 
 HELP = f"""\
@@ -33,8 +33,9 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
   scantruss families GRID OUT [OUT ...]    move the nodes along the surface, so that members are of few lengths
   scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
                                            list nodes, members and panels of a grid or structure as a workshop needs them
-  scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv --supports corners
-                                           set out supports, heights, boundaries; the order of assembly
+  scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv [--supports corners]
+                                           set out supports (of a grid: --supports), heights, boundaries;
+                                           the order of assembly
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss convert FILE OUT [OUT ...]     write a saved grid or structure for other programs: .dxf, .ifc, .saf.xlsx ...
@@ -68,7 +69,9 @@ def run(words: Sequence[str]) -> None:
     from .commands import COMMANDS
 
     if words[0] not in COMMANDS:
-        raise InputError(f"no command {words[0]!r}; use one of {' '.join(COMMANDS)}, or --help")
+        raise InputError(
+            f"no command {words[0]!r}{did_you_mean(words[0], COMMANDS)}; use one of {' '.join(COMMANDS)}, or --help"
+        )
     make_parser, command = COMMANDS[words[0]]
     parser = make_parser()
     if "-h" in words or "--help" in words:

@@ -108,7 +108,8 @@ def length_or_field(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"{needs}; write {text.replace(',', '.')} with a point, not {text}")
     if found := re.fullmatch(r"(-?\d*\.?\d+)\s*([a-z]+|\"|')", text, re.IGNORECASE):
         raise argparse.ArgumentTypeError(
-            f"{needs}; write {found[1]} in the unit of the scan, without {found[2]} (--unit says which unit that is)"
+            f"{needs} in the unit of the scan, without {found[2]} (info tells the unit, --unit sets it);"
+            f" turn {text} into that unit"
         )
     if "." in text or "/" in text or "\\" in text:
         raise argparse.ArgumentTypeError(f"{needs}; there is no file {text}")
@@ -126,6 +127,23 @@ def whole_number(text: str) -> int:
         return int(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"needs a whole number, got {text!r}") from None
+
+
+def share(text: str) -> float:
+    """Return 0.01 of "1%" or "0.01"."""
+    try:
+        return float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"needs a share such as 1% or 0.01, got {text!r}") from None
+
+
+def scale(text: str) -> float:
+    """Return 0.01 of "1:100" or "0.01"."""
+    first, colon, second = text.partition(":")
+    try:
+        return float(first) / (float(second) if colon else 1.0)
+    except (ValueError, ZeroDivisionError):
+        raise argparse.ArgumentTypeError(f"needs a scale such as 0.01 or 1:100, got {text!r}") from None
 
 
 def size_of_memory(text: str) -> float:

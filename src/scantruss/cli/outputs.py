@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from argparse import Namespace
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from ..runtime.ours import check_ours
 from ..settings import CURVATURE
 
 Taken = dict[Path, str]  # place of a file -> what is there
+VALUE = re.compile(r"[a-z-]{2,}:[-+]?\d")  # begin of the value of an option, such as snow:1kN/m2
+SUFFIX = re.compile(r"\.[a-z]\w*$", re.IGNORECASE)  # end of the name of a file
 
 
 def inputs_of(values: Namespace) -> Taken:
@@ -60,9 +63,15 @@ def outs_of(values: Namespace) -> list[Path]:
     from .options import UsageError
 
     given = getattr(values, "outs", None) or []
-    outs = [Path(out) for out in (*([given] if isinstance(given, str) else given), *values.more_outs)]
+    words = [*([given] if isinstance(given, str) else given), *values.more_outs]
+    if stray := next((word for word in words if VALUE.match(word) and not SUFFIX.search(word)), None):
+        raise UsageError(
+            f"{stray} is no file to write; if it belongs to the option before it, separate its values by commas, without blanks"
+        )
+    outs = [Path(word) for word in words]
     if not outs:
-        raise UsageError("missing OUT, the file of the result; write it last or as -o OUT")
+        how = "write it last or as -o OUT" if hasattr(values, "outs") else "write it as -o OUT"
+        raise UsageError(f"missing OUT, the file of the result; {how}")
     return outs
 
 

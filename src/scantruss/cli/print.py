@@ -6,7 +6,7 @@ from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of
 
@@ -25,7 +25,7 @@ MOST_HERE = 500  # members and nodes that are united in this process
 
 def print_parser() -> Parser:
     """Options of ``scantruss print``."""
-    from .options import Parser, add_outs, number
+    from .options import Parser, add_outs, number, scale
 
     usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
     said = (
@@ -39,7 +39,9 @@ def print_parser() -> Parser:
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
-    parser.add_argument("--scale", metavar="S", type=number, default=1.0, help="scale of the model (default 1)")
+    parser.add_argument(
+        "--scale", metavar="S", type=scale, default=1.0, help="scale of the model, 0.01 or 1:100 (default 1)"
+    )
     parser.add_argument("--marks", action="store_true", help="engrave the marks of the nodes on their balls")
     parser.add_argument(
         "--bed",
@@ -98,7 +100,7 @@ def print_solid(values: Namespace) -> None:
                 marks=values.marks,
                 keep_failed=values.keep_failed,
             )
-    size = " x ".join(f"{side:.4g}" for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
+    size = " x ".join(words_of_number(side, 4) for side in solid.vertices.max(axis=0) - solid.vertices.min(axis=0))
     bodies = "one watertight solid" if solid.components == 1 else f"{solid.components} watertight solids"
     notes = [note for out in outs for note in model_note(out, solid.unit)]
     print_lines([*solid.notes, *notes, f"wrote {' '.join(map(str, outs))}: {bodies}, {size} {solid.unit}".rstrip()])
@@ -115,7 +117,7 @@ def _print_parts(grid: Grid, outs: list[Path], values: Namespace) -> None:
         for number, out in enumerate(outs):
             bars("solids", number / len(outs))
             made = _apart(_print_parts_of, grid, save.beside(out), options)
-    size = " x ".join(f"{side:.4g}" for side in made.size)
+    size = " x ".join(words_of_number(side, 4) for side in made.size)
     what = "balls with sockets" if values.sockets else "parts with plug joints"
     notes = [note for out in outs for note in model_note(out, made.unit)]
     files = f"{len(made.files):,} files, {made.files[0]} to {made.files[-1]}"

@@ -7,7 +7,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def schedule_parser() -> Parser:
     """Options of ``scantruss schedule``."""
     from ..settings import UNITS
-    from .options import Parser, add_outs, number
+    from .options import Parser, add_outs, number, scale
     from .positions import position
 
     parser = Parser(
@@ -57,7 +57,7 @@ def schedule_parser() -> Parser:
         "--angle-tolerance", metavar="DEG", type=number, help="largest misfit of equal nodes (default 0.5)"
     )
     parser.add_argument(
-        "--scale", metavar="S", type=number, help="size of the structure over that of the grid (default 1)"
+        "--scale", metavar="S", type=scale, help="size of the structure over that of the grid (default 1)"
     )
     units = "|".join(unit for unit in UNITS if unit)
     parser.add_argument("--unit", metavar=units, help="unit of a grid that has none")
@@ -97,8 +97,8 @@ def schedule_parser() -> Parser:
 
 
 def tube(text: str) -> tuple[float, float | None]:
-    """Return diameter and wall of "114.3x5"; no wall for "114.3"."""
-    diameter, times, wall = text.lower().partition("x")
+    """Return diameter and wall of "114.3x5" or "CHS114.3x5"; no wall for "114.3"."""
+    diameter, times, wall = text.lower().removeprefix("chs").partition("x")
     try:
         return float(diameter), float(wall) if times else None
     except ValueError:
@@ -153,7 +153,7 @@ def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
     lines = [
         f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {settings.angle_tolerance:g} degrees"
         + mirrored_words(made.node_types),
-        f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {cut:,.4g} m",
+        f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {words_of_number(cut, 4)} m",
         f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm"
         + mirrored_words(made.panel_types),
     ]
@@ -173,10 +173,23 @@ def mirrored_words(types: Schedule) -> str:
 
 def warning_lines(warnings: Schedule) -> list[str]:
     """Say of each kind of warning how many there are, and the worst."""
+    from ..schedules.clashes import HEAVY_BALLS
+
     lines = []
     for words in dict.fromkeys(warnings["warning"]):
         rows = [row for row in warnings.rows if row[0] == words]
-        _, at, _, value, limit, measure, *_ = max(rows, key=lambda row: abs(float(row[3] or 0) - float(row[4] or 0)))
-        place = "" if at is None else f" at {at}"
-        lines.append(f"warning: {words}: {len(rows):,}, the worst {value:.4g}, limit {limit:.4g} {measure}{place}")
+        _, at, _, worst, given, measure, *_ = max(rows, key=lambda row: abs(float(row[3] or 0) - float(row[4] or 0)))
+        value, limit = float(worst or 0), None if given is None else float(given)
+        most = f"{words_of_number(value, 4)} {measure}".rstrip() + ("" if at is None else f" at {at}")
+        if words == HEAVY_BALLS and limit is not None:
+            lines.append(
+                f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} % for its nodes;"
+                f" structure --node-allowance {value / 100:.2f} takes that into account"
+            )
+        elif limit is None:  # what is never carried at all
+            lines.append(f"warning: {words}; the greatest is {most}")
+        elif len(rows) == 1:
+            lines.append(f"warning: {words}: {most}, limit {words_of_number(limit, 4)}")
+        else:
+            lines.append(f"warning: {words}: {len(rows):,}, the worst {most}, limit {words_of_number(limit, 4)}")
     return lines

@@ -23,23 +23,24 @@ PROPS_NAMED = 8  # of a step
 def setout_parser() -> Parser:
     """Options of ``scantruss setout``."""
     from ..settings import UNITS
-    from .options import Parser, add_outs, number
+    from .options import Parser, add_outs, number, scale
     from .positions import position
 
     parser = Parser(
         "setout",
-        "GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv|OUT.xlsx [OUT ...] [--supports WHERE] [options]",
+        "GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv|OUT.xlsx [OUT ...] [--supports WHERE, of a GRID only] [options]",
         "Set out a grid or a structure: supports, heights along sections, unrolled boundaries, a plan with marks, and the\n"
         "assembly by rings from the supports, each step stable or with the nodes that need props.\n"
+        "A structure has supports, joints, scale and unit of its own: give them for a grid only.\n"
         "Lengths that are not of the scan are millimetres of what is built.",
     )
     add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
     add_outs(parser, "drawing .dxf or .pdf, tables .xlsx or .csv: the supports, the other tables beside it", "*")
     units = "|".join(unit for unit in UNITS if unit)
     for name, metavar, kind, said in (
-        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, line:NAME, N001, several joined by +"),
+        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, line:NAME, loop:N, N001, several joined by +"),
         ("joints", "TYPE", str, "of a grid: rigid (default) or pinned, while it is put up"),
-        ("scale", "S", number, "of a grid: size of the structure over that of the grid (default 1)"),
+        ("scale", "S", scale, "of a grid: size of the structure over that of the grid (default 1)"),
         ("unit", units, str, "unit of a grid that has none"),
         ("origin", "X,Y,Z", position, "origin of the building frame in the scan (default: lowest corner)"),
         ("rotation", "DEG", number, "from the scan's x axis to the building's, about z"),
@@ -109,7 +110,7 @@ def setout_lines(made: SettingOut) -> list[str]:
     heights = sum(len(line.points) for line in made.section_lines)
     lines = [
         f"{count:,} supports, {heights:,} heights along {len(made.section_lines):,} sections,"
-        f" {len(made.boundaries):,} boundaries unrolled"
+        f" {len(made.boundaries):,} {'boundary' if len(made.boundaries) == 1 else 'boundaries'} unrolled"
     ]
     loose = [(number, step.props) for number, step in enumerate(made.steps) if len(step.props)]
     lines.append(

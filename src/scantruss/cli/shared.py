@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import words_of_number
+
 if TYPE_CHECKING:
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
@@ -153,7 +155,7 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     for number, piece in enumerate(large[:MOST_PIECES], 1):
         places = samples.surface.mean[samples.piece == piece] + cloud.origin
         low, high = places.min(axis=0), places.max(axis=0)
-        size = " x ".join(f"{side:.3g}" for side in high - low)
+        size = " x ".join(words_of_number(side, 3) for side in high - low)
         box = ",".join(f"{c:.6g}" for c in (*low - samples.surface.radius, *high + samples.surface.radius))
         bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone, --crop box:{box} all in its box")
     if len(large) > MOST_PIECES:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..settings import UNITS
 from .outputs import claim, claim_clouds
 from .shared import cloud_file_notes, note_compiling, report_cloud
@@ -143,7 +143,7 @@ def show_splice(result: Splice, written: list[Path]) -> None:
             f"{pair.first} - {pair.second}",
             f"{100.0 * pair.overlap:.0f} %",
             f"{100.0 * pair.agreement:.0f} %",
-            "-" if pair.residual is None else f"{pair.residual:.4g}{unit}",
+            "-" if pair.residual is None else f"{words_of_number(pair.residual, 4)}{unit}",
             "-" if pair.residual is None else f"{pair.residual / result.spacing:.2f}",
         )
         for pair in result.pairs
@@ -153,7 +153,7 @@ def show_splice(result: Splice, written: list[Path]) -> None:
     line = f"{count} of {count + len(result.left_out)} scans in the frame of {frame}"
     print_lines(
         [
-            f"{line}, spacing {result.spacing:.4g}{unit}, {len(result.cloud.points):,} points",
+            f"{line}, spacing {words_of_number(result.spacing, 4)}{unit}, {len(result.cloud.points):,} points",
             "wrote " + " ".join(map(str, written)),
             *cloud_file_notes(written[0], selects=False),
         ]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 REPORT_SUFFIXES = (".html", ".pdf", ".png")  # of what a person reads; the others are those of `export.formats`
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
-    ("scale", "NUMBER", "scale of the structure to the grid (default 1)"),
+    ("scale", "SCALE", "scale of the structure to the grid (default 1)"),
     ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
     ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, IPE200, HEA200, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
@@ -39,7 +39,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("loads", "LOAD,...|FILE",
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
-    ("node_allowance", "NUMBER", "weight of the nodes as a share of that of the members (default 0)"),
+    ("node_allowance", "SHARE", "weight of the nodes over that of the members, such as 0.15 or 15%% (default 0)"),
     ("double_layer", "DEPTH,...", "a second layer so far below, in metres of the structure or with a unit, and webs between; more"
      " layers with more depths, as in 1.2,0.8"),
     ("second_layer", "dual|same", "of a double layer: nodes under the triangles (default) or under the nodes"),
@@ -60,7 +60,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
 
 def structure_parser() -> Parser:
     """Options of ``scantruss structure``."""
-    from .options import Parser, add_outs, number, whole_number
+    from .options import Parser, add_outs, number, scale, share, whole_number
 
     parser = Parser(
         "structure",
@@ -76,7 +76,7 @@ def structure_parser() -> Parser:
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
     )
     for name, metavar, said in OWN_OPTIONS:
-        kind = {"NUMBER": number, "COUNT": whole_number}.get(metavar, str)
+        kind = {"NUMBER": number, "COUNT": whole_number, "SCALE": scale, "SHARE": share}.get(metavar, str)
         parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
     parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
     parser.add_argument("--dry-run", action="store_true", help="say size and time of the path, and compute nothing")
@@ -109,7 +109,7 @@ def structure(values: Namespace) -> None:
     from ..structure.doubts import support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
-    from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines
+    from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines, unlisted_lines
     from ..structure.sizing import SizingRound, size_members, weight_curve
     from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
@@ -160,6 +160,7 @@ def structure(values: Namespace) -> None:
     wrote = [*written, *(place for place in (report_place, plot) if place)]
     print_lines(
         [
+            *unlisted_lines(report),
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             support_words(truss),

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
+from .grid import choose_length
 from .outputs import Taken, claim, inputs_of, result_folder
-from .shared import add_memory, note_compiling, read_scan, thin_to_fit
+from .shared import add_memory, note_compiling, read_scan, settings_to_read, with_some_length
 from .thin import add_workers, workers_of
 
 if TYPE_CHECKING:
@@ -30,9 +31,10 @@ def sweep_parser() -> Parser:
 
     parser = Parser(
         "sweep",
-        "SCAN --length 3,4,5 [--effort quick,normal ...] -o FOLDER [options]",
+        "SCAN [--length 3,4,5] [--effort quick,normal ...] -o FOLDER [options]",
         "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
-        "Every setting takes one value or several, separated by commas; the scan is read once.",
+        "Every setting takes one value or several, separated by commas; the scan is read once. Without --length the length that\n"
+        "info suggests is taken.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
@@ -79,15 +81,19 @@ def sweep(values: Namespace) -> None:
     from ..report.choosing import head_of, rows_of, structure_table
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
+    from .options import has_length
 
     folder = result_folder(values.out)
-    trials, varied = trials_of_words(values)
+    trials, varied = trials_of_words(with_some_length(values))
     variants = variants_of(values)
     claim_results(folder, trials, inputs_of(values), values.force, SWEEP_STRUCTURES if variants else ())
     shortest = min((trial.settings for trial in trials), key=lambda settings: settings.length)
     with Bars() as bars:
-        fitting = thin_to_fit(values.scan, shortest, values.memory)
+        fitting = settings_to_read(values, shortest, bars)
         cloud = read_scan(values.scan, fitting, bars)
+        if not has_length(values):
+            length = choose_length(cloud, shortest, bars).length
+            trials = [replace(trial, settings=trial.settings.replace(length=length)) for trial in trials]
         if variants:
             from ..structure.build import scale_of
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import FormatError
+from ..errors import FormatError, InputError
 from ..grid.grid import Grid
 from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
 from ..scan.cloud import PointCloud
@@ -21,7 +21,7 @@ from ..settings import UNITS
 from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
 from .model import Model, members_of, model_of_grid, model_of_truss
-from .style import FileStyle
+from .style import PAGE_POINTS, FileStyle
 
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
@@ -41,6 +41,7 @@ class FileFormat:
     encode: Encoder | None  #: what its files hold: a pure function of the model
     loses: str = ""  #: what it cannot hold of a grid or a structure
     loses_of_structure: str = ""  #: what it cannot hold of a structure besides
+    most_points: int = -1  #: of a scan that it holds; a scan with no more loses nothing
     holds: tuple[str, ...] = (GRID, STRUCTURE)
     needs_unit: bool = False  #: whether a grid without a unit is refused
     wants_system: bool = False  #: whether programs need the reference system to place it
@@ -96,7 +97,8 @@ FORMATS: dict[str, FileFormat] = {
                            loses_of_structure="stiffness, loads, displacements or reactions"),
     ".glb": FileFormat("GLB", one("glb.encode_glb"), loses="marks or exact coordinates (float32, relative to the origin)",
                        loses_of_structure="supports, loads or forces"),
-    ".html": FileFormat("HTML", one("page.encode_page"), loses="more than 60,000 points of the scan", loses_of_structure="loads"),
+    ".html": FileFormat("HTML", one("page.encode_page"), loses=f"more than {PAGE_POINTS:,} points of the scan", most_points=PAGE_POINTS,
+                        loses_of_structure="loads"),
     ".ifc": FileFormat("IFC", one("ifc.encode_ifc"), needs_unit=True, draw=function("drawing_files.draw_ifc"),
                        reads_with="ifcopenshell", extra="bim"),
     ".inp": FileFormat("Abaqus", one("abaqus.encode_inp"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
@@ -187,7 +189,11 @@ def check_library(row: FileFormat, *, reading: bool = False) -> None:
 def losses(model: Model, path: str | Path) -> list[str]:
     """Return the note on what the format of a path does not hold of a model; none where it holds all."""
     row = FORMATS[suffix_of(Path(path), FORMATS)]
-    lost = [row.loses, *([row.loses_of_structure] if model.truss is not None else [])]
+    points = 0 if model.cloud is None else len(model.cloud.points)
+    lost = [
+        row.loses if points > row.most_points else "",
+        *([row.loses_of_structure] if model.truss is not None else []),
+    ]
     words = ", ".join(each for each in lost if each)
     unplaced = f"the reference system is not known, so {row.name} names none; give it with --system EPSG:CODE"
     return [f"{row.name} holds no {words}"] * bool(words) + [unplaced] * (row.wants_system and not model.system)
@@ -203,6 +209,8 @@ def model_of(
         return model_of_grid(what, cloud)
     if isinstance(what, Truss):
         return model_of_truss(what)
+    if not hasattr(what, "truss"):
+        raise InputError(f"a grid, a structure or its solution is needed, got {type(what).__name__}")
     return model_of_truss(what.truss, what, report)
 
 
@@ -239,6 +247,8 @@ def write(
     FormatError
         Unknown suffix, an extra that is not installed, no such folder, no space; nothing half-written is left.
     """
+    if not isinstance(path, str | Path):
+        raise FormatError(f"write needs a grid or structure, then a file name, got {type(path).__name__} as the file")
     model = model_of(what, cloud=cloud, report=report)
     path = check_output(path, GRID if model.truss is None else STRUCTURE)
     check_unit(path, model.unit)

@@ -25,6 +25,7 @@
   };
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const rgb = (name) => [1, 3, 5].map((k) => parseInt(css(name).padEnd(7, css(name).slice(1)).substr(k, 2), 16));
+  const hex = (color) => [1, 3, 5].map((k) => parseInt(color.substr(k, 2), 16));
   const words = (value) => value === null || value === undefined ? "-" : typeof value === "number" ? String(+value.toPrecision(5)) : value;
 
   // ---- programs
@@ -79,8 +80,8 @@
   for (const kind of KINDS) codes[kind] = paint(kind, code(kind));
 
   // ---- camera
-  const home = { target: [0, 0, 0], distance: 1.4 * size, turn: -0.9, rise: 0.5 };
-  let camera = { ...home, target: [...home.target] };
+  const FOCAL = 1 / Math.tan(0.35), MARGIN = 0.94;
+  let camera = { target: [0, 0, 0], distance: 1.4 * size, turn: -0.9, rise: 0.75 }, atHome = true;
   const axes = () => {
     const { turn, rise } = camera, back = [Math.cos(rise) * Math.cos(turn), Math.cos(rise) * Math.sin(turn), Math.sin(rise)];
     const right = [-Math.sin(turn), Math.cos(turn), 0];
@@ -88,9 +89,24 @@
     return { back, right, up };
   };
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const goHome = () => { // as near as all nodes fit into the view, in its middle
+    camera = { target: [0, 0, 0], distance: 0.01 * size, turn: -0.9, rise: 0.75 }; atHome = true;
+    const { back, right, up } = axes(), wide = canvas.width / canvas.height, fit = Math.min(1, wide) * FOCAL / MARGIN;
+    for (let step = 0; step < 4; step++) {
+      const each = Array.from({ length: counts.nodes }, (_, k) => at(k).map((value, j) => value - camera.target[j]));
+      const seen = each.map((p) => [dot(back, p), dot(right, p), dot(up, p)]);
+      camera.distance = seen.reduce((most, [z, x, y]) => Math.max(most, z + Math.max(Math.abs(x) * fit / wide, Math.abs(y) * fit)), 0.01 * size);
+      const middleOf = (j) => {
+        const ends = seen.reduce(([a, b], p) => { const v = p[j] / (camera.distance - p[0]); return [Math.min(a, v), Math.max(b, v)]; }, [Infinity, -Infinity]);
+        return counts.nodes && step < 3 ? camera.distance * (ends[0] + ends[1]) / 2 : 0;
+      };
+      const x = middleOf(1), y = middleOf(2);
+      camera.target = camera.target.map((value, j) => value + x * right[j] + y * up[j]);
+    }
+  };
   const view = () => {
     const { back, right, up } = axes(), eye = camera.target.map((value, k) => value + camera.distance * back[k]);
-    const wide = canvas.width / canvas.height, f = 1 / Math.tan(0.35), fit = Math.min(1, wide);
+    const wide = canvas.width / canvas.height, f = FOCAL, fit = Math.min(1, wide);
     const near = Math.max(camera.distance - 1.5 * size, camera.distance * 0.01), far = camera.distance + 1.5 * size;
     const rows = [right.map((v) => v * f * fit / wide), up.map((v) => v * f * fit), back];
     const m = new Float32Array(16), p = (far + near) / (near - far), q = 2 * far * near / (near - far);
@@ -147,6 +163,7 @@
   const resize = () => {
     const ratio = window.devicePixelRatio || 1;
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio)); canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    if (atHome) goHome();
     redraw();
   };
 
@@ -157,20 +174,23 @@
     const one = choice.kind && column(choice.kind, choice.name), known = one ? one.values.filter((v) => typeof v === "number") : [];
     let low = Infinity, high = -Infinity;
     for (const v of known) { low = Math.min(low, v); high = Math.max(high, v); }
+    const [most, over] = choice.most && high > choice.most[0] ? choice.most : [Infinity, null];
+    high = Math.min(high, most);
     if (choice.middle !== undefined) { const far = Math.max(high - choice.middle, choice.middle - low) || 1e-9; low = choice.middle - far; high = choice.middle + far; }
     const stops = choice.middle !== undefined ? diverging() : rising(), plain = { nodes: rgb("--wire"), members: rgb("--wire"), panels: rgb("--panel") };
     for (const kind of KINDS) {
       if (colors[kind]) gl.deleteBuffer(colors[kind]);
       colors[kind] = paint(kind, (k) => {
         const value = kind === choice.kind ? one.values[k] : null;
-        return [...(typeof value === "number" ? ramp(stops, high > low ? (value - low) / (high - low) : 0.5) : plain[kind]), 255];
+        return [...(value > most ? hex(over) : typeof value === "number" ? ramp(stops, high > low ? (value - low) / (high - low) : 0.5) : plain[kind]), 255];
       });
     }
     $("legend").hidden = !one || !known.length;
     if (one && known.length) {
       $("what").textContent = choice.words + (one.unit ? ` [${one.unit}]` : "");
-      $("ramp").style.background = `linear-gradient(to right, ${stops.map((c) => `rgb(${c})`).join(",")})`;
-      $("ends").replaceChildren(...[low, (low + high) / 2, high].map((v) => Object.assign(document.createElement("span"), { textContent: words(v) })));
+      const decimals = Math.min(Math.max(2 - Math.floor(Math.log10(high - low || Math.abs(high) || 1) + 0.05), 0), 8);
+      $("ramp").style.background = `linear-gradient(to right, ${stops.map((c, k) => `rgb(${c}) ${(over ? 90 : 100) * k / (stops.length - 1)}%`).join(",")}${over ? `, ${over} 90%` : ""})`;
+      $("ends").replaceChildren(...[low, (low + high) / 2, high].map((v, k) => Object.assign(document.createElement("span"), { textContent: v.toFixed(decimals) + (over && k > 1 ? " and more" : "") })));
     }
     redraw();
   };
@@ -203,7 +223,7 @@
   };
 
   // ---- pins of the certificate
-  const fly = (place) => { camera.target = place.map((value, k) => value - middle[k]); camera.distance = Math.min(camera.distance, 8 * data.reach); redraw(); };
+  const fly = (place) => { atHome = false; camera.target = place.map((value, k) => value - middle[k]); camera.distance = Math.min(camera.distance, 8 * data.reach); redraw(); };
   const flags = data.places.map((place, k) => {
     const pin = Object.assign(document.createElement("button"), { className: "pin", textContent: k + 1, title: place.words, tabIndex: -1 });
     pin.onclick = () => fly(place.where);
@@ -219,9 +239,9 @@
   });
 
   // ---- mouse, touch and keys
-  const orbit = (x, y) => { camera.turn -= x; camera.rise = Math.min(Math.max(camera.rise + y, -1.55), 1.55); redraw(); };
-  const pan = (x, y) => { const { right, up } = axes(); camera.target = camera.target.map((value, k) => value + camera.distance * (y * up[k] - x * right[k])); redraw(); };
-  const zoom = (factor) => { camera.distance = Math.min(Math.max(camera.distance * factor, 0.005 * size), 5 * size); redraw(); };
+  const orbit = (x, y) => { atHome = false; camera.turn -= x; camera.rise = Math.min(Math.max(camera.rise + y, -1.55), 1.55); redraw(); };
+  const pan = (x, y) => { atHome = false; const { right, up } = axes(); camera.target = camera.target.map((value, k) => value + camera.distance * (y * up[k] - x * right[k])); redraw(); };
+  const zoom = (factor) => { atHome = false; camera.distance = Math.min(Math.max(camera.distance * factor, 0.005 * size), 5 * size); redraw(); };
   const fingers = new Map();
   let moved = 0;
   canvas.onpointerdown = (event) => { fingers.set(event.pointerId, event); canvas.setPointerCapture(event.pointerId); if (fingers.size === 1) moved = 0; else moved = 99; };
@@ -245,7 +265,7 @@
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     if (way) (event.shiftKey ? pan : orbit)(0.08 * way[0], 0.08 * way[1]);
     else if (event.key === "+" || event.key === "=") zoom(0.85); else if (event.key === "-") zoom(1 / 0.85);
-    else if (event.key === "Home") { camera = { ...home, target: [...home.target] }; redraw(); } else if (event.key === "Escape") select(); else return;
+    else if (event.key === "Home") { goHome(); redraw(); } else if (event.key === "Escape") select(); else return;
     event.preventDefault();
   };
   $("mark").oninput = () => {

@@ -14,17 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import words_of_number
 from ..grid.certificate import near
 from ..grid.grid import Grid
 from ..runtime.ours import MARK
 from ..scan.cloud import PointCloud
+from ..structure.report import use_words
 from .model import Model, model_of_grid
 from .page_tables import Pin, colorings_of, pins_of, tables_of
-from .style import FileStyle
+from .style import PAGE_POINTS, FileStyle
 
 PAGE_FOLDER = Path(__file__).parent
 NOTEBOOK_HEIGHT = 640  #: of a page within a notebook [pixel]
-PAGE_POINTS = 60_000  #: of the scan that are drawn
 PAGE_LAYERS = (("members", True), ("nodes", True), ("panels", True), ("scan", False), ("pins", True))
 
 
@@ -151,14 +152,14 @@ def _figures(model: Model) -> list[tuple[str, str]]:
     if model.truss is None and model.grid is not None and len(model.members):
         quality = model.grid.quality
         return [
-            (f"member length, mean{unit}", f"{quality.length_mean:.4g}"),
+            (f"member length, mean{unit}", words_of_number(quality.length_mean, 4)),
             ("length std / mean", f"{quality.length_cv:.4f}"),
             ("shape quality G, mean", f"{quality.shape_mean:.4f}"),
             ("shape quality G, smallest", f"{quality.shape_min:.3f}"),
             ("angles [degree]", f"{quality.angle_min:.1f} to {quality.angle_max:.1f}"),
             ("inner nodes of six members", f"{quality.valence6:.0%}"),
         ]
-    rows = [(f"member length, mean{unit}", f"{model.lengths.mean():.4g}")] if len(model.members) else []
+    rows = [(f"member length, mean{unit}", words_of_number(model.lengths.mean(), 4))] if len(model.members) else []
     if model.truss is not None:
         rows.append(("mass without nodes [kg]", f"{model.truss.mass:,.0f}"))
         rows.append(("supports", f"{len(model.supported):,}"))
@@ -167,9 +168,9 @@ def _figures(model: Model) -> list[tuple[str, str]]:
         service = [result for result in every if result.state == "SLS"] or every  # as the report of a structure does
         if service:
             most, name = max((result.displacement_max, result.name) for result in service)
-            rows.append((f"greatest displacement, {name} [mm]", f"{1e3 * most:.3g}"))
+            rows.append((f"greatest displacement, {name} [mm]", words_of_number(1e3 * most, 3)))
     if model.utilization is not None and np.isfinite(model.utilization).any():
-        rows.append(("greatest utilization", f"{np.nanmax(model.utilization):.2f}"))
+        rows.append(("greatest utilization", use_words(float(np.nanmax(model.utilization)))))
     return rows
 
 

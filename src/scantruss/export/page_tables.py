@@ -9,9 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..check.folds import fold_angles
+from ..errors import words_of_number
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.panels import planarity_of, shape_qualities_of, side_lengths_of
+from .drawing.structure import OVERUSED
 from .model import Model
 
 COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, words, middle of a diverging scale
@@ -132,7 +134,9 @@ def colorings_of(tables: Tables) -> list[dict[str, Any]]:
     for kind, name, words, middle in COLORINGS:
         values = next((each.values for each in tables[kind] if each.name == name), ())
         if any(value is not None for value in values):
-            more = {} if middle is None else {"middle": middle}
+            more: dict[str, Any] = {} if middle is None else {"middle": middle}
+            if name == "utilization":
+                more["most"] = [1.0, OVERUSED]  # what is more has a colour of its own, as in pictures
             found.append({"kind": kind, "name": name, "words": words, **more})
     return found
 
@@ -147,7 +151,7 @@ def pins_of(certificate: Certificate) -> list[Pin]:
         if fault.where is not None
     ]
     pins += [
-        Pin(name, f"{worst.value:.4g}{' degrees' if of_angle else unit}", worst.where)
+        Pin(name, f"{words_of_number(worst.value, 4)}{' degrees' if of_angle else unit}", worst.where)
         for name, worst, of_angle in certificate.worst_places()
     ]
     return pins + [

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
@@ -156,14 +156,14 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
     length = float(grid.lengths[shortest]) * scale
     if member_diameter < length / SLENDEREST:
         raise InputError(
-            f"members {length:.4g}{unit} long at scale {scale:g} would be {member_diameter:g}{unit} thick, thinner than one in"
-            f" {SLENDEREST:,}; give a smaller scale or a larger diameter"
+            f"members {words_of_number(length, 4)}{unit} long at scale {scale:g} would be {member_diameter:g}{unit} thick,"
+            f" thinner than one in {SLENDEREST:,}; give a smaller scale or a larger diameter"
         )
     for name, value in (("member", member_diameter), ("node", node_diameter)):
         if value >= length:
-            a, b = grid.edges[shortest].tolist()
+            a, b = (node_marks(grid)[k] for k in grid.edges[shortest].tolist())
             raise InputError(
-                f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {length:.4g}{unit} long "
+                f"the {name} diameter {value:g}{unit} is not smaller than the shortest member, {words_of_number(length, 4)}{unit} long "
                 f"at scale {scale:g} (nodes {a} and {b}); give a smaller diameter or a larger scale"
             )
 
@@ -270,7 +270,7 @@ def _checked(solid: Solid) -> Solid:
     euler = len(np.unique(solid.triangles)) - len(solid.triangles) * 3 // 2 + len(solid.triangles)
     if not (solid.volume > 0 and solid.components >= 1 and is_watertight(solid.triangles)):
         raise InputError(
-            f"the grid gives no watertight solid (volume {solid.volume:.4g}, {solid.components} bodies); "
+            f"the grid gives no watertight solid (volume {words_of_number(solid.volume, 4)}, {solid.components} bodies); "
             f"check the grid and try slightly different diameters"
         )
     return replace(solid, genus=solid.components - euler // 2)

@@ -11,6 +11,7 @@ from .drawing.style import PictureStyle
 OBJ_ELEMENTS = ("faces", "lines", "both")
 STEP_PARTS = ("axes", "bodies")
 IFC_EDITIONS = ("IFC4", "IFC4X3")
+PAGE_POINTS = 60_000  #: of the scan that are drawn in a page
 IFC_VIEWS = ("auto", "physical", "analysis", "both")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from ..errors import CertificateError, Place, words_of_place
+from ..errors import CertificateError, Place, words_of_number, words_of_place
 
 if TYPE_CHECKING:
     from .grid import Grid
@@ -144,7 +144,7 @@ class Certificate:
             ("longest member", self.longest_member, False),
             ("smallest angle", self.smallest_angle, True),
             ("largest angle", self.largest_angle, True),
-            ("sharpest fold between triangles", self.sharpest_fold, True),
+            ("sharpest fold between triangles, 180 is level", self.sharpest_fold, True),
             ("node farthest from the scan", _largest(self.node_distance), False),
             ("triangle farthest from the scan", _largest(self.triangle_distance), False),
             ("point farthest from the grid", _largest(self.scan_distance), False),
@@ -193,7 +193,7 @@ class Certificate:
             f"{self.handles} handles" if self.handles else "",
             "no triangles cut each other",
             f"{self.scan_within_reach:.2%} of the scan and {self.grid_within_reach:.2%} of the triangles within"
-            f" {self.reach:.3g} {self.unit}".rstrip(),
+            f" {words_of_number(self.reach, 3)} {self.unit}".rstrip(),
             f"irregular {self.irregular}, forced {self.irregular_forced}",
         ]
         return ", ".join(word for word in said if word)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import words_of_number
 from .line_sets import LineSet
 from .panels import CELL_NAMES
 from .quality import GridQuality, measure_quality
@@ -67,7 +68,7 @@ class Grid(GridTables):
     def __repr__(self) -> str:
         """Say what it is made of, not every number."""
         unit = f" {self.unit}" if self.unit else ""
-        length = f" of {self.lengths.mean():.4g}{unit}" if len(self.edges) else ""
+        length = f" of {words_of_number(self.lengths.mean(), 4)}{unit}" if len(self.edges) else ""
         return f"Grid({len(self.nodes):,} nodes, {len(self.edges):,} members{length}, {len(self.panel_table):,} {self.panels_are})"
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..check.limits import WARN_LEFT_OUT
-from ..errors import words_of_place
+from ..errors import words_of_number, words_of_place
 from ..grid.certificate import near
 from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
@@ -85,12 +85,17 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
     return [
         (
             name + (unit if key.startswith("length_") and key != "length_cv" else ""),
-            form.format(before[key]) if key in before else "",
-            form.format(after[key]),
+            _said(before[key], form) if key in before else "",
+            _said(after[key], form),
         )
         for name, key, form in rows
         if key in after
     ]
+
+
+def _said(value: float, form: str) -> str:
+    """Return a number in a form, one such as "{:.4g}" without a power of ten."""
+    return words_of_number(value, int(form[3])) if form.endswith("g}") else form.format(value)
 
 
 def grid_lines(grid: Grid, points: int) -> list[str]:
@@ -125,19 +130,22 @@ def line_lines(grid: Grid) -> list[str]:
     unit, lines = f" {grid.unit}" if grid.unit else "", []
     for kind in (FIXED_LINE, RIDGE):
         sets = sets_of(grid, kind)
-        each = [f"{line['name']} {len(line['nodes'])} nodes, {line['length']:.4g}{unit}" for line in sets[:MOST_LINES]]
+        each = [
+            f"{line['name']} {len(line['nodes'])} nodes, {words_of_number(line['length'], 4)}{unit}"
+            for line in sets[:MOST_LINES]
+        ]
         each += [f"and {len(sets) - MOST_LINES} more"] * (len(sets) > MOST_LINES)
         if sets:
             total = sum(line["length"] for line in sets)
             count = (
-                f"{len(sets)} {kind}{'s' if len(sets) > 1 else ''}, {total:.4g}{unit} in all"
+                f"{len(sets)} {kind}{'s' if len(sets) > 1 else ''}, {words_of_number(total, 4)}{unit} in all"
                 if len(sets) > 1
                 else f"1 {kind}"
             )
             lines.append(f"{count}: {'; '.join(each)}")
     made = grid.settings
     if made is not None and made.ridge_angle > 0.0 and made.method == "default" and not sets_of(grid, RIDGE):
-        lines.append(f"no ridge is folded by more than {made.ridge_angle:g} degrees")
+        lines.append(f"no ridge: no sharp edge is folded to less than {180 - made.ridge_angle:g} degrees, 180 is level")
     return lines
 
 
@@ -157,8 +165,9 @@ def distance_lines(certificate: Certificate) -> list[str]:
     """Return how far scan and grid lie apart, in the scan's unit and in members."""
     unit, member = f" {certificate.unit}" if certificate.unit else "", 2.0 * certificate.reach
     lines = [
-        f"{name}: 50 % within {spread.p50:.3g}, 95 % {spread.p95:.3g}, 99 % {spread.p99:.3g}, all"
-        f" {spread.largest.value:.3g}{unit} ({spread.p50 / member:.2g}, {spread.p95 / member:.2g}, {spread.p99 / member:.2g},"
+        f"{name}: 50 % within {words_of_number(spread.p50, 3)}, 95 % {words_of_number(spread.p95, 3)},"
+        f" 99 % {words_of_number(spread.p99, 3)}, all {words_of_number(spread.largest.value, 3)}{unit}"
+        f" ({spread.p50 / member:.2g}, {spread.p95 / member:.2g}, {spread.p99 / member:.2g},"
         f" {spread.largest.value / member:.2g} members)"
         for name, spread in (
             ("points to grid", certificate.scan_distance),
@@ -186,9 +195,9 @@ def left_out_lines(certificate: Certificate) -> list[str]:
     for part in certificate.left_out:
         if part.kind == "far" and part.where is not None:  # a warning reports it
             continue
-        size = f"{part.size or 0.0:.3g}{unit} {'long' if part.kind == 'limbs' else 'across'}"
+        size = f"{words_of_number(part.size or 0.0, 3)}{unit} {'long' if part.kind == 'limbs' else 'across'}"
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
-        place = f", up to {part.size:.3g}{unit} across" if part.number > 1 else place
+        place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
         lines.append(f"left out: {count}{part.words}{place}" if count else f"{part.words}{place}")
     return lines
@@ -203,7 +212,7 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
     """Return the worst places of a grid: name, figure, place in the scan's own frame."""
     unit = f" {certificate.unit}" if certificate.unit else ""
     return [
-        (name, f"{worst.value:.4g}{' degrees' if of_angle else unit}", words_of_place(worst.where))
+        (name, f"{words_of_number(worst.value, 4)}{' degrees' if of_angle else unit}", words_of_place(worst.where))
         for name, worst, of_angle in certificate.worst_places()
     ]
 
@@ -214,13 +223,13 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
-    extent = " x ".join(f"{side:.4g}" for side in np.ptp(cloud.points, axis=0))
+    extent = " x ".join(words_of_number(side, 4) for side in np.ptp(cloud.points, axis=0))
     lowest = [f"{value:.10g}" for value in cloud.origin + cloud.points.min(axis=0)]
     lines = [
         f"points   {len(cloud.points)}"
         + (f" ({cloud.dropped} more left out: NaN or infinite)" if cloud.dropped else ""),
         f"extent   {extent}{unit}, from {' '.join(lowest)}",
-        f"spacing  {cloud.spacing:.4g}{unit}",
+        f"spacing  {words_of_number(cloud.spacing, 4)}{unit}",
         f"unit     {cloud.unit or 'not known; give it with --unit mm|cm|m|inch|foot'}",
     ]
     if low > high:
@@ -236,6 +245,6 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
 def loop_rows(boundary: Boundary) -> list[tuple[str, ...]]:
     """Return kind, length and corners of each loop."""
     return [
-        ("external" if loop.external else "internal", f"{loop.length:.4g}", str(len(loop.corners)))
+        ("external" if loop.external else "internal", words_of_number(loop.length, 4), str(len(loop.corners)))
         for loop in boundary.loops
     ]

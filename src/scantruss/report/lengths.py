@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import words_of_place
+from ..errors import words_of_number, words_of_place
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -71,7 +71,11 @@ def _why(trial: LengthTrial) -> str:
 def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     """Return how noisy and how bent the scan is, which lengths pass, and which to take."""
     unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
-    bent = f"R = {radius:.3g}{unit}: 95 % of the scan is bent less" if np.isfinite(radius) else "the scan is flat"
+    bent = (
+        f"R = {words_of_number(radius, 3)}{unit}: 95 % of the scan is bent less"
+        if np.isfinite(radius)
+        else "no bend beyond its noise was found"
+    )
     lines = [bent]
     if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
         noise = trial.grid.certificate.noise

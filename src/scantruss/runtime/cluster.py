@@ -24,7 +24,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from .. import __version__
-from ..errors import InputError, ScanTrussError
+from ..errors import InputError, ScanTrussError, how_to_install
 from .parallel import processors
 from .stopping import is_clean, left_behind, signals_held
 
@@ -35,7 +35,7 @@ Work = Callable[[Job, Any], Result]
 JOBS_PER_WORKER = 2  # jobs submitted per worker; more would let results pile up in memory
 MOST_PER_PROCESSOR = 4  # workers; more only take memory
 SECONDS_TO_ANSWER = 10.0  # time a scheduler has to answer [s]
-NEEDS_DASK = 'needs dask and distributed: python -m pip install "scantruss[cluster]"'
+NEEDS_DASK = f"needs dask and distributed; install them with: {how_to_install('cluster')}"
 WORKER_DIED = "a worker died, perhaps for lack of memory; use fewer workers"
 
 

@@ -54,7 +54,7 @@ def check_place(path: str | Path, suffixes: Collection[str]) -> Path:
     path = Path(path)
     if not suffix_of(path, suffixes):
         raise FormatError(
-            f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(suffixes))}'
+            f'no format for "{path.suffix or path.name}"; use one of {" ".join(sorted(set(suffixes)))}'
             f"{nearest_suffix(path, suffixes)}"
         )
     folder = path.parent

@@ -10,9 +10,11 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
 from types import FrameType
 
 SECONDS_TO_END = 0.5  # time in which the main thread may end by itself [s]
@@ -57,6 +59,8 @@ def signals_heard() -> Iterator[None]:
     """Raise `Stopped` on the first signal to end, for as long as a command runs; then remove what it left half-written."""
     _State.asked, _State.told, _State.written = None, False, False
     with ExitStack() as stack:
+        stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
+        sys.unraisablehook = partial(_say_unless_stopped, sys.unraisablehook)
         for number in SIGNAL_STATUS:
             if callable(kept := signal.getsignal(number)) or kept == signal.SIG_DFL:
                 with suppress(ValueError):  # only the main thread may
@@ -67,6 +71,12 @@ def signals_heard() -> Iterator[None]:
         finally:
             with signals_held():
                 clean_up()
+
+
+def _say_unless_stopped(say: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs) -> None:
+    """Say what was lost in a callback that cannot raise, but for `Stopped`: then the watch ends the process."""
+    if not issubclass(lost.exc_type, Stopped):
+        say(lost)
 
 
 def _raise_once(number: int, frame: FrameType | None) -> None:

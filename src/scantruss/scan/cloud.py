@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..runtime.parallel import in_parts, processors, run_in_parts
 from .checks import (
     CAUSE,
@@ -52,7 +52,7 @@ class PointCloud:
 
     def __repr__(self) -> str:
         """Give the number of points and the extent."""
-        sides = " x ".join(f"{side:.4g}" for side in self.bounds[1] - self.bounds[0])
+        sides = " x ".join(words_of_number(side, 4) for side in self.bounds[1] - self.bounds[0])
         unit = f" {self.unit}" if self.unit else ""
         name = f"{self.name}: " if self.name else ""
         return f"PointCloud({name}{len(self.points):,} points, {sides}{unit})"

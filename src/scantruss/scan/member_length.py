@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from ..errors import InputError, LengthError
+from ..errors import InputError, LengthError, words_of_number
 from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud, measure_gap
 
@@ -36,8 +36,8 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
         return
     low, high = exact_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
-    extent = f"a scan whose longest side is {cloud.usual_extent:.4g}{unit}"
-    apart = f"points that are {cloud.spacing:.3g}{unit} apart"
+    extent = f"a scan whose longest side is {words_of_number(cloud.usual_extent, 4)}{unit}"
+    apart = f"points that are {words_of_number(cloud.spacing, 3)}{unit} apart"
     if low > high:
         raise InputError(
             f"this scan carries no grid: members must be at least {round_length(low, 'up'):g}{unit} long for {apart}, and at most"

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 SYMMETRY_TOLERANCE = 0.1  #: by how far 95 % of a scan may lie off its mirror image [member lengths]
 CELLS_ACROSS = 45  #: of the cells in each of which one place stands for the scan, along its longest side
@@ -129,6 +132,8 @@ def _places(points: np.ndarray) -> _Places:
         raise InputError(f"the scan has too few points for its symmetry to be told: {len(points):,}")
     middle = at.mean(axis=0)
     at -= middle
+    from scipy.spatial import cKDTree  # not needed by a grid without symmetry
+
     tree = cKDTree(at)
     _, near = tree.query(at, k=9)
     around = at[near] - at[near].mean(axis=1, keepdims=True)

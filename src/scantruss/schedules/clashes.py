@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
 SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
 NO_MOMENT = 1e-6  # [m]: moment over force up to which it is one of rounding
+HEAVY_BALLS = "balls are heavier than the node allowance of the structure"
+TOO_HEAVY = 1.1  # times its allowance for nodes from which the balls of a structure are too heavy for it
+SOME_WEIGHT = 0.02  # share of the mass of the members up to which balls are not worth a warning
 WarningRow = tuple[Value, ...]
 
 
@@ -30,6 +33,7 @@ def warnings_table(parts: Parts) -> Schedule:
         *_crossing(parts),
         *_folds(parts),
         *_of_structure(parts),
+        *_heavy_balls(parts),
     ]
     heads = ("warning", "at", "with", "value", "limit", "measure")
     units = {"scan x": parts.unit, "scan y": parts.unit, "scan z": parts.unit}
@@ -164,10 +168,23 @@ def _of_structure(parts: Parts) -> list[WarningRow]:
         if moment > NO_MOMENT * max(1.0, float(forces.high.max()) / 1000.0):
             at = parts.member_marks[int(forces.moment.argmax())]
             rows.append(
-                ("bolts are chosen for tension and carry no moments", at, None, moment, 0.0, "kNm", None, None, None)
+                ("bolts are chosen for tension and carry no moments", at, None, moment, None, "kNm", None, None, None)
             )
     for words, value, most, measure, chosen in found:
         for member in np.flatnonzero(chosen).tolist():
             place = parts.grid.scan_nodes[parts.grid.edges[member]].mean(axis=0)
             rows.append((words, parts.member_marks[member], None, float(value[member]), most, measure, *place.tolist()))
     return rows
+
+
+def _heavy_balls(parts: Parts) -> list[WarningRow]:
+    """Balls that weigh more than the self-weight of the structure allows for its nodes [% of the mass of its members]."""
+    balls = parts.ball_masses
+    if balls is None or parts.forces is None or not parts.forces.truss.mass:
+        return []
+    truss = parts.forces.truss
+    weight = sum(case.self_weight for case in truss.cases)
+    share, allowed = float(balls.sum()) / truss.mass, weight - 1.0
+    if weight <= 0.0 or share <= max(TOO_HEAVY * allowed, SOME_WEIGHT):
+        return []
+    return [(HEAVY_BALLS, None, None, 100.0 * share, 100.0 * allowed, "% of the mass of the members", None, None, None)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -52,3 +53,10 @@ class Parts:
     node_marks: list[str]
     member_marks: list[str]
     panel_marks: list[str]
+
+    @property
+    def ball_masses(self) -> np.ndarray | None:
+        """(V,) mass of each ball, solid, holes not taken off [kg]; None without a density."""
+        if (density := self.stock.ball_density) is None:
+            return None
+        return math.pi / 6.0 * (2.0 * self.radius / 1000.0) ** 3 * density

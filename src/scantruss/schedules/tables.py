@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,7 @@ def all_tables(parts: Parts) -> Schedules:
     """Return all schedules."""
     ring = rings(parts.grid, building_places(parts.grid, parts.settings)[:, 2])
     groups = list(layered.own_groups) if (layered := layered_grid(parts)) else member_groups(parts.grid)
-    ball, member = _ball_masses(parts), _member_masses(parts)
+    ball, member = parts.ball_masses, _member_masses(parts)
     return Schedules(
         nodes=_nodes(parts, ring, ball),
         drilling=_drilling(parts),
@@ -46,13 +45,6 @@ def all_tables(parts: Parts) -> Schedules:
         warnings=warnings_table(parts),
         inner_panels=inner_panels(parts) if layered else None,
     )
-
-
-def _ball_masses(parts: Parts) -> np.ndarray | None:
-    """Return the mass of each ball (V,), solid, holes not taken off [kg]; None without a density."""
-    if (density := parts.stock.ball_density) is None:
-        return None
-    return math.pi / 6.0 * (2.0 * parts.radius / 1000.0) ** 3 * density
 
 
 def _member_masses(parts: Parts) -> np.ndarray | None:

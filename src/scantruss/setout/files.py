@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import FormatError
+from ..errors import FormatError, how_to_install
 from ..export.csv import encode_table
 from ..runtime.files import check_place, write_files
 from ..runtime.ours import MARK
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .make import SettingOut
 
 SETOUT_SUFFIXES = (".csv", ".dxf", ".pdf", ".xlsx")
-NEEDS_EZDXF = 'writing .dxf needs ezdxf: python -m pip install "scantruss[cad]"'
+NEEDS_EZDXF = f"writing .dxf needs ezdxf; install it with: {how_to_install('cad')}"
 LAYER_COLOURS = (8, 1, 5, 7, 8, 3, 6, 9)  # of the layers, AutoCAD colour index
 LAYER_INKS = ("0.55", "#c0202a", "#2040c0", "0", "0.45", "#208030", "#803090", "0.75")  # of the layers
 USUAL_SCALES = [base * 10**power for power in range(6) for base in (1, 2, 2.5, 5)]  # 1 : so much

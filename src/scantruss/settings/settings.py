@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..selection import Selection
 from .records import (
     HOLE,
@@ -23,6 +24,7 @@ from .records import (
     SurfaceSettings,
 )
 from .values import (
+    CURVATURE,
     check_length_field,
     check_line,
     check_names,
@@ -61,7 +63,12 @@ class Settings(
         if self.length_field and self.length == 0:
             object.__setattr__(self, "length", shortest_and_longest(self.length_field)[0])
         if not (isinstance(self.length, int | float) and math.isfinite(self.length) and self.length > 0):
-            raise InputError(f"length must be a positive number in the scan's unit, got {self.length}")
+            field = (
+                f"; give {CURVATURE}MIN:MAX or rows of lengths as length_field"
+                if isinstance(self.length, str | Sequence)
+                else ""
+            )
+            raise InputError(f"length must be a positive number in the scan's unit, got {self.length}{field}")
         super().__post_init__()
         if self.cells != "quad" and self.rows != "boundary":
             raise InputError(f"rows {self.rows} needs cells quad, got {self.cells}")
@@ -76,6 +83,15 @@ class Settings(
             raise InputError(f"symmetry needs cells triangle, got {self.cells}")
         object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))
         object.__setattr__(self, "line_names", check_names(self.line_names, len(self.fixed_lines)))
+
+    @classmethod
+    def check(cls, given: Any) -> Settings:
+        """Return settings that a function was given; a number, or what else is none, is refused."""
+        if isinstance(given, cls):
+            return given
+        raise InputError(
+            f"settings must be Settings, as in Settings(length=1.5), got {type(given).__name__} {given!r:.40}"
+        )
 
     def __repr__(self) -> str:
         """Name the settings that are not the default."""
@@ -112,7 +128,9 @@ class Settings(
         values = {RENAMED.get(name, name): value for name, value in values.items() if name != "made_by"}
         names = {spec.name for spec in fields(cls)}
         if unknown := sorted(set(values) - names):
-            raise InputError(f"unknown setting {unknown[0]!r}; known are {' '.join(sorted(names))}")
+            raise InputError(
+                f"unknown setting {unknown[0]!r}{did_you_mean(unknown[0], names)}; known are {' '.join(sorted(names))}"
+            )
         if "length" not in values and not values.get("length_field"):
             raise InputError("settings need a length (the desired member length in the scan's unit)")
         try:

@@ -135,7 +135,7 @@ def rectangle(name: str, width: float, depth: float, source: str = "") -> Sectio
 
 
 def find_section(name: str) -> Section:
-    """Return a section by name (`CHS114.3x5`, `SHS100x5`, `R100x200` of width x depth in mm), or from a CSV file.
+    """Return a section by name (`CHS114.3x5` or `114.3x5`, `SHS100x5`, `R100x200` of width x depth in mm), or from a CSV file.
 
     `FILE.csv` is a file with one section, `FILE.csv:NAME` one of several; see `read_sections` for its columns.
 
@@ -148,6 +148,8 @@ def find_section(name: str) -> Section:
         width, depth = float(found[1]) / 1e3, float(found[2]) / 1e3
         if min(width, depth) > 0:
             return rectangle(f"R{found[1]}x{found[2]}", width, depth, "dimensions given")
+    if re.fullmatch(r"\d+\.?\d*x\d+\.?\d*", _key(name)):  # a tube, as `schedule` takes it
+        name = f"CHS{name}"
     return _find(name, "section", bundled_sections, read_sections)
 
 

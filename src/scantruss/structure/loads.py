@@ -296,7 +296,11 @@ def _nodes(truss: Truss, given: Any, name: str) -> np.ndarray:
     words = [given] if isinstance(given, str) else given
     if not words:
         raise InputError(f'the load {name!r} needs nodes, as in nodes = ["N001"]')
-    return support_nodes(truss, "+".join(map(str, words)))
+    try:
+        return support_nodes(truss, "+".join(map(str, words)))
+    except InputError as error:
+        found = str(error).partition(";")[0].removeprefix("no supports").removeprefix(":").strip()
+        raise InputError(f"the load {name!r} names nodes that are not there: {found}") from None
 
 
 def _members(truss: Truss, given: Any, name: str) -> np.ndarray:

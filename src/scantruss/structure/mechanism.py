@@ -57,9 +57,9 @@ def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
     moves = np.linalg.norm(motion[:, :3], axis=1)
     turns = length * np.linalg.norm(motion[:, 3:], axis=1)
     if moves.max() > 1e-6 * max(turns.max(initial=0.0), 1e-300) and _is_rigid(truss.nodes, motion[:, :3]):
-        raise InputError(
-            "a mechanism: the supports let the whole structure move; hold more directions, as with --support-type pinned"
-        )
+        held = truss.supports[:, :3][truss.supports.any(axis=1)] > 0
+        advice = "use more supports" if held.all() else "hold more directions, as with --support-type pinned"
+        raise InputError(f"a mechanism: the supports let the whole structure move; {advice}")
     sizes, part, verb = (moves, motion[:, :3], "moves along") if moves.max() >= turns.max(initial=0.0) else (
         turns, motion[:, 3:], "turns about"
     )  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import FormatError, InputError
+from ..errors import FormatError, InputError, did_you_mean
 from ..layouts.double_layer import BEND_WAYS, DEPTH_WAYS
 from ..layouts.layer_parts import SECOND_LAYERS
 from .checks import MemberChecks
@@ -112,9 +112,9 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
         elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
             given[name] = str(value)
         else:
-            raise InputError(
-                f"{path} has {name!r} = {value!r}; known are {' '.join(sorted(known | check_names | {'combinations'}))}"
-            )
+            names = sorted(known | check_names | {"combinations"})
+            guess = "" if name in names else did_you_mean(name, names)
+            raise InputError(f"{path} has {name!r} = {value!r}{guess}; known are {' '.join(names)}")
     return StructureSettings(**given, checks=MemberChecks(**checks))
 
 

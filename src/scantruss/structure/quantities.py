@@ -11,7 +11,7 @@ FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6}  #: [N]
 LENGTH = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
 PRESSURE = {f"{name}/m2": value for name, value in FORCE.items()} | {"Pa": 1.0, "kPa": 1e3}  #: [N/m2]
 FORCE_PER_LENGTH = {f"{name}/m": value for name, value in FORCE.items()} | {"N/mm": 1e3, "kN/mm": 1e6}  #: [N/m]
-TEMPERATURE = {"K": 1.0, "C": 1.0}  #: of a change [K]
+TEMPERATURE = {"C": 1.0, "K": 1.0}  #: of a change [K]
 
 
 def quantity(text: object, units: dict[str, float], what: str, *, plain: bool = False) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import words_of_number
 from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
 from .doubts import doubts_of
 from .groups import member_groups_of
@@ -19,6 +20,8 @@ from .path_report import path_figures, path_warnings, path_words
 from .sizing import SizingRound
 from .statics import CaseResult, Solution
 from .truss import Truss
+
+MOST_UTILIZATION = 1000  #: that is written as a number
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,12 @@ class StructureReport:
     )
     path: Path | None = None  #: where it was asked for
     layers: LayerChecks | None = None  #: of a double layer
+
+    def __repr__(self) -> str:
+        """Say how much is used and moved, and how many warnings there are."""
+        used = "not checked" if self.utilization is None else f"utilization {self.utilization.max():.3g}"
+        moved = max(case.displacement_max for case in self.cases)
+        return f"StructureReport({self.truss!r}, {used}, moves {1e3 * moved:.3g} mm, {len(self.warnings)} warnings)"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; SI units."""
@@ -164,8 +173,10 @@ def report_structure(
         said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
     elif (over := int((worst > 1).sum())) > 0:
         most = int(worst.argmax())
-        words = f"{truss.member_marks[most]} {worst[most]:.2f} by {governing[most]}"
-        said.append(f"{over:,} of {len(worst):,} members are used beyond 1, the most {words}")
+        words = f"{truss.member_marks[most]} {use_words(worst[most])} by {governing[most]}"
+        said.append(
+            f"{over:,} of {len(worst):,} members {'is' if over == 1 else 'are'} used beyond 1, the most {words}"
+        )
     said += _limits(truss, figures, checks)
     if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
         less = f"the structure buckles at {least:.3g} times {buckling.of}"
@@ -240,15 +251,30 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     return [
         (
             case.name,
-            f"{case.applied[2] / 1e3:.4g}",
-            f"{case.reactions[2] / 1e3:.4g}",
-            f"{1e3 * case.displacement_max:.3g}",
-            f"{case.force_min / 1e3:.4g}",
-            f"{case.force_max / 1e3:.4g}",
-            "-" if case.utilization_max is None else f"{case.utilization_max:.2f}",
+            words_of_number(case.applied[2] / 1e3, 4),
+            words_of_number(case.reactions[2] / 1e3, 4),
+            words_of_number(1e3 * case.displacement_max, 3),
+            words_of_number(case.force_min / 1e3, 4),
+            words_of_number(case.force_max / 1e3, 4),
+            use_words(case.utilization_max),
         )
         for case in cases + chosen
     ]
+
+
+def unlisted_lines(report: StructureReport) -> list[str]:
+    """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
+    more = len(report.cases) - len(structure_lines(report))
+    return [f"and {more:,} more combination{'s' * (more > 1)}, which use the members or move the nodes less"] * (
+        more > 0
+    )
+
+
+def use_words(utilization: float | None) -> str:
+    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
+    if utilization is None:
+        return "-"
+    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"
 
 
 def mode_lines(report: StructureReport) -> list[str]:

@@ -53,6 +53,17 @@ def candidates(truss: Truss) -> list[Section]:
     return chain
 
 
+def _why_not_larger(truss: Truss, last: Section) -> str:
+    """Say why larger sections of the catalogue are not taken; "" where there are none."""
+    larger = [s for s in bundled_sections() if _kind(s) == _kind(last) and s.plastic_y > last.plastic_y]
+    slender = [s.name for s in larger if section_class(s, truss.material) == 4]
+    if not slender:
+        return ""
+    return (
+        f" ({slender[0]}{' and others' if len(slender) > 1 else ''} of class 4 in {truss.material.name} are left out)"
+    )
+
+
 def _kind(section: Section) -> tuple[str, str, str]:
     """Return what stays when a section is replaced."""
     return section.shape, section.finish, section.name.rstrip("0123456789.") if section.shape == "I" else ""
@@ -118,7 +129,8 @@ def size_members(
         if needed.max() == len(chain):
             mark = truss.member_marks[int(needed.argmax())]
             raise InputError(
-                f"no section up to {chain[-1].name} is enough at {mark}; use more supports or shorter members"
+                f"no section up to {chain[-1].name} is enough at {mark}{_why_not_larger(truss, chain[-1])};"
+                " use more supports or shorter members"
             )
         chosen = np.maximum(chosen, needed)
     raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")

@@ -45,6 +45,12 @@ class CaseResult:
     line: np.ndarray  #: (M, 3) loads along the members, in local axes [N/m]
     nodal: np.ndarray  #: (V, 6) loads on the nodes
 
+    def __repr__(self) -> str:
+        """Say what it is of, and the greatest displacement and forces."""
+        low, high = self.axial.min() / 1e3, self.axial.max() / 1e3
+        moved = f"moves {1e3 * self.displacement_max:.3g} mm"
+        return f"CaseResult({self.name!r}, {moved}, axial forces {low:.4g} to {high:.4g} kN)"
+
     @property
     def applied(self) -> np.ndarray:
         """(3,) sum of all loads [N]."""
@@ -135,6 +141,10 @@ class Solution:
 
     truss: Truss
     cases: tuple[CaseResult, ...]
+
+    def __repr__(self) -> str:
+        """Name the structure and its load cases."""
+        return f"Solution({self.truss!r}: {', '.join(case.name for case in self.cases)})"
 
     def __getitem__(self, name: str) -> CaseResult:
         """Return the result of a load case or combination by name."""

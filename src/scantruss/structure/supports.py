@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..kernels.geometry.components import component_labels
 from .quantities import FORCE_PER_LENGTH, LENGTH, quantity
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .truss import Truss
 
 SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
-SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME"
+SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME, loop:N"
+SUPPORT_WORDS = ("corners", "boundary", "fixed")  #: of these, those without a value
 HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
 
 
@@ -99,7 +100,8 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
     if word.startswith("line:"):
         raise InputError(f"no supports: the grid has no lines, so no {word}")
     raise InputError(
-        f"no supports {word!r}; name some with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
+        f"no supports {word!r}{did_you_mean(word, (*SUPPORT_WORDS, *truss.node_sets))}; name some with --supports:"
+        f" {SUPPORT_WAYS}, a node such as N001 or a file of positions"
     )
 
 

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from ..errors import InputError
+from ..errors import InputError, how_to_install
 
 if TYPE_CHECKING:
     from .browsers import Browsers
@@ -33,9 +33,7 @@ def check_viser() -> None:
         It is not installed; the message has the command that installs it.
     """
     if find_spec("viser") is None:
-        raise InputError(
-            'the studio needs viser, which is not installed; install it with: python -m pip install "scantruss[studio]"'
-        )
+        raise InputError(f"the studio needs viser, which is not installed; install it with: {how_to_install('studio')}")
 
 
 class Guard:

@@ -103,9 +103,10 @@ class SurfaceSamples:
 
     @property
     def left_out(self) -> tuple[int, float]:
-        """Number of pieces without a grid, and their share of the samples, which is about that of the area."""
+        """Number of pieces without a grid but the floor, and their share of the samples, which is about that of the area."""
         samples = np.bincount(self.piece)
-        small = np.delete(samples, self.pieces)
+        floor = () if self.floor is None else (self.floor,)
+        small = np.delete(samples, [*self.pieces, *floor])
         return len(small), float(small.sum() / samples.sum())
 
     @cached_property

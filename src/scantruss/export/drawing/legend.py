@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import Place
+from ...errors import Place, words_of_number
 from ...grid.grid import Grid
 from .camera import Camera
 from .strokes import INK
@@ -105,7 +105,7 @@ def marks_of(grid: Grid) -> list[Mark]:
     warned = {mark.where for mark in marks}
     unit = f" {grid.unit}" if grid.unit else ""
     marks += [
-        Mark(f"{part.words}, {part.size:.3g}{unit} across", part.where, INK)
+        Mark(f"{part.words}, {words_of_number(part.size or 0.0, 3)}{unit} across", part.where, INK)
         for part in found.left_out
         if part.kind in ("hole", "gap") and part.where is not None and part.where not in warned
     ]
@@ -115,7 +115,9 @@ def marks_of(grid: Grid) -> list[Mark]:
         ("smallest angle", found.smallest_angle, " degrees"),
     )
     return marks or [
-        Mark(f"{name}, {figure.value:.3g}{words}", figure.where, INK) for name, figure, words in worst if figure
+        Mark(f"{name}, {words_of_number(figure.value, 3)}{words}", figure.where, INK)
+        for name, figure, words in worst
+        if figure
     ]
 
 

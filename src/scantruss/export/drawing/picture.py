@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ...errors import words_of_number
 from ...grid.grid import Grid
 from ...runtime.files import check_place, write_files
 from ...runtime.ours import MARK
@@ -148,7 +149,7 @@ def caption_of(grid: Grid) -> str:
     quality = grid.quality
     return (
         f"{len(grid.nodes)} nodes   {len(grid.edges)} members   {len(grid.panel_table)} {grid.panels_are}      "
-        f"member length {quality.length_mean:.4g} ± {quality.length_std:.2g} {grid.unit}".rstrip()
+        f"member length {words_of_number(quality.length_mean, 4)} ± {quality.length_std:.2g} {grid.unit}".rstrip()
         + f"      shape quality {quality.shape_mean:.3f} ± {quality.shape_std:.3f}"
     )
 

@@ -14,7 +14,7 @@ from ...structure.checks import CLAUSES, MemberChecks, span_of
 from ...structure.modes import Modes
 from ...structure.options import StructureSettings, settings_text
 from ...structure.path_report import path_words
-from ...structure.report import STRUCTURE_HEAD, CaseFigures, StructureReport, structure_lines
+from ...structure.report import STRUCTURE_HEAD, CaseFigures, StructureReport, structure_lines, use_words
 from ...structure.statics import CaseResult, Solution
 from ...structure.truss import Truss
 from .charts import draw_nonlinear_path, draw_rounds, draw_weights
@@ -47,20 +47,20 @@ class ReportSource:
 
 def report_parts(source: ReportSource) -> list[ReportPart]:
     """Return all parts of the report of a structure."""
-    return [*_first_page(source), *_pictures(source), *_tables(source)]
+    return [*_first_page(source), *_pictures(source), *_tables(source), *_repeated(source)]
 
 
 def overview_picture(solution: Solution, report: StructureReport) -> MemberPicture:
     """Return the picture that stands for a structure: its utilization, or its axial forces where no member is checked."""
     if report.utilization is not None:
         most = float(report.utilization.max())
-        return MemberPicture(f"utilization, {most:.2f} at most", "utilization", report.utilization, USED)
+        return MemberPicture(f"utilization, {use_words(most)} at most", "utilization", report.utilization, USED)
     result = _most_pressed(solution)
     return MemberPicture(f"axial forces under {result.name}", "axial force [kN]", _axial(result) / 1e3, FORCES)
 
 
 def _first_page(source: ReportSource) -> Iterator[ReportPart]:
-    """Yield what was found, warnings, assumptions, clauses, and settings that repeat it."""
+    """Yield what was found, warnings, assumptions and clauses."""
     report, truss, settings = source.report, source.solution.truss, source.settings
     values = report.to_dict()
     service = max(_states(report, "SLS"), key=lambda case: case.displacement_max)
@@ -71,8 +71,12 @@ def _first_page(source: ReportSource) -> Iterator[ReportPart]:
     span = span_of(truss)
     used, moves = values["utilization_max"], service.displacement_max
     rows = [
-        ("greatest utilization", "-" if used is None else f"{used:.2f}", _governing(report)),
-        ("greatest displacement", f"{1e3 * moves:.3g} mm", f"span/{span / max(moves, 1e-12):.0f}, {service.name}"),
+        ("greatest utilization", use_words(used), _governing(report)),
+        (
+            "greatest displacement",
+            f"{1e3 * moves:.3g} mm",
+            f"span/{span / max(moves, 1e-12):.0f} of the span {span:.3g} m, {service.name}",
+        ),
         ("axial forces", f"{_range_of_forces(values)} kN", "all cases and combinations"),
     ]
     if report.buckling is not None and len(report.buckling.values):
@@ -96,9 +100,13 @@ def _first_page(source: ReportSource) -> Iterator[ReportPart]:
         pairs = zip(used_clauses[:half], [*used_clauses[half:], ("", "")][:half], strict=True)
         head = ("clause", "what for", "clause", "what for")
         yield DataTable(head, tuple((*left, *right) for left, right in pairs), words=(0, 1, 2, 3))
+
+
+def _repeated(source: ReportSource) -> Iterator[ReportPart]:
+    """Yield the command and the settings that make it again."""
     yield SectionHead("To make it again")
     yield Sentence(f"{'The command, and the' if source.command else 'The'} file structure.toml with all settings:")
-    yield Listing(f"{source.command}\n\n# structure.toml\n{settings_text(settings)}".lstrip())
+    yield Listing(f"{source.command}\n\n# structure.toml\n{settings_text(source.settings)}".lstrip())
 
 
 def _range_of_forces(values: dict[str, Any]) -> str:
@@ -125,7 +133,7 @@ def _assumptions(truss: Truss, settings: StructureSettings) -> Iterator[str]:
     yield f"Linear elastic analysis of small displacements; straight members between nodes, {joints}.{more}"
     yield f"Scale {settings.scale:g} of the structure to the grid; lengths in m, forces in N, masses in kg; z is up."
     of = truss.material
-    strength = "f,y" if of.kind == "steel" else "characteristic strength"
+    strength = "yield strength" if of.kind == "steel" else "characteristic strength"
     yield (
         f"{of.name}: E {of.young / 1e9:g} GPa, G {of.shear / 1e9:g} GPa, {strength} {of.yield_strength / 1e6:g} MPa,"
         f" {of.density:g} kg/m3 ({of.source or 'own'})."
@@ -181,7 +189,7 @@ def _pictures(source: ReportSource) -> Iterator[ReportPart]:
             0.42,
         )
         rows = [
-            (str(number), f"{each.mass:,.0f}", str(each.sections), f"{each.utilization:.2f}",
+            (str(number), f"{each.mass:,.0f}", str(each.sections), use_words(each.utilization),
              "-" if each.buckling is None else f"{each.buckling:.3g}")
             for number, each in enumerate(report.rounds, 1)
         ]  # fmt: skip
@@ -230,7 +238,7 @@ def _tables(source: ReportSource) -> Iterator[ReportPart]:
     yield _sections(truss, report)
     rows = [
         (name, f"{each['members']:,}", f"{each['mass']:,.0f}", " ".join(each["sections"]),
-         "-" if each["utilization_max"] is None else f"{each['utilization_max']:.2f}")
+         use_words(each["utilization_max"]))
         for name, each in report.to_dict()["groups"].items()
     ]  # fmt: skip
     yield DataTable(("group", "members", "mass [kg]", "sections", "utilization"), tuple(rows), words=(0, 3))
@@ -285,7 +293,7 @@ def _sections(truss: Truss, report: StructureReport) -> DataTable:
     rows = []
     for number, section in enumerate(truss.sections):
         mine = truss.section_of == number
-        used = "-" if report.utilization is None or not mine.any() else f"{report.utilization[mine].max():.2f}"
+        used = "-" if report.utilization is None or not mine.any() else use_words(report.utilization[mine].max())
         rows.append(
             (section.name, truss.material.name, f"{mine.sum():,}", f"{truss.lengths[mine].sum():,.1f}",
              f"{section.area * truss.material.density:.2f}", f"{truss.member_mass[mine].sum():,.0f}", used)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ...errors import FormatError
+from ...errors import FormatError, how_to_install
 
 
 def need_library(what: str, library: str, extra: str) -> None:
@@ -16,6 +16,4 @@ def need_library(what: str, library: str, extra: str) -> None:
         It is missing; the message has the command that installs it.
     """
     if library and find_spec(library) is None:
-        raise FormatError(
-            f'{what} needs {library}, which is not installed; install it with: python -m pip install "scantruss[{extra}]"'
-        )
+        raise FormatError(f"{what} needs {library}, which is not installed; install it with: {how_to_install(extra)}")
