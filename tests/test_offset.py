@@ -163,7 +163,7 @@ def test_more_smoothing_cuts_off_no_more_than_chance_did(
     curve = resample(circle(4000, wave=wave, waves=waves), CURVE_STEP)
     rng = SamplingBias(module.MEAN_BEYOND * density ** (-2 / 3) * 0.2 ** (-1 / 3), density)
     more = bent(curve, rng, plane)
-    monkeypatch.setattr(module, "WIDER_WINDOWS", (module.WINDOW,))
+    monkeypatch.setattr(module, "WIDER_WINDOWS", (module.SMOOTHING_WINDOW,))
     usual = bent(curve, rng, plane)
     moved = np.linalg.norm(more, axis=1) - np.linalg.norm(usual, axis=1)
     assert -1.3 * module.WINDOW_SHIFT * rng.beyond <= moved.min()
@@ -177,7 +177,7 @@ def test_what_chance_explains_is_smoothed_more(plane: Surface, monkeypatch: pyte
     curve = resample(circle(4000), CURVE_STEP)
     curve *= 1.0 + 0.002 * np.random.default_rng(0).normal(size=(len(curve), 1))
     more = bent(curve, SamplingBias(0.02, 115.0), plane)
-    monkeypatch.setattr(module, "WIDER_WINDOWS", (module.WINDOW,))
+    monkeypatch.setattr(module, "WIDER_WINDOWS", (module.SMOOTHING_WINDOW,))
     usual = bent(curve, SamplingBias(0.02, 115.0), plane)
     assert np.linalg.norm(more, axis=1).std() < 0.6 * np.linalg.norm(usual, axis=1).std()
 

@@ -324,10 +324,11 @@ def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough() -> None:
     shape = make("great_court", 100_000)
     length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
     samples = samples_of(shape.points, length)
-    thick = (samples.thickness > module.ROUGH * length).mean()
+    thick = (samples.thickness > module.ROUGH_SAMPLE * length).mean()
     assert module.SOME_ROUGH < thick < module.MANY_ROUGH
     assert (
-        shape.distance(samples.surface.mean + PointCloud.from_array(shape.points).origin).max() < module.ROUGH * length
+        shape.distance(samples.surface.mean + PointCloud.from_array(shape.points).origin).max()
+        < module.ROUGH_SAMPLE * length
     )
 
 

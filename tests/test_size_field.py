@@ -24,7 +24,7 @@ from scantruss.kernels.mesh.trial import total_energy
 from scantruss.kernels.surface import size_field as kernels
 from scantruss.kernels.surface.local_surface import Surface
 from scantruss.settings import Settings
-from scantruss.surface.size_field import RATIO, measured_bends
+from scantruss.surface.size_field import LARGEST_RATIO, measured_bends
 
 
 def tube(radius: float, height: float, spacing: float) -> np.ndarray:
@@ -114,7 +114,7 @@ def test_a_step_is_graded_to_both_sides_by_the_ratio() -> None:
     order = np.argsort(x)
     for place in np.arange(0.0, 8.0, 0.5):  # a member further on the length may have grown by the ratio
         here = np.interp(place, x[order], lengths[order])
-        assert np.interp(place + here, x[order], lengths[order]) < RATIO * here
+        assert np.interp(place + here, x[order], lengths[order]) < LARGEST_RATIO * here
 
 
 # ---- lengths given at places ---------------------------------------------------------------------------------------
@@ -290,7 +290,7 @@ def test_members_have_the_lengths_that_are_desired_there(method: str, shape: str
     assert abs(stretch.mean() - 1.0) < (0.015 if method == "default" else 0.08)
     assert grid.quality.shape_mean > (0.98 if method == "default" else 0.97)
     assert grid.quality.stretch_cv == pytest.approx(stretch.std() / stretch.mean())
-    assert steepest(grid) < RATIO
+    assert steepest(grid) < LARGEST_RATIO
     wished = across(points, 0.8, 2.0)
     far_in = np.abs(grid.nodes[:, 0]) < 4.0  # a blend flattens towards the ends
     given_there = np.array([wished(place) for place in grid.nodes + grid.origin])

@@ -28,9 +28,9 @@ def test_a_stage_may_take_a_multiple_of_its_expected_steps() -> None:
 @pytest.mark.parametrize(
     ("module", "multiple", "words"),
     [
-        (rolling_disc, "ROLLED", "the boundary cannot be followed"),
-        (fold_tracing, "TRACED", "the ridges of the scan cannot be followed"),
-        (advance, "MADE", "the front runs over itself"),
+        (rolling_disc, "MOST_TOUCHES", "the boundary cannot be followed"),
+        (fold_tracing, "MOST_TRACED", "the ridges of the scan cannot be followed"),
+        (advance, "MOST_TRIANGLES_MADE", "the front runs over itself"),
     ],
 )
 def test_each_stage_is_watched(monkeypatch: pytest.MonkeyPatch, module: object, multiple: str, words: str) -> None:

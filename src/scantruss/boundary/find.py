@@ -28,7 +28,7 @@ from .touched_points import boundary_points
 from .tube_ends import end_of_tube
 
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
-SPIKES = (0.6, 0.3, 0.16)
+SPIKE_LENGTHS = (0.6, 0.3, 0.16)
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
@@ -203,7 +203,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
         if kernels.open_share(surface, samples.boxes, points, loop[0], radius) < LEAST_OPEN_SHARE:
             continue
         curve = resample(points, CURVE_STEP * length)
-        for width in SPIKES:
+        for width in SPIKE_LENGTHS:
             curve = cut_spikes(surface, curve, width * length, CURVE_STEP * length)
         if len(curve) >= 8:
             paper = settings.method == "paper"

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 OUTSIDE_BOUNDARY = "outside of the boundary that was given"
-BRIDGED = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
+BRIDGED_DISTANCE = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
 SHORTEST_BOUNDARY = 3.0  # shortest boundary [member lengths]
 CORNERS_APART = 0.5  # of two corners nearer along the boundary the sharper one is a node [member lengths]
 # a boundary of the scan that comes no farther than this from that given is the same [member lengths]
@@ -148,11 +148,11 @@ def _curve(
         )
     points, vertices = divide_polyline(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
     _, gaps = feet_on_scan(points, narrow_surface(samples, POINTS_UNDER_LINE))
-    if (worst := float(gaps.max())) > BRIDGED * length:
+    if (worst := float(gaps.max())) > BRIDGED_DISTANCE * length:
         place = words_of_place(points[int(gaps.argmax())] + samples.origin)
         raise LengthError(
             f"boundary {number} leaves the scan by up to {words_of_number(worst, 4)}{unit}, near ({place});"
-            f" it must stay within half a member, {words_of_number(BRIDGED * length, 4)}{unit}, which the grid bridges"
+            f" it must stay within half a member, {words_of_number(BRIDGED_DISTANCE * length, 4)}{unit}, which the grid bridges"
         )
     return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)
 

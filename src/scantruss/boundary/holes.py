@@ -16,7 +16,7 @@ RAY_LEAVES_SCAN = 0.6  # distance from the nearest sample at which a ray has lef
 # cosine of the angle between the surroundings and the plane of the hole below which that plane is not used
 LEAST_PLANE_COSINE = 0.35
 FEWEST_PLACES_FOR_PLATE = 12  # fewest places around a hole through which a plate is fitted
-SMOOTHING = 1e-6  # smoothing of the plate [squared diameters of the hole]
+PLATE_SMOOTHING = 1e-6  # smoothing of the plate [squared diameters of the hole]
 
 
 def fill_holes(samples: SurfaceSamples, curves: list[np.ndarray]) -> np.ndarray:
@@ -56,7 +56,7 @@ def _fill_hole(surface: Surface, curve: np.ndarray) -> np.ndarray:
         flat = hole_boundary[start] * (1 + away / radius)[:, None]
         fine = 0.7
     inside = _lattice(hole_boundary, FILLING_SPACING * fine * length)
-    return _thin_plate(flat, places, inside, SMOOTHING * (around / np.pi) ** 2)
+    return _thin_plate(flat, places, inside, PLATE_SMOOTHING * (around / np.pi) ** 2)
 
 
 def _look_around(

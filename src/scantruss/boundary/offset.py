@@ -12,7 +12,7 @@ from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, room_across, runs_around, smooth_between
 
-WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
+SMOOTHING_WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
 # half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
 WIDER_WINDOWS = (1.0, 2.0, 3.0)
 CURVE_PARTS = 6  # a window is never wider than the curve over this number
@@ -74,14 +74,16 @@ def offset_curve(
     corner_at : (C,) int64, points of it that are corners
     """
     if bias.beyond == 0.0:
-        (narrow,), corner_at = smooth_between(curve, *find_corners(curve, settings), [round(WINDOW / CURVE_STEP)])
+        (narrow,), corner_at = smooth_between(
+            curve, *find_corners(curve, settings), [round(SMOOTHING_WINDOW / CURVE_STEP)]
+        )
         return narrow, corner_at
     beyond, step = bias.beyond, CURVE_STEP * settings.length
     room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
     curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
     at, places = _corners(curve, bias, settings, surface)
     halves = [
-        round(WINDOW / CURVE_STEP),
+        round(SMOOTHING_WINDOW / CURVE_STEP),
         *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER_WINDOWS),
     ]
     (narrow, *wider), corner_at = smooth_between(curve, at, places, halves)

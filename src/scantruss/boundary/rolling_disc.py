@@ -15,13 +15,13 @@ from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
-INSIDE = 9.0  # stands for no free direction
-ROLLED = 200.0  # times that the disc may touch each sample at the edge, on average
+NO_FREE_DIRECTION = 9.0  # stands for no free direction
+MOST_TOUCHES = 200.0  # times that the disc may touch each sample at the edge, on average
 ROUND_AND_ROUND = (
     "the boundary cannot be followed: the scan is too rough or too sparse; use a longer length, or clean the scan"
 )
-TRIES = 20  # attempts to roll the disc away from one place
-TRAP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
+MOST_TRIES = 20  # attempts to roll the disc away from one place
+SHORTEST_OPEN_LOOP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 
 
 class Rolled(NamedTuple):
@@ -44,10 +44,10 @@ def boundary_loops(
 
     in_parts(len(free), NORMALS_PER_THREAD, look)
     beside = surface.neighbors[on_edge]
-    free[on_edge], free[beside[beside >= 0]] = INSIDE, INSIDE
-    rolling = _RollingDisc(surface, radii, int((free < INSIDE).sum()), origin)
+    free[on_edge], free[beside[beside >= 0]] = NO_FREE_DIRECTION, NO_FREE_DIRECTION
+    rolling = _RollingDisc(surface, radii, int((free < NO_FREE_DIRECTION).sum()), origin)
     loops, short, closed = list[Rolled](), list[Rolled](), np.zeros(len(free), np.bool_)
-    for sample in np.flatnonzero(free < INSIDE).tolist():
+    for sample in np.flatnonzero(free < NO_FREE_DIRECTION).tolist():
         if rolling.following[sample] >= 0:
             continue
         loop = rolling.loop_at(sample, free[sample], radius)
@@ -69,7 +69,7 @@ class _RollingDisc:
 
     def __init__(self, surface: Surface, radii: np.ndarray, free: int, origin: np.ndarray) -> None:
         count = len(surface.mean)
-        self.origin, self.watch = origin, Watch(ROUND_AND_ROUND, free, ROLLED)
+        self.origin, self.watch = origin, Watch(ROUND_AND_ROUND, free, MOST_TOUCHES)
         self.surface, self.radii = surface, radii
         self.mirrored = surface._replace(normals=-surface.normals)
         self.path = np.empty(2_000 + 4 * free, np.int64)
@@ -84,7 +84,7 @@ class _RollingDisc:
         """
         centre = kernels.sample_disc(self.surface, sample, direction, self.radii[sample])
         means = self.surface.mean
-        for _ in range(TRIES):
+        for _ in range(MOST_TRIES):
             ahead = self._roll(self.surface, sample, centre, self.following)
             if self._is_near(ahead, sample, radius):
                 return ahead
@@ -94,7 +94,7 @@ class _RollingDisc:
             back = self._roll(self.mirrored, sample, centre, self.preceding)[::-1]
             if self._is_near(back, sample, radius):
                 return back
-            if len(ahead) == 0 or length_around(means[ahead]) > TRAP * radius:
+            if len(ahead) == 0 or length_around(means[ahead]) > SHORTEST_OPEN_LOOP * radius:
                 return ahead
             self.banned[ahead[ahead != sample]] = True
         return np.zeros(0, np.int64)

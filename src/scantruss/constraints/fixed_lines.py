@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from .network import Network
 
 LINE_STEP = 0.05  # distance between the points of a line [member lengths]
-ZIGZAG = 0.005  # zigzags of a polyline below this are straightened first [member lengths]
-RETURN = 1.5  # a line that comes back to itself after this length meets itself [member lengths]
+STRAIGHTENED_ZIGZAG = 0.005  # zigzags of a polyline below this are straightened first [member lengths]
+RETURN_LENGTH = 1.5  # a line that comes back to itself after this length meets itself [member lengths]
 SHORTEST_LINE = 0.5  # shortest open line [member lengths]
 SHORTEST_RING = 2.0  # shortest closed line [member lengths]
 
@@ -39,7 +39,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
         closed = bool((given[0] == given[-1]).all())
         _check_length(given, closed, number, samples.unit, settings.length)
         points, vertices = divide_polyline(
-            simplify(given, ZIGZAG * settings.length, closed), closed, LINE_STEP * settings.length
+            simplify(given, STRAIGHTENED_ZIGZAG * settings.length, closed), closed, LINE_STEP * settings.length
         )
         corners = corners_of_polyline(points, vertices, closed, settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
@@ -108,7 +108,7 @@ def _without_returns(
         gap = arc[i] - along
         gap = np.minimum(gap, total - gap) if closed else gap
         back = np.flatnonzero(
-            (gap > RETURN * length) & (((places[:k] - places[k]) ** 2).sum(axis=1) < (0.3 * length) ** 2)
+            (gap > RETURN_LENGTH * length) & (((places[:k] - places[k]) ** 2).sum(axis=1) < (0.3 * length) ** 2)
         )
         if len(back):
             middle = (int(sparse[back[-1]]) + i) // 2

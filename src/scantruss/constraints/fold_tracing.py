@@ -19,30 +19,30 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 # radii around a place within which folds are fitted, in turn until one fits: the second for rounded folds, then for places near corners
-RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
+FOLD_RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
 FEWEST_SPACINGS = 2.6  # least radius, in distances between points
-CLOSER = 2  # number of the first of the radii for places near corners
+FIRST_NEAR_CORNERS = 2  # number of the first of the radii for places near corners
 POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
-FITS = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
-STRIDE = 0.25  # step from place to place along a fold [member lengths]
+FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
+FOLD_STRIDE = 0.25  # step from place to place along a fold [member lengths]
 LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
-LIKELY = 0.35  # share of the ridge angle above which a fold is looked at more closely
-WEAK = 0.6  # share of the ridge angle from which a fold is followed
+LIKELY_FOLD = 0.35  # share of the ridge angle above which a fold is looked at more closely
+WEAK_FOLD = 0.6  # share of the ridge angle from which a fold is followed
 SHARP_SHARE = 1.5  # share of it from which no larger radius is tried
-FADED = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
-BETTER = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
-ROUGHEST = 0.12  # points farther from a fold than this follow neither side [member lengths]
+FADED_FOLD = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
+FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
+ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 MOST_FALSE_FOLDS = 12  # places that look folded and are no ridge, after which the search stops: the scan is rough
-MISSED = 2  # places in a row at which a fold may not be seen and still goes on
-TURNED = 0.94  # least cosine of the turn of a fold from place to place
-RING = 6  # places along the shortest ring
+MISSED_PLACES = 2  # places in a row at which a fold may not be seen and still goes on
+LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
+PLACES_OF_SHORTEST_RING = 6  # places along the shortest ring
 MOST_PLACES_OF_FOLD = 20_000  # most places along a fold
-TRACED = 4.0  # times as many places as ridges can have where they lie side by side
-TANGLED = "the ridges of the scan cannot be followed; use another length, or --ridge-angle 0"
-MEETS = 0.3  # a fold this near to another one has come to it [member lengths]
+MOST_TRACED = 4.0  # times as many places as ridges can have where they lie side by side
+TANGLED_RIDGES = "the ridges of the scan cannot be followed; use another length, or --ridge-angle 0"
+FOLDS_MEET_WITHIN = 0.3  # a fold this near to another one has come to it [member lengths]
 OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
@@ -58,15 +58,17 @@ class Tracer:
         self.surface = samples.surface
         self.length = settings.length
         self.angle = float(np.radians(settings.ridge_angle))
-        self.sharpest = SHARPEST_EDGE if settings.sharp_edges else SHARPEST
-        self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in RADII]
+        self.sharpest = SHARPEST_EDGE if settings.sharp_edges else SHARPEST_FOLD_ANGLE
+        self.radii = [max(radius * settings.length, FEWEST_SPACINGS * samples.spacing) for radius in FOLD_RADII]
         of_sample = samples.area / len(samples.surface.mean)
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
-        self.fits = max(FITS * settings.length, 1.5 * float(np.median(samples.thickness)))
+        self.fits = max(FOLD_FITS_WITHIN * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty((6000, COLUMNS))
         self.origin = samples.origin
-        self.watch = Watch(TANGLED, samples.area / (MEETS * STRIDE * settings.length**2), TRACED)
+        self.watch = Watch(
+            TANGLED_RIDGES, samples.area / (FOLDS_MEET_WITHIN * FOLD_STRIDE * settings.length**2), MOST_TRACED
+        )
 
     def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.ndarray | None:
         """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
@@ -77,11 +79,11 @@ class Tracer:
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
         for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
-            if number < first or (number >= CLOSER and best is not None and self._is_clear(best)):
+            if number < first or (number >= FIRST_NEAR_CORNERS and best is not None and self._is_clear(best)):
                 continue
             surface = self.surface._replace(patch_points=max(most, FEWEST_OF_A_SAMPLE))
             fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, fold)
-            if not fits or fold[GAIN] < BETTER or fold[OFF] > ROUGHEST * self.length:
+            if not fits or fold[GAIN] < FOLD_OVER_SMOOTH or fold[OFF] > ROUGHEST_SIDE * self.length:
                 continue
             if self._is_clear(fold) and fold[BEND] >= SHARP_SHARE * self.angle:
                 return fold
@@ -91,7 +93,7 @@ class Tracer:
 
     def _is_clear(self, fold: np.ndarray) -> bool:
         """Whether a fold fits and is one to follow."""
-        return bool(fold[OFF] <= self.fits and fold[BEND] >= WEAK * self.angle)
+        return bool(fold[OFF] <= self.fits and fold[BEND] >= WEAK_FOLD * self.angle)
 
     def _rank(self, fold: np.ndarray) -> tuple[bool, float]:
         """What is better of two folds: clear ones that bend most, else those that fit best."""
@@ -114,12 +116,12 @@ class Tracer:
                 break
             if (
                 fold is not None
-                and fold[BEND] > WEAK * self.angle
+                and fold[BEND] > WEAK_FOLD * self.angle
                 and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
                 self.watch.note(len(folds), folds[-1, :3] + self.origin)
-                even = [part for part in parts_of(folds) if is_even(part, WEAK * self.angle, self.sharpest)]
+                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds[:, :3]:
@@ -132,9 +134,9 @@ class Tracer:
         for share in PLACES_BETWEEN_CORNERS:
             place = first + share * (last - first)
             fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, len(self.radii) - 1)
-            if fold is None or fold[BEND] < WEAK * self.angle or abs(fold[3:6] @ ahead) < TURNED:
+            if fold is None or fold[BEND] < WEAK_FOLD * self.angle or abs(fold[3:6] @ ahead) < LEAST_TURN_COSINE:
                 return False
-            if np.linalg.norm(fold[:3] - place) > 0.6 * STRIDE * self.length:
+            if np.linalg.norm(fold[:3] - place) > 0.6 * FOLD_STRIDE * self.length:
                 return False
         return True
 
@@ -153,7 +155,7 @@ class Tracer:
         if not len(likely):
             return likely
         note = np.zeros(len(likely), np.int64)
-        least, apart = LIKELY * self.angle, LOOK_SPACING * self.length
+        least, apart = LIKELY_FOLD * self.angle, LOOK_SPACING * self.length
         return likely[: kernels.keep_folded(self.surface, likely, self.radii[0], least, apart, self.buffer, note)]
 
     def _follow(self, sample: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
@@ -161,14 +163,18 @@ class Tracer:
         ahead, ring = self._march(sample, fold, 1.0, fold[:3], others)
         back: list[np.ndarray] = []
         if not ring:
-            back, ring = self._march(sample, fold, -1.0, ahead[-1][:3] if len(ahead) > RING else fold[:3], others)
+            back, ring = self._march(
+                sample, fold, -1.0, ahead[-1][:3] if len(ahead) > PLACES_OF_SHORTEST_RING else fold[:3], others
+            )
         folds = np.array([*back[::-1], fold, *ahead])
         if not ring:
             folds[:, :3] = smoothed(folds[:, :3])
             return folds
         folds = folds[:-1]  # the last place lies beside the first
-        around = np.take(folds[:, :3], np.arange(-RING, len(folds) + RING), axis=0, mode="wrap")
-        folds[:, :3] = smoothed(around)[RING:-RING]
+        around = np.take(
+            folds[:, :3], np.arange(-PLACES_OF_SHORTEST_RING, len(folds) + PLACES_OF_SHORTEST_RING), axis=0, mode="wrap"
+        )
+        folds[:, :3] = smoothed(around)[PLACES_OF_SHORTEST_RING:-PLACES_OF_SHORTEST_RING]
         return np.concatenate([folds, folds[:1]])
 
     def _march(
@@ -179,8 +185,8 @@ class Tracer:
         steps: list[np.ndarray] = []
         known = np.concatenate([np.zeros((0, 3)), *others])
         missed = 0
-        while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED:
-            stride = (1 + missed) * STRIDE * self.length
+        while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED_PLACES:
+            stride = (1 + missed) * FOLD_STRIDE * self.length
             place = at[:3] + stride * ahead
             x, y, z = place.tolist()
             sample = walk(self.surface, sample, (x, y, z))
@@ -193,18 +199,18 @@ class Tracer:
             after[3:6] *= np.sign(after[3:6] @ ahead)
             steps.append(after)
             at, ahead, missed = after, after[3:6], 0
-            if len(steps) > RING and np.linalg.norm(at[:3] - goal) < 0.6 * stride:
+            if len(steps) > PLACES_OF_SHORTEST_RING and np.linalg.norm(at[:3] - goal) < 0.6 * stride:
                 return steps, True
-            if len(known) and ((known - at[:3]) ** 2).sum(axis=1).min() < (MEETS * self.length) ** 2:
+            if len(known) and ((known - at[:3]) ** 2).sum(axis=1).min() < (FOLDS_MEET_WITHIN * self.length) ** 2:
                 break
         return steps, False
 
     def _goes_on(self, fold: np.ndarray, place: np.ndarray, ahead: np.ndarray) -> bool:
         """Whether the fold found where a line of folds should go on belongs to it."""
         return bool(
-            fold[BEND] >= FADED * self.angle
-            and np.linalg.norm(fold[:3] - place) < 0.6 * STRIDE * self.length
-            and abs(fold[3:6] @ ahead) > TURNED
+            fold[BEND] >= FADED_FOLD * self.angle
+            and np.linalg.norm(fold[:3] - place) < 0.6 * FOLD_STRIDE * self.length
+            and abs(fold[3:6] @ ahead) > LEAST_TURN_COSINE
         )
 
     def _above(self, place: np.ndarray) -> np.ndarray:
@@ -233,13 +239,13 @@ class Tracer:
 
 PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
 CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
-LONG = 1.0  # least length of a line of folds [member lengths]
+SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
 LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
-SHARPEST = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+SHARPEST_FOLD_ANGLE = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
 SHARPEST_EDGE = 155.0  # the same where sharp edges of bodies are looked for [degree]
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
-EVEN = (0.5, 3.5)
+EVEN_FOLDS = (0.5, 3.5)
 BLUNT, ACUTE = 50.0, 70.0  # [degree]
 BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
@@ -268,17 +274,17 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     return [*parts, folds[first:]]
 
 
-def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST) -> bool:
+def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
-    if len(folds) * STRIDE < LONG or (angles >= angle).sum() * STRIDE < LEAST_FULL_LENGTH:
+    if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
         return False
     ahead = np.diff(folds[:, :3], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     bends = np.cross(ahead[1:], ahead[:-1])
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
-    most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN)) + BY_NOISE / np.sqrt(max(gain, 1.0))
+    most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
     return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
 
 

@@ -15,9 +15,9 @@ MEETING_DISTANCE = 0.3  # a line this close to the boundary or another line meet
 # the same distance for the end of a line; an end that stands out farther is more than a stub [member lengths]
 AT_END = 0.5
 # a line that stays close for longer than this runs alongside, and that part is left out [member lengths]
-ALONGSIDE = 1.2
+ALONGSIDE_WITHIN = 1.2
 ONE_STOP = 0.5  # corners and meetings closer together than this are one [member lengths]
-FADE = 0.6  # length over which a line is bent towards a meeting [member lengths]
+FADE_LENGTH = 0.6  # length over which a line is bent towards a meeting [member lengths]
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +211,7 @@ class Network:
         for track, (distance, foot) in zip(self.tracks, near, strict=True):
             for begin, end in runs(distance < MEETING_DISTANCE * self.length):
                 whole = end - begin == len(points)
-                if arc[end - 1] - arc[begin] <= ALONGSIDE * self.length and not whole:
+                if arc[end - 1] - arc[begin] <= ALONGSIDE_WITHIN * self.length and not whole:
                     at = begin + int(distance[begin:end].argmin())
                     found.append((float(distance[at]), at, self._stop_on(track, foot[at])))
                     continue
@@ -263,7 +263,7 @@ class Network:
         ends = [self._new_stop(part[k]) if stop < 0 else stop for k, stop in ((0, begin[1]), (-1, end[1]))]
         arc = _arc(part)
         for k, stop in ((0, ends[0]), (-1, ends[1])):
-            share = np.clip(1.0 - np.abs(arc - arc[k]) / (FADE * self.length), 0.0, 1.0)
+            share = np.clip(1.0 - np.abs(arc - arc[k]) / (FADE_LENGTH * self.length), 0.0, 1.0)
             part += share[:, None] * (self.places[stop] - part[k])
         place_of = {int(i): k for k, i in enumerate(at.tolist())}
         self._add_track(part, False, [place_of[i] for i in order if i in place_of], ends, sharp)

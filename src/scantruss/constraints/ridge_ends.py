@@ -6,17 +6,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
+LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
-ROUND = 0.8  # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
-TOUCH = 0.6  # gap below which only one of the ends must point to the other [member lengths]
-BLURRED = 1  # places at an end that are left out, because the third side disturbs them
+RING_COSINE = (
+    0.8  # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
+)
+TOUCHING_GAP = 0.6  # gap below which only one of the ends must point to the other [member lengths]
+BLURRED_PLACES = 1  # places at an end that are left out, because the third side disturbs them
 AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
-STRAIGHT = 0.01  # median distance of the places of a straight line from it, at most [distance of its ends]
+STRAIGHT_WITHIN = 0.01  # median distance of the places of a straight line from it, at most [distance of its ends]
 STRAIGHT_FITS = 4  # of a straight line, those after the first with places off it weighing less
 WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
 REACH_BACK = 0.5  # longest way back to a corner or another ridge, where an end has gone too far [member lengths]
-MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
+LARGEST_MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
 LEAST_FREE_RIDGE = 2.5  # least length of a ridge of which an end is free [member lengths]
 LEAST_RIDGE = 0.6  # least length of any other [member lengths]
 
@@ -65,7 +67,10 @@ def join_ends(traced: list[Ridge], length: float) -> list[Ridge]:
     rings = [ridge.moved(ridge.places[:-1]) for ridge in traced if _is_ring(ridge.places)]
     rings = [replace(ridge, ring=True) for ridge in rings + [each for each in ridges if _closes(each.places, length)]]
     ridges = [ridge for ridge in ridges if not _closes(ridge.places, length)]
-    lines = [line[BLURRED:-BLURRED] if len(line) > 2 * BLURRED + 2 else line for line in (r.places for r in ridges)]
+    lines = [
+        line[BLURRED_PLACES:-BLURRED_PLACES] if len(line) > 2 * BLURRED_PLACES + 2 else line
+        for line in (r.places for r in ridges)
+    ]
     ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
     led = _corners(ends, length)
     for end in ends:
@@ -96,7 +101,11 @@ def _closes(line: np.ndarray, length: float) -> bool:
     gap = two.place - one.place
     size = float(np.linalg.norm(gap))
     whole = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    return whole > 4.0 * size and size < BRIDGE * length and min(gap @ one.ahead, -(gap @ two.ahead)) > ROUND * size
+    return (
+        whole > 4.0 * size
+        and size < LONGEST_BRIDGE * length
+        and min(gap @ one.ahead, -(gap @ two.ahead)) > RING_COSINE * size
+    )
 
 
 def end_of(line: np.ndarray, number: int, at: int) -> End:
@@ -108,7 +117,7 @@ def end_of(line: np.ndarray, number: int, at: int) -> End:
     some = towards[-FAR_AIM:]
     middle, ahead = _straight(some)
     off = np.linalg.norm(np.cross(some - middle, ahead), axis=1)
-    if len(some) > AIM and np.median(off) < STRAIGHT * np.linalg.norm(some[-1] - some[0]):
+    if len(some) > AIM and np.median(off) < STRAIGHT_WITHIN * np.linalg.norm(some[-1] - some[0]):
         return End(number, at, middle + ((towards[-1] - middle) @ ahead) * ahead, ahead)
     return End(number, at, towards[-1], _direction(towards, AIM))
 
@@ -146,14 +155,14 @@ def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:
 
 def _facing(lines: list[np.ndarray], length: float) -> tuple[End, End] | None:
     """Two ends that face each other over the smallest gap."""
-    best, pair = BRIDGE * length, None
+    best, pair = LONGEST_BRIDGE * length, None
     ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
     for k, one in enumerate(ends):
         for two in ends[k + 1 :]:
             gap = two.place - one.place
             size = float(np.linalg.norm(gap))
             straight = min(gap @ one.ahead, -(gap @ two.ahead)) > COSINE_TO_OTHER_END * size or (
-                size < TOUCH * length and two.ahead @ one.ahead < -COSINE_TO_OTHER_END
+                size < TOUCHING_GAP * length and two.ahead @ one.ahead < -COSINE_TO_OTHER_END
             )
             if one.line != two.line and size < best and straight:
                 best, pair = size, (one, two)
@@ -189,7 +198,7 @@ def _cost(one: End, two: End, length: float) -> float | None:
     place = meeting([one, two])
     ways = [float((place - end.place) @ end.ahead) for end in (one, two)]
     miss = max(float(np.linalg.norm(np.cross(place - end.place, end.ahead))) for end in (one, two))
-    if min(ways) < -REACH_BACK * length or max(ways) > WAY_TO_CORNER * length or miss > MISS * length:
+    if min(ways) < -REACH_BACK * length or max(ways) > WAY_TO_CORNER * length or miss > LARGEST_MISS * length:
         return None
     return max(abs(way) for way in ways) + miss
 
@@ -203,7 +212,7 @@ def _meet(numbers: list[int], ends: list[End], length: float) -> bool:
     for end in some:
         way = float((place - end.place) @ end.ahead)
         miss = float(np.linalg.norm(np.cross(place - end.place, end.ahead)))
-        if not -REACH_BACK * length <= way <= WAY_TO_CORNER * length or miss > MISS * length:
+        if not -REACH_BACK * length <= way <= WAY_TO_CORNER * length or miss > LARGEST_MISS * length:
             return False
     return True
 
@@ -226,7 +235,7 @@ def _foot(end: End, others: list[np.ndarray], corners: list[np.ndarray], length:
         away = places - end.place
         way = away @ end.ahead
         miss = np.linalg.norm(away - way[:, None] * end.ahead, axis=1)
-        fits = (way >= -REACH_BACK * length) & (way <= WAY_TO_CORNER * length) & (miss <= MISS * length)
+        fits = (way >= -REACH_BACK * length) & (way <= WAY_TO_CORNER * length) & (miss <= LARGEST_MISS * length)
         if fits.any():
             cost = bonus * np.where(fits, np.abs(way) + 2.0 * miss, np.inf)
             if cost.min() < best:

@@ -11,7 +11,7 @@ import numpy as np
 from ..boundary.polylines import divide_polyline
 from ..kernels.surface.ridges import BEND
 from .fixed_lines import LINE_STEP
-from .fold_tracing import LEAST_FULL_LENGTH, STRIDE, Tracer
+from .fold_tracing import FOLD_STRIDE, LEAST_FULL_LENGTH, Tracer
 from .network import Network, runs
 from .ridge_ends import Ridge, join_ends
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 END_BESIDE_RIDGE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
-NEARLY = 0.9  # share of the ridge angle that counts as full: noise takes some away
-SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
+NEARLY_FULL_ANGLE = 0.9  # share of the ridge angle that counts as full: noise takes some away
+LEAST_FULL_SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
 LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
 FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
-SHORT = 1.8  # longest ridge that is looked for between two corners [member lengths]
+LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two corners [member lengths]
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
 
@@ -100,17 +100,17 @@ def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
             ends.append(place)
     found: list[Ridge] = []
     for first, last in combinations(ends, 2):
-        if SHORTEST_RIDGE * length < np.linalg.norm(last - first) <= SHORT * length:
+        if SHORTEST_RIDGE * length < np.linalg.norm(last - first) <= LONGEST_BETWEEN_CORNERS * length:
             middle = 0.5 * (first + last)[None]
             taken = any(ridge.distance(middle[0]) < END_BESIDE_RIDGE * length for ridge in ridges + found)
             if not taken and tracer.is_folded_between(first, last):
-                steps = max(int(np.linalg.norm(last - first) / (STRIDE * length)), 1) + 1
+                steps = max(int(np.linalg.norm(last - first) / (FOLD_STRIDE * length)), 1) + 1
                 found.append(Ridge(np.linspace(first, last, steps), True))
     return found
 
 
 def _is_sharp(folds: np.ndarray, angle: float) -> bool:
     """Whether a line of folds (K, FOUND) has the full angle along enough of it."""
-    full = folds[:, BEND] >= NEARLY * angle
-    size = float(full.sum()) * STRIDE
-    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= SHARE))
+    full = folds[:, BEND] >= NEARLY_FULL_ANGLE * angle
+    size = float(full.sum()) * FOLD_STRIDE
+    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))

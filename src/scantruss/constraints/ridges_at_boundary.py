@@ -14,14 +14,16 @@ if TYPE_CHECKING:
     from .ridge_ends import Ridge
 
 BOUNDARY_REACH = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
-TUBE = 0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
+TUBE_RADIUS = (
+    0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
+)
 PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge is taken
 # places at the end of a ridge from which its direction is told, and the last of them that are left out
 STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3
 # distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
 CORNER_KEPT_WITHIN = 0.1
 DENSITY_REACH = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
-FORWARD = 2.0  # how far the scan may go on along it [member lengths]
+LOOK_FORWARD = 2.0  # how far the scan may go on along it [member lengths]
 GAP_AT_END = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
 FEWEST_ALONG = 8  # fewest points from which that is told
 BENDING_LENGTH = 1.0  # length over which the boundary is bent to the end of a ridge [member lengths]
@@ -61,13 +63,13 @@ def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.nda
         return None
     ahead /= size
     surface = samples.surface
-    near = np.flatnonzero(np.linalg.norm(surface.mean - line[-1], axis=1) < (FORWARD + 1.0) * length)
+    near = np.flatnonzero(np.linalg.norm(surface.mean - line[-1], axis=1) < (LOOK_FORWARD + 1.0) * length)
     parts = [surface.points[surface.start[s] : surface.start[s + 1]] for s in near.tolist()]
     away = np.concatenate([np.zeros((0, 3)), *parts]) - from_there
     way = away @ ahead
     across = np.linalg.norm(away - way[:, None] * ahead, axis=1)
-    radius = max(TUBE * length, 2.0 * samples.spacing)
-    way = np.sort(way[(across < radius) & (way > -DENSITY_REACH * length) & (way < FORWARD * length)])
+    radius = max(TUBE_RADIUS * length, 2.0 * samples.spacing)
+    way = np.sort(way[(across < radius) & (way > -DENSITY_REACH * length) & (way < LOOK_FORWARD * length)])
     if len(way) < FEWEST_ALONG:
         return None
     usual = float(np.median(np.diff(way)))

@@ -44,14 +44,19 @@ from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
-STRICTNESS = (1.0, 0.6, 0.3, 0.0)  # strictness of each round: what found no room waits for the next, more tolerant one
+STRICTNESS_OF_ROUNDS = (
+    1.0,
+    0.6,
+    0.3,
+    0.0,
+)  # strictness of each round: what found no room waits for the next, more tolerant one
 LARGEST_GAP = 60  # most segments of a gap that is filled; larger gaps stay open
 FRONT_CLEARANCE = 0.6  # least distance of a candidate node from the initial front [member lengths]
 FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial front [member lengths]
 SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 NODE_BOX = 2.4
-MADE = 4.0  # times as many triangles as the scan has room for that a front may make
+MOST_TRIANGLES_MADE = 4.0  # times as many triangles as the scan has room for that a front may make
 RUNS_OVER_ITSELF = "the front runs over itself: the scan is too rough or too sparse for this length"
 SEGMENTS_PER_REPORT = 500  # segments advanced between two reports of progress
 
@@ -95,11 +100,11 @@ def advance_front(
         quadrangle=settings.case3 == "quadrangle",
         strict=1.0,
     )
-    for strict in STRICTNESS:
+    for strict in STRICTNESS_OF_ROUNDS:
         count = int(front.count[lists.SEGMENTS])
         for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
             lists.enqueue(front, s)
-        by_cases = settings.method == "paper" and strict == STRICTNESS[0]
+        by_cases = settings.method == "paper" and strict == STRICTNESS_OF_ROUNDS[0]
         front = run(
             front,
             samples,
@@ -315,7 +320,7 @@ def run(
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
     expected = samples.graded_area / (0.433 * rules.desired**2)
-    watch, made = Watch(RUNS_OVER_ITSELF, expected, MADE), int(front.count[lists.TRIANGLES])
+    watch, made = Watch(RUNS_OVER_ITSELF, expected, MOST_TRIANGLES_MADE), int(front.count[lists.TRIANGLES])
     watch.note(made, samples.origin)
     while True:  # each slice makes triangles, or the queue becomes shorter
         status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT)

@@ -41,12 +41,12 @@ class FieldStart:
     laid: bool = True  #: False: no lattice, the front makes all of its nodes itself
 
 
-STARTS = {  # lattice directions of the fronts, by effort
+STARTS_OF_EFFORTS = {  # lattice directions of the fronts, by effort
     "quick": (FieldStart(),),
     "normal": tuple(FieldStart(10.0 * turn) for turn in range(6)),
     "best": tuple(FieldStart(5.0 * turn, scale) for scale in (1.0, 1.02) for turn in range(12)),
 }
-SCALES = {  # lengths of the fronts instead, where the desired length varies over the scan and no lattice fits
+SCALES_OF_EFFORTS = {  # lengths of the fronts instead, where the desired length varies over the scan and no lattice fits
     "quick": (1.0,),
     "normal": (1.0, 0.97, 1.03),
     "best": (1.0, 0.97, 1.03, 0.94, 1.06, 0.985, 1.015, 0.955, 1.045),
@@ -80,9 +80,9 @@ def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStar
     if settings.method == "paper":
         return (FieldStart(laid=False),)
     if samples.graded:
-        return tuple(FieldStart(scale=scale, laid=False) for scale in SCALES[settings.effort])
+        return tuple(FieldStart(scale=scale, laid=False) for scale in SCALES_OF_EFFORTS[settings.effort])
     large = samples.graded_area > SMALL_AREA * settings.length**2
-    return STARTS[settings.effort][: 1 if settings.effort == "normal" and large else None]
+    return STARTS_OF_EFFORTS[settings.effort][: 1 if settings.effort == "normal" and large else None]
 
 
 def orientation_fields(

@@ -28,18 +28,30 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 #: lengths to try in turn, as multiples of the usual one: first by what usually gives a grid (True), later by all that may
-LADDER = (
+LADDER_OF_LENGTHS = (
     (1.0, True), (1.4, True), (1.0, False), (2.0, True), (1.4, False), (1 / 1.4, True), (2.8, True), (2.0, False),
     (1 / 1.4, False), (0.5, True), (2.8, False),
 )  # fmt: skip
-NEXT = 1.4  # a length is suggested if that many times it passes too
-NEARBY = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)  # lengths that are tried in place of one that failed
+NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
+NEARBY_LENGTHS = (
+    1.12,
+    0.9,
+    1.25,
+    0.8,
+    1.4,
+    0.7,
+    1.7,
+    0.6,
+    2.0,
+    0.5,
+    2.8,
+)  # lengths that are tried in place of one that failed
 # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
 RUNS_USUAL = 4.0  # quick runs that are made at the usual length where no length nearby passes and it is far away
-RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
+MOST_QUICK_RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 
@@ -83,7 +95,10 @@ class Advice:
         self._found: dict[float, LengthTrial] = {}
         self._briefly: set[float] = set()  # of these, by what usually gives a grid only
         self._usual = suggest_length(cloud)
-        self._runs, self._run_length = RUNS, self._usual  # quick runs that are left, and the length they are counted at
+        self._runs, self._run_length = (
+            MOST_QUICK_RUNS,
+            self._usual,
+        )  # quick runs that are left, and the length they are counted at
 
     def try_length(self, length: float, *, briefly: bool = False) -> LengthTrial | None:
         """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or runs are used up."""
@@ -144,7 +159,7 @@ class Advice:
         """
         low, high = length_range(self._cloud)
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
-        for share, briefly in LADDER:
+        for share, briefly in LADDER_OF_LENGTHS:
             length = min(max(_two_digits(share * self._usual), low), high)
             trial = self.try_length(length, briefly=briefly)
             if trial is None or not trial.passed:
@@ -168,7 +183,7 @@ class Advice:
         """Return the nearest length that passes in place of one that does not, or the usual one; None where none of those tried does."""
         low, high = length_range(self._cloud)
         at = min(max(length, low), high)
-        lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY)} - {length}
+        lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY_LENGTHS)} - {length}
         if (sure := round_length(SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
             lengths.add(sure)
         self._runs, self._run_length = RUNS_NEARBY, at
@@ -185,11 +200,11 @@ class Advice:
 
     def next_above(self, length: float) -> float:
         """Return the next longer length to look at."""
-        return min(_two_digits(NEXT * length), max(length, length_range(self._cloud)[1]))
+        return min(_two_digits(NEXT_LENGTH * length), max(length, length_range(self._cloud)[1]))
 
     def next_below(self, length: float) -> float:
         """Return the next shorter length to look at."""
-        return max(_two_digits(length / NEXT), min(length, length_range(self._cloud)[0]))
+        return max(_two_digits(length / NEXT_LENGTH), min(length, length_range(self._cloud)[0]))
 
     def around(self, length: float) -> list[float]:
         """Return the lengths of a table: one, the two below and the two above."""

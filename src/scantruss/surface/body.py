@@ -20,19 +20,21 @@ from .linked_samples import Linked, link_samples
 Voxels = NDArray[np.bool_]
 DistanceField = NDArray[np.float64]  # a value for each voxel
 
-VOXEL = 1.0 / 6.0  # size of a voxel [member lengths]
+VOXEL_SIZE = 1.0 / 6.0  # size of a voxel [member lengths]
 COARSEST_VOXEL = 0.25  # the same of a large scan [member lengths]
 MOST_VOXELS = 8_000_000
 LIMB_RADIUS = (
     0.45  # of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
 )
 SLIT_RADIUS = 0.3  # of the ball that does not fit into a slit [member lengths]
-DEEP = 0.2  # how far a limb stands out, or a slit goes in, beyond what every edge and corner loses [member lengths]
+DEPTH_OF_LIMBS = (
+    0.2  # how far a limb stands out, or a slit goes in, beyond what every edge and corner loses [member lengths]
+)
 OFF_BODY = (
     1.3  # distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
 )
 WALL_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
-NEIGHBORS = 12  # samples around one that tell whether it lies at a boundary
+NEIGHBORS_AT_BOUNDARY = 12  # samples around one that tell whether it lies at a boundary
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
 SPARSE_LINK = 2.0  # the same where points are sparse, in distances of the sixth neighbour
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # of a disc, in distances of the sixth neighbour
@@ -82,7 +84,7 @@ def opened_body(
         Normals that came with the scan.
     """
     found = link_samples(points, max(WALL_SAMPLES * length, 0.25 * spacing), length, spacing, given)
-    if len(found.mean) <= NEIGHBORS:
+    if len(found.mean) <= NEIGHBORS_AT_BOUNDARY:
         return None
     lattice = _lattice(points, length)
     if lattice is None:
@@ -102,7 +104,7 @@ def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
     """Return voxels around points (N, 3); None where they would be too many."""
     margin = (LIMB_RADIUS + WIDEST_LINK + 1.0) * length
     low, extent = points.min(axis=0) - margin, np.ptp(points, axis=0) + 2.0 * margin
-    size = max(VOXEL * length, float(np.cbrt(extent.prod() / MOST_VOXELS)))
+    size = max(VOXEL_SIZE * length, float(np.cbrt(extent.prod() / MOST_VOXELS)))
     if size > COARSEST_VOXEL * length:
         return None
     x, y, z = (np.ceil(extent / size).astype(int) + 1).tolist()
@@ -147,7 +149,7 @@ def _at_gaps(found: Linked) -> NDArray[np.bool_]:
     """Return which samples (S,) lie at a boundary, or at a place where others happen to be missing."""
     from scipy.spatial import cKDTree
 
-    turn, _ = _around(found, cKDTree(found.mean).query(found.mean, k=NEIGHBORS + 1)[1][:, 1:])
+    turn, _ = _around(found, cKDTree(found.mean).query(found.mean, k=NEIGHBORS_AT_BOUNDARY + 1)[1][:, 1:])
     gap = np.maximum(np.diff(turn, axis=1).max(axis=1), turn[:, 0] + 2.0 * np.pi - turn[:, -1])
     at_gaps: NDArray[np.bool_] = gap > np.radians(BOUNDARY_GAP)
     return at_gaps
@@ -242,9 +244,9 @@ def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length:
 
     if not body.any():
         return None
-    limbs = _beyond_ball(body, LIMB_RADIUS * length, DEEP * length, lattice)
+    limbs = _beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body & ~limbs
-    slits = _beyond_ball(~body, SLIT_RADIUS * length, DEEP * length, lattice)
+    slits = _beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body | slits
     depth = _distance(~body, lattice) - _distance(body, lattice)  # positive inside
     depth -= 0.5 * lattice.size * np.sign(depth)

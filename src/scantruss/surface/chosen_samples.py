@@ -13,8 +13,8 @@ from .given_normals import GivenNormals
 from .linked_samples import (
     LINK_BOX,
     MANY_ROUGH,
-    ROUGH,
-    SHEETS,
+    ROUGH_SAMPLE,
+    THICKNESS_OF_SHEETS,
     Linked,
     is_rough,
     is_smooth,
@@ -147,7 +147,7 @@ def usual_samples(
     if asked.smooth_scale:
         points = some = mean_surface(some, asked.smooth_scale * length, length)
         found = link_samples(some, radius, length, spacing)
-    if is_rough(found, SHEETS * length):
+    if is_rough(found, THICKNESS_OF_SHEETS * length):
         fine = link_finer(points, radius, length, spacing, given)
         if fine is not None:
             some, (found, radius) = points, fine
@@ -155,7 +155,7 @@ def usual_samples(
     still = np.zeros(len(found.mean), np.bool_)
     if asked.sharp_edges:
         still = beside_edges(found, on_sharp_edges(found, found.normals.copy(), length), BESIDE_EDGE * length)
-    if is_rough(found, ROUGH * length, MANY_ROUGH):
+    if is_rough(found, ROUGH_SAMPLE * length, MANY_ROUGH):
         found = settle_to_sheet(found, some, radius, length, spacing, still)
     if asked.sharp_edges:
         coarse = coarse_samples(found, length)

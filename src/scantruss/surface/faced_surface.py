@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface.local_surface import Surface
 from ..scan.normals import STEEP_SINE, cut_steep_links, face_as_given, face_one_side, face_outside, mean_normals
-from .linked_samples import ROUGH, Linked
+from .linked_samples import ROUGH_SAMPLE, Linked
 from .sharp_edges import on_sharp_edges, unsure_samples
 
 PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitted while nodes move
@@ -21,7 +21,7 @@ def faced_surface(
     sharp_edges : whether samples on sharp edges of bodies face away from them
     """
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
-    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH * length, STEEP_SINE)
+    normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH_SAMPLE * length, STEEP_SINE)
     on_edge = on_sharp_edges(found, normals, length) if sharp_edges else np.zeros(len(mean), np.bool_)
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors, unsure_samples(found, on_edge, length) if on_edge.any() else None)

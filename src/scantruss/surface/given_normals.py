@@ -14,7 +14,7 @@ from ..scan.cloud import PointCloud
 
 NO_NORMALS = np.empty((0, 3))  # where none are given
 POINTS_TO_JUDGE = 2000  # points by which it is judged whether normals can be trusted
-BESIDE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
+BESIDE_SINE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
 MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
 AT_A_POINT = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
 
@@ -39,7 +39,7 @@ class GivenNormals:
         some = np.linspace(0, len(points) - 1, min(len(points), POINTS_TO_JUDGE)).astype(np.int64)
         other, _ = given._nearest(points[some], 2)
         apart = points[other] - points[some]
-        beside = np.abs((apart * unit[some]).sum(axis=1)) < BESIDE * np.linalg.norm(apart, axis=1)
+        beside = np.abs((apart * unit[some]).sum(axis=1)) < BESIDE_SINE * np.linalg.norm(apart, axis=1)
         opposite = (unit[some] * unit[other]).sum(axis=1) < 0.0
         return given if (opposite & beside).mean() <= MOST_OPPOSITE else None
 

@@ -19,17 +19,19 @@ from .linked_samples import link_samples
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .scratch import with_own_scratch
 
-SUSPECT = 1.1  # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
+SUSPECT_WITHIN = (
+    1.1  # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
+)
 FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
-BEYOND = 1.2  # largest girth that is measured [girth below which limbs are cut off]
+LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
 SMOOTHINGS = 3  # passes in which a sample becomes what most of those linked to it are
 FEWEST_OF_LIMB = 12  # fewest samples of a part that is cut off
 BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
-SURELY = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
-CLEAN = 0.8  # least share of the samples on each side of a ring that are on the right side
-NECK = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
-AROUND = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
+SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
+CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
+NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
+LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
 NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points tell its shape [desired lengths]
 RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
 WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
@@ -37,7 +39,7 @@ SMALLEST_RING = (
     2.0  # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
 )
 POINTS_OF_RING = 72
-MOST = 0.4  # share of the scan above which what is thin is the scan itself
+MOST_OF_SCAN_THIN = 0.4  # share of the scan above which what is thin is the scan itself
 LIMBS_PER_THREAD = 400
 
 
@@ -82,7 +84,7 @@ def cut_limbs(
     if parts is None:
         return none
     gone, rings = parts.cut()
-    if not gone.any() or gone.sum() > MOST * len(points):
+    if not gone.any() or gone.sum() > MOST_OF_SCAN_THIN * len(points):
         return none
     none[0][which[gone]] = True
     return none[0], rings
@@ -91,7 +93,7 @@ def cut_limbs(
 def _suspects(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
     """Return which samples may lie on a limb too thin (S,) bool, and those around them."""
     marks = np.zeros(len(surface.mean), np.bool_)
-    run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT * girth / 3.0, marks)
+    run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT_WITHIN * girth / 3.0, marks)
     if marks.sum() < FEWEST_OF_LIMB:
         return marks
     beside = surface.neighbors
@@ -138,7 +140,7 @@ class _Parts:
 
         def measure(part: int, begin: int, end: int) -> None:
             own = surface if part == 0 else with_own_scratch(surface)
-            measure_girths(own, BEYOND * limit, HALF_SECTION, girth, axis, begin, end)
+            measure_girths(own, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
 
         in_parts(len(piece), LIMBS_PER_THREAD, measure)
         girth /= length * surface.field
@@ -174,7 +176,7 @@ class _Parts:
         rings: list[LimbRing] = []
         for limb in np.unique(whole[~stays]):
             gone = whole == limb
-            if self._thinnest(gone & self.thin) > SURELY * self.limit:
+            if self._thinnest(gone & self.thin) > SURE_GIRTH * self.limit:
                 continue
             ends = gone[one] & ~gone[other]
             own, off = [], gone[self.owner]
@@ -193,7 +195,7 @@ class _Parts:
         for part in np.unique(thin):
             ends = np.unique(fat[thin == part])
             blunt = ~np.isin(ends, solid)
-            thick = self._thinnest(self.label == part) >= NECK * self.limit
+            thick = self._thinnest(self.label == part) >= NECK_GIRTH * self.limit
             if len(ends) > 1 and blunt.any() and not blunt.all() and thick:
                 kept.append(part)
         return np.array(kept, np.int64)
@@ -220,7 +222,7 @@ class _Parts:
         length = surface.length * float(surface.field[edge].mean())
         middle = surface.mean[edge].mean(axis=0)
         radius = float(np.linalg.norm(surface.mean[edge] - middle, axis=1).max())
-        count = flood(surface, int(edge[0]), tuple(middle), radius + AROUND * length)
+        count = flood(surface, int(edge[0]), tuple(middle), radius + LOOKED_AROUND_RING * length)
         near = surface.queue[:count].copy()
         normals = surface.normals[near[np.linalg.norm(surface.mean[near] - middle, axis=1) < radius + 0.2 * length]]
         axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
@@ -246,7 +248,7 @@ class _Parts:
         within = np.hypot(height[:, 0], height[:, 1]) < 1.3 * out.max()
         for way in (1.0, -1.0):
             clear = within & (way * height[:, 2] > HALF_SECTION * length)
-            if (gone[near[clear]] == (way > 0.0)).sum() < CLEAN * clear.sum():
+            if (gone[near[clear]] == (way > 0.0)).sum() < CLEAN_RING_SHARE * clear.sum():
                 return None
         bounds = girth > SMALLEST_RING * length
         inside = np.hypot(flat[:, 0], flat[:, 1]) < 1.3 * out.max()

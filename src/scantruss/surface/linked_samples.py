@@ -24,10 +24,10 @@ LONE_SPACING = 0.3  # point spacing above which most points are samples themselv
 SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]
 LINKED_POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
 PATCH_SPACING = 0.3  # point spacing that is dense enough for fitting patches [sample radii]
-ROUGH = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
+ROUGH_SAMPLE = 0.04  # thickness above which a sample is rough and moved to the middle of its sheet [member lengths]
 SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
 MANY_ROUGH = 0.007  # share of rough samples above which they are moved; fewer may lie along ridges
-SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
+THICKNESS_OF_SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
 MOST_REFINEMENTS = 2  # most times that the sample radius is halved to see whether a thick layer is several sheets
 FINEST_RADIUS = 1.0  # smallest radius of a sample [point spacings]
 SMOOTH_THICKNESS = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
@@ -99,7 +99,7 @@ def link_finer(
         if radius < FINEST_RADIUS * spacing:
             return None
         found = link_samples(points, radius, length, spacing, given)
-        if not is_rough(found, ROUGH * length):
+        if not is_rough(found, ROUGH_SAMPLE * length):
             return found, radius
     return None
 
@@ -129,7 +129,7 @@ def settle_to_sheet(
 ) -> Linked:
     """Return the samples of a rough layer moved to its middle, but those that stay where they are, thinned and linked again."""
     moved, thickness = np.empty_like(found.mean), np.where(still, 0.0, found.thickness)
-    kernels.settle_samples(found.mean, found.neighbors, thickness, ROUGH * length, 0.6 * length, moved)
+    kernels.settle_samples(found.mean, found.neighbors, thickness, ROUGH_SAMPLE * length, 0.6 * length, moved)
     joined, chosen, mean, boxes, neighbors = _settled(moved, radius, length, spacing, found.facing)
     owner = joined[found.owner]
     grouped, start, _ = group(points, owner, len(chosen))

@@ -12,11 +12,11 @@ from ..runtime.parallel import in_parts
 from ..scan.cloud import bounds_of
 from .linked_samples import samples_of_points
 
-RADIUS = 1.5  # radius of the balls over which surfaces are fitted [scales]
+BALL_RADIUS = 1.5  # radius of the balls over which surfaces are fitted [scales]
 #: terms of the surfaces to which the points move, one pass after the other: planes draw the layers of an overhang together
-PASSES = (TERMS_OF_PLANE, TERMS_OF_QUADRIC, TERMS_OF_QUADRIC)
-STEP = 0.125  # distance of the points to which surfaces are fitted [radii]
-FINE = 0.1  # distance of the points that are moved [member lengths]
+TERMS_OF_PASSES = (TERMS_OF_PLANE, TERMS_OF_QUADRIC, TERMS_OF_QUADRIC)
+FITTED_STEP = 0.125  # distance of the points to which surfaces are fitted [radii]
+MOVED_STEP = 0.1  # distance of the points that are moved [member lengths]
 FITS_PER_THREAD = 500  # fewest places for a thread of their own
 
 
@@ -34,9 +34,9 @@ def mean_surface(points: np.ndarray, scale: float, length: float) -> np.ndarray:
     length : float
         Desired member length [scan unit].
     """
-    places, radius = samples_of_points(points, FINE * length)[2], RADIUS * scale
-    for terms in PASSES:
-        around = samples_of_points(places, STEP * radius)[2]
+    places, radius = samples_of_points(points, MOVED_STEP * length)[2], BALL_RADIUS * scale
+    for terms in TERMS_OF_PASSES:
+        around = samples_of_points(places, FITTED_STEP * radius)[2]
         boxes = new_boxes(*bounds_of(around), radius, len(around), len(around))
         put_all(boxes, around, np.arange(len(around)))
         in_parts(

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from .linked_samples import Linked
 
 THICK_AT_EDGE = 0.03  # thickness above which a sample may lie on a sharp edge [member lengths]
-REACH = 0.7  # distance within which other samples tell whether it does [member lengths]
-FEWEST = 8  # fewest samples of an edge
+EDGE_REACH = 0.7  # distance within which other samples tell whether it does [member lengths]
+FEWEST_EDGE_SAMPLES = 8  # fewest samples of an edge
 BESIDE_EDGE = (
     1.2  # distance from an edge within which samples stay in their places, and are finer where thick [member lengths]
 )
-UNSURE = (
+UNSURE_EDGE = (
     0.6  # distance from an edge within which other thick samples tell little of which way a side faces [member lengths]
 )
 EDGE_SHARE, FEWEST_NEEDED = (
@@ -39,9 +39,9 @@ def on_sharp_edges(found: Linked, normals: np.ndarray, length: float) -> np.ndar
     """Let the samples on sharp edges face away from them; returns which those are (S,) bool, none where they are few."""
     thick = np.flatnonzero(found.thickness > THICK_AT_EDGE * length)
     turned = normals.copy()
-    face_off_edges(found.mean, turned, found.boxes, thick, REACH * length)
+    face_off_edges(found.mean, turned, found.boxes, thick, EDGE_REACH * length)
     there: np.ndarray = (turned != normals).any(axis=1)
-    if there.sum() < FEWEST:
+    if there.sum() < FEWEST_EDGE_SAMPLES:
         there[:] = False
     normals[there] = turned[there]
     return there
@@ -71,4 +71,4 @@ def coarse_samples(found: Linked, length: float) -> np.ndarray:
 
 def unsure_samples(found: Linked, on_edge: np.ndarray, length: float) -> np.ndarray:
     """Which samples (S,) near sharp edges are thick and yet do not face away from them."""
-    return (found.thickness > THICK_AT_EDGE * length) & ~on_edge & beside_edges(found, on_edge, UNSURE * length)
+    return (found.thickness > THICK_AT_EDGE * length) & ~on_edge & beside_edges(found, on_edge, UNSURE_EDGE * length)

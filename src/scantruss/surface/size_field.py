@@ -15,8 +15,10 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..settings import Settings, shortest_and_longest
 
-RATIO = 1.2  # largest ratio of the desired lengths of two successive members
-SLOPE = 0.7 * 2.0 * (RATIO - 1.0) / (RATIO + 1.0)  # growth per distance; 0.7 because links make distances longer
+LARGEST_RATIO = 1.2  # largest ratio of the desired lengths of two successive members
+STEEPEST_GROWTH = (
+    0.7 * 2.0 * (LARGEST_RATIO - 1.0) / (LARGEST_RATIO + 1.0)
+)  # growth per distance; 0.7 because links make distances longer
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
 LESS_CURVED_SHARE = 0.95  # share of the scan that is less curved than the places with the shortest members
 NOISE_DEVIATIONS = 4.6  # standard deviations of a curvature up to which it may be noise
@@ -57,7 +59,7 @@ def length_field(surface: Surface, wish: Wish | None) -> np.ndarray:
     shortest, longest = shortest_and_longest(wish.field)
     most = longest / shortest
     field = _by_curvature(surface, most) if isinstance(wish.field, str) else _by_given(surface, wish, shortest)
-    kernels.grade(surface.mean, surface.neighbors, field, SLOPE / wish.length)
+    kernels.grade(surface.mean, surface.neighbors, field, STEEPEST_GROWTH / wish.length)
     return np.clip(field, 1.0, most)
 
 

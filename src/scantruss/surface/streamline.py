@@ -16,7 +16,7 @@ from ..scan.cloud import Bounds
 DENSE_SPACING = 0.35  # point spacing below which a scan is streamlined [box size]
 CHOSEN_POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
 EVERY_POINT = np.zeros(0, np.int64)  # stands for the numbers of all points
-MARKS = 1 << 20  # marks for boxes near a place; of some thousands of boxes two hardly ever share one
+BOX_MARKS = 1 << 20  # marks for boxes near a place; of some thousands of boxes two hardly ever share one
 LEAST_ROOM, MOST_ROOM = 1 << 16, 1 << 19  # bounds of the number of points that there is room for at first
 FILLED_BOXES = 64  # boxes of a block that are expected to be occupied
 
@@ -93,7 +93,7 @@ class _First:
 def points_near(points: np.ndarray, places: np.ndarray, reach: float) -> np.ndarray:
     """Return, in order, the points (N, 3) within `reach` of any of the places (K, 3), and a few more, (M,) int64."""
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), reach, 0, 0)
-    marked = np.zeros(MARKS, np.bool_)
+    marked = np.zeros(BOX_MARKS, np.bool_)
     nearby.mark_around(boxes, places, reach, marked)
     parts: list[np.ndarray] = [np.zeros(0, np.int64)] * processors()
 
