@@ -14,6 +14,7 @@ FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other front
 # share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
+MOST_RUNS_OF_CELLS = 3  # the same for quads and hexagons, which are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 
 
@@ -25,14 +26,16 @@ class Hope:
     counted in grids that are made, not in seconds: the same scan gets the same result.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, cells: str = "triangle") -> None:
+        self._cells = cells
         self._settings: Settings | None = None
         self._far = self._given_up = 0
         self._runs, self._looks_one_sided = 0, False
 
     def is_left(self) -> bool:
         """Whether any attempt is worth making."""
-        return self._given_up < MOST_GIVEN_UP and self._runs < MOST_RUNS
+        most = MOST_RUNS if self._cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
+        return self._given_up < MOST_GIVEN_UP and self._runs < most
 
     def begin(self) -> None:
         """Note that a grid is made."""

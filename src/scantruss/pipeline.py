@@ -181,7 +181,7 @@ def first_that_passes(
         of a grid of the mean surface that only leaves out too much.
     """
     faults: list[ScanTrussError] = []
-    hope, advice = Hope(), ""
+    hope, advice = Hope(settings.cells), ""
     for attempt in tried:
         if not hope.allows(attempt):
             continue
