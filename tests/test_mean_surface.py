@@ -14,7 +14,7 @@ from scantruss.kernels.geometry.quadric import TERMS_OF_PLANE, TERMS_OF_QUADRIC
 from scantruss.kernels.surface.mean_surface import FIT_TURNS, KNOWN_TURNS, OFF_THE_FIT, mean_offsets, move_to_mean
 from scantruss.kernels.surface.samples import put_all
 from scantruss.scan.cloud import PointCloud, bounds_of
-from scantruss.surface.mean_surface import BALL_RADIUS, mean_surface
+from scantruss.surface.mean_surface import RADIUS_OF_BALLS, mean_surface
 from scantruss.surface.samples import sample_surface
 
 
@@ -68,7 +68,7 @@ def test_points_move_as_by_the_slow_twin(terms: int) -> None:
 def test_a_smooth_scan_hardly_moves_and_roughness_vanishes() -> None:
     """A sphere of four members: the plane of the first pass cuts off R^2 / 8 r; noise of a tenth falls to less than a fifth."""
     smooth = np.linalg.norm(mean_surface(ball(1, 20_000, 0.0), 0.5, 1.0), axis=1)
-    assert abs(smooth - 4.0).max() < (BALL_RADIUS * 0.5) ** 2 / (8 * 4.0)
+    assert abs(smooth - 4.0).max() < (RADIUS_OF_BALLS * 0.5) ** 2 / (8 * 4.0)
     rough = np.linalg.norm(mean_surface(ball(1, 20_000, 0.1), 0.5, 1.0), axis=1)
     assert rough.std() < 0.02 and abs(rough.mean() - 4.0) < 0.02
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .ridge_ends import Ridge
 
 BOUNDARY_REACH = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
-TUBE_RADIUS = (
+RADIUS_OF_TUBE = (
     0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
 )
 PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge is taken
@@ -68,7 +68,7 @@ def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.nda
     away = np.concatenate([np.zeros((0, 3)), *parts]) - from_there
     way = away @ ahead
     across = np.linalg.norm(away - way[:, None] * ahead, axis=1)
-    radius = max(TUBE_RADIUS * length, 2.0 * samples.spacing)
+    radius = max(RADIUS_OF_TUBE * length, 2.0 * samples.spacing)
     way = np.sort(way[(across < radius) & (way > -DENSITY_REACH * length) & (way < LOOK_FORWARD * length)])
     if len(way) < FEWEST_ALONG:
         return None

@@ -12,7 +12,7 @@ from ..runtime.parallel import in_parts
 from ..scan.cloud import bounds_of
 from .linked_samples import samples_of_points
 
-BALL_RADIUS = 1.5  # radius of the balls over which surfaces are fitted [scales]
+RADIUS_OF_BALLS = 1.5  # radius of the balls over which surfaces are fitted [scales]
 #: terms of the surfaces to which the points move, one pass after the other: planes draw the layers of an overhang together
 TERMS_OF_PASSES = (TERMS_OF_PLANE, TERMS_OF_QUADRIC, TERMS_OF_QUADRIC)
 FITTED_STEP = 0.125  # distance of the points to which surfaces are fitted [radii]
@@ -34,7 +34,7 @@ def mean_surface(points: np.ndarray, scale: float, length: float) -> np.ndarray:
     length : float
         Desired member length [scan unit].
     """
-    places, radius = samples_of_points(points, MOVED_STEP * length)[2], BALL_RADIUS * scale
+    places, radius = samples_of_points(points, MOVED_STEP * length)[2], RADIUS_OF_BALLS * scale
     for terms in TERMS_OF_PASSES:
         around = samples_of_points(places, FITTED_STEP * radius)[2]
         boxes = new_boxes(*bounds_of(around), radius, len(around), len(around))

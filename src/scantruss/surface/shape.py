@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .mean_surface import BALL_RADIUS
+from .mean_surface import RADIUS_OF_BALLS
 
 if TYPE_CHECKING:
     from ..kernels.surface.local_surface import Surface
@@ -95,7 +95,7 @@ def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
     surface = samples.surface
     if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
-    apart, looked, merged = [], 0, BALL_RADIUS * samples.moved
+    apart, looked, merged = [], 0, RADIUS_OF_BALLS * samples.moved
     reach, close = (max(least, merged) * surface.length for least in (LAYER_REACH, CLOSE_LAYERS))
     # samples with near numbers lie near each other, so these are from all over the scan
     for sample in np.unique(np.linspace(0, len(surface.mean) - 1, PLACES_LOOKED_AT).astype(np.int64)):
