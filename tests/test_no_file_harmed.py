@@ -105,7 +105,6 @@ WRONG = [
     "splice -o a.xyz b.xyz c.ply",
     "sweep --length L -o a.xyz",
     "sweep folder a.xyz --length L -o a.xyz",
-    "sweep a.xyz -o folder",
     "print a.xyz new.stl --member-diameter 0.1 --node-diameter 0.2",
     "print new.stl theirs.json --member-diameter 0.1 --node-diameter 0.2",
     "print theirs.json new.stl --member-diameter 0.1 --node-diameter 0.2",

@@ -320,7 +320,7 @@ def test_missing_empty_folder_and_unknown_suffix(tmp_path: Path) -> None:
         "none.ply": "does not exist",
         "empty.ply": "is empty",
         "folder.ply": "is a folder",
-        "a.xzy": r'no reader for "\.xzy" .*use one of \.asc .*\.ply .*\.xyz',
+        "a.xzy": r'no reader for "\.xzy" .*use one of \.3mf .*\.ply .*\.xyz',
     }.items():
         with pytest.raises(FormatError, match=words):
             read_points(tmp_path / name)

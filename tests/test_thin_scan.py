@@ -66,7 +66,10 @@ def check(
     held = read_points(names, unit, selection)
     found = thin_scan(names, S, keep=keep, unit=unit, selection=selection)
     wanted = thin_points(held.points + held.origin, S, keep=keep)
-    assert found.points.shape == wanted.shape and len(wanted) < len(held.points)
+    assert found.points.shape == wanted.shape and len(wanted) <= len(held.points)
+    assert len(wanted) < len(held.points) or str(names).endswith(
+        ".tif"
+    )  # a raster whose cells are larger than the boxes
     assert np.allclose(found.points, wanted, rtol=1e-12, atol=1e-9)
     assert found.unit == held.unit and found.read == len(held.points) + held.dropped
     assert sorted(found.notes) == sorted(held.notes)

@@ -162,6 +162,8 @@ def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
 
 def mirrored_words(types: Schedule) -> str:
     """Say how many types there are if mirror images count once; nothing where there are as many."""
+    if all(each.name != "mirror image" for each in types.columns):
+        return ""
     first = types.columns[0].values
     seen = {
         frozenset((own, image)) for own, image in zip(first, types["mirror image"], strict=True) if image is not None
