@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from marks import compiled_only
 from small_grids import dome, icosahedron
 from test_quads import bowl
 
@@ -39,6 +40,7 @@ def test_the_dual_keeps_pieces_loops_and_direction() -> None:
     assert (upward > 0).all()
 
 
+@compiled_only
 def test_hexagons_of_a_scan() -> None:
     grid = st.grid_from_points(bowl(False), st.Settings(length=0.9, cells="hexagon", unit="m"))
     assert grid.certificate is not None and grid.certificate.passed

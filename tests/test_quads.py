@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marks import compiled_only
 from small_grids import dome
 
 import scantruss as st
@@ -85,6 +86,7 @@ def test_corners_are_nodes_and_the_boundary_is_kept() -> None:
     assert np.minimum(np.abs(np.abs(loop[:, 0]) - 8.0), np.abs(np.abs(loop[:, 1]) - 6.0)).max() < 0.06 * LENGTH
 
 
+@compiled_only
 def test_the_same_scan_gives_the_same_bytes_and_json_holds_all(tmp_path: Path) -> None:
     again = st.grid_from_points(bowl(False), st.Settings(length=LENGTH, cells="quad", unit="m"))
     text = encode_json(quads())
@@ -123,6 +125,7 @@ def test_files_hold_quads(tmp_path: Path) -> None:
     assert len(ezdxf.readfile(tmp_path / "quads.dxf").modelspace().query("3DFACE")) == len(faces)
 
 
+@compiled_only
 def test_the_command_makes_quads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.save(tmp_path / "bowl.npy", bowl(False))
     out = tmp_path / "quads.json"
