@@ -80,7 +80,7 @@ def how_to_install(extra: str) -> str:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return " (did you mean X?)" with the most similar of the words that are known; "" where none is similar."""
-    from difflib import get_close_matches  # not needed by a run that is told nothing wrong
+    from difflib import get_close_matches  # not needed where no name is wrong
 
     near = get_close_matches(word, list(known), 1, 0.7)
     return f" (did you mean {near[0]}?)" if near else ""

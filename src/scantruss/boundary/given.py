@@ -256,7 +256,7 @@ def _enclosed(
         [np.bincount(label[(foot >= 0) & (right == side)], minlength=len(label)) for side in (False, True)]
         for foot, right in beside
     ]
-    at_rim = np.bincount(label[_rim_samples(samples, scanned, rings, length)], minlength=len(label))
+    at_boundary = np.bincount(label[_boundary_samples(samples, scanned, rings, length)], minlength=len(label))
     areas = np.bincount(label, minlength=len(label))
     spans = np.bincount(rings.ring, np.linalg.norm(rings.points[rings.after] - rings.points, axis=1))
     turned, external, kept = np.zeros(count, np.bool_), np.zeros(count, np.bool_), []
@@ -264,7 +264,7 @@ def _enclosed(
     while left:
         outer = left.pop(0)
         external[outer] = True
-        turned[outer] = _inside_is_right(sides[outer], at_rim, areas, samples, rings, outer)
+        turned[outer] = _inside_is_right(sides[outer], at_boundary, areas, samples, rings, outer)
         region = int(sides[outer][int(turned[outer])].argmax())
         kept.append(region)
         beyond = [sides[outer][int(not turned[outer])]]
@@ -274,13 +274,15 @@ def _enclosed(
                 turned[hole] = votes[1] > votes[0]
                 beyond.append(sides[hole][int(not turned[hole])])
                 left.remove(hole)
-        at_rim[[int(side.argmax()) for side in beyond if side.any()]] += len(label)  # outside of one is outside of all
+        at_boundary[[int(side.argmax()) for side in beyond if side.any()]] += len(
+            label
+        )  # outside of one is outside of all
     return turned, kept, external
 
 
 def _inside_is_right(
     sides: Sequence[np.ndarray],
-    at_rim: np.ndarray,
+    at_boundary: np.ndarray,
     areas: np.ndarray,
     samples: SurfaceSamples,
     rings: Rings,
@@ -304,13 +306,13 @@ def _inside_is_right(
         raise InputError(
             f"boundary {number + 1} does not divide the scan into inside and outside (near {place}); close it around a part"
         )
-    first, second = (int(at_rim[region]) for region in regions)
+    first, second = (int(at_boundary[region]) for region in regions)
     if first != second:
         return first > second
     return bool(areas[regions[1]] > areas[regions[0]])
 
 
-def _rim_samples(
+def _boundary_samples(
     samples: SurfaceSamples, scanned: Sequence[tuple[np.ndarray, int]], rings: Rings, length: float
 ) -> np.ndarray:
     """Return the samples (K,) at the longest boundary of each piece of the scan, as far as it is none of those given."""

@@ -115,16 +115,16 @@ def dual_of(grid: Grid, corners: np.ndarray, near: float) -> Dual:
     near : distance within which they do [scan unit]
     """
     triangles, count = grid.triangles, len(grid.triangles)
-    rim = np.flatnonzero(grid.edge_uses == 1)
-    of_rim = {int(edge): count + number for number, edge in enumerate(rim.tolist())}
+    boundary_members = np.flatnonzero(grid.edge_uses == 1)
+    of_boundary_member = {int(edge): count + number for number, edge in enumerate(boundary_members.tolist())}
     middles = grid.nodes[triangles].mean(axis=1)
-    halves = grid.nodes[grid.edges[rim]].mean(axis=1)
-    rim_nodes = np.unique(grid.edges[rim])
+    middles_of_members = grid.nodes[grid.edges[boundary_members]].mean(axis=1)
+    boundary_nodes = np.unique(grid.edges[boundary_members])
     at_corner = np.array(
-        [len(corners) > 0 and np.linalg.norm(corners - grid.nodes[v], axis=1).min() <= near for v in rim_nodes]
+        [len(corners) > 0 and np.linalg.norm(corners - grid.nodes[v], axis=1).min() <= near for v in boundary_nodes]
     )
-    kept = rim_nodes[at_corner] if len(rim_nodes) else rim_nodes
-    own = {int(v): count + len(rim) + number for number, v in enumerate(kept.tolist())}
+    kept = boundary_nodes[at_corner] if len(boundary_nodes) else boundary_nodes
+    own = {int(v): count + len(boundary_members) + number for number, v in enumerate(kept.tolist())}
     sides = grid.half_edge_edges.reshape(3, -1).T
     after: list[dict[int, int]] = [{} for _ in grid.nodes]  # at each node: from member to member, over a triangle
     over: list[dict[int, int]] = [{} for _ in grid.nodes]
@@ -138,19 +138,19 @@ def dual_of(grid: Grid, corners: np.ndarray, near: float) -> Dual:
             continue
         starts = set(following) - set(following.values())
         edge = starts.pop() if starts else min(following)
-        loop = [of_rim[edge]] if edge in of_rim else []
+        loop = [of_boundary_member[edge]] if edge in of_boundary_member else []
         for _ in range(len(following)):
             loop.append(over[v][edge])
             edge = following[edge]
-        if edge in of_rim:
-            loop.append(of_rim[edge])
+        if edge in of_boundary_member:
+            loop.append(of_boundary_member[edge])
             if v in own:
                 loop.append(own[v])
         if len(loop) > 2:
             loops.append(loop)
-    nodes = np.concatenate([middles, halves, grid.nodes[kept]])
+    nodes = np.concatenate([middles, middles_of_members, grid.nodes[kept]])
     fixed = np.zeros(len(nodes), np.bool_)
-    fixed[count + len(rim) :] = True
+    fixed[count + len(boundary_members) :] = True
     return Dual(nodes, table_of(loops), fixed)
 
 
@@ -163,8 +163,8 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
     panels = grid.panel_table
     before, after = _corners(panels)
     normals = mesh.patches[:count, 3:6]
-    rim = np.zeros(count, np.bool_)
-    rim[grid.edges[grid.edge_uses == 1].ravel()] = True
+    at_boundary = np.zeros(count, np.bool_)
+    at_boundary[grid.edges[grid.edge_uses == 1].ravel()] = True
     for _ in range(HEXAGON_STEPS):
         way = nodes[b] - nodes[a]
         size = np.linalg.norm(way, axis=1, keepdims=True)
@@ -173,7 +173,7 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
         move = np.zeros_like(nodes)
         np.add.at(move, a, pull)
         np.add.at(move, b, -pull)
-        _add_turns(move, nodes, before, after, rim, length)
+        _add_turns(move, nodes, before, after, at_boundary, length)
         move *= HEXAGON_STEP * target[:, None]
         move -= (move * normals).sum(axis=1, keepdims=True) * normals
         move[kind >= AT_REST] = 0.0
@@ -192,7 +192,7 @@ def _corners(panels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _add_turns(
-    move: np.ndarray, nodes: np.ndarray, before: np.ndarray, after: np.ndarray, rim: np.ndarray, length: float
+    move: np.ndarray, nodes: np.ndarray, before: np.ndarray, after: np.ndarray, at_boundary: np.ndarray, length: float
 ) -> None:
     """Add what opens or closes the angles to 120 degrees, those at the boundary to 90: the ends of both sides move along their bisector."""
     v, one, two = before[:, 0], before[:, 1], after[:, 1]
@@ -200,7 +200,7 @@ def _add_turns(
     e /= np.maximum(np.linalg.norm(e, axis=1, keepdims=True), 1e-12 * length)
     f /= np.maximum(np.linalg.norm(f, axis=1, keepdims=True), 1e-12 * length)
     cosine = (e * f).sum(axis=1, keepdims=True)
-    wanted = np.where(rim[v], 0.0, -0.5)[:, None]
+    wanted = np.where(at_boundary[v], 0.0, -0.5)[:, None]
     off = HEXAGON_ANGLES * (cosine - wanted)
     np.add.at(move, one, -off * (f - cosine * e))
     np.add.at(move, two, -off * (e - cosine * f))

@@ -62,7 +62,7 @@ class Panels:
             spent, p, a, b = heapq.heappop(queue)
             if (a, b) != (-1, -1) and ((b, a) not in self.left or (p != start and len(self.corners[p]) == 3)):
                 way = [(a, b)]
-                while self.left[way[0]] != start:
+                while self.left[way[0]] != start:  # ends: each turn goes back to a panel that was settled before
                     way.insert(0, before[self.left[way[0]]])
                 return way
             if spent > cost[p]:

@@ -98,11 +98,11 @@ class QuadMesh:
         return out
 
     def try_quads(
-        self, before: list[list[int]], after: list[list[int]], rim: np.ndarray, sweeps: int, join: int = -1, joined: int = -1
+        self, before: list[list[int]], after: list[list[int]], at_boundary: np.ndarray, sweeps: int, join: int = -1, joined: int = -1
     ) -> float:  # fmt: skip
         """Return by how much the energy grows where some quads replace others; the nodes around stay where they have settled."""
         grown: float = try_quads(
-            self.nodes, np.array(before), np.array(after), self.degree, rim, self.held, self.curve, self.arc, self.patches,
+            self.nodes, np.array(before), np.array(after), self.degree, at_boundary, self.held, self.curve, self.arc, self.patches,
             self.curves, self.desired, QUAD_LENGTHS, QUAD_ANGLES, sweeps, QUAD_RELAXATION, GAIN_AT_REST, join, joined,
         )  # fmt: skip
         return grown

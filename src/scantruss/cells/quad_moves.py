@@ -31,10 +31,10 @@ class Moves:
 
     def __init__(self, mesh: QuadMesh) -> None:
         self.mesh = mesh
-        self.rim = self._rim()
+        self.at_boundary = self._at_boundary()
         self.ideals = self._ideals()
 
-    def _rim(self) -> np.ndarray:
+    def _at_boundary(self) -> np.ndarray:
         """Return which nodes lie on the boundary (C,)."""
         mesh, on = self.mesh, np.zeros(len(self.mesh.at), np.bool_)
         for a, b in mesh.chains:
@@ -47,8 +47,8 @@ class Moves:
         mesh, quads = self.mesh, self.mesh.live()
         total = np.bincount(quads.ravel(), corner_angles_of(mesh.nodes, quads).ravel(), len(mesh.at))
         at_corner = np.maximum(np.rint(total / 90.0), 1.0).astype(np.int64)
-        on_rim = np.where(mesh.held == AT_REST_THERE, at_corner, 2)
-        ideals: list[int] = np.where(self.rim, on_rim, 4).tolist()
+        ideal_at_boundary = np.where(mesh.held == AT_REST_THERE, at_corner, 2)
+        ideals: list[int] = np.where(self.at_boundary, ideal_at_boundary, 4).tolist()
         return ideals
 
     def charge(self, v: int, change: int = 0) -> int:
@@ -70,7 +70,7 @@ class Moves:
             corners = mesh.quads[q]
             k = corners.index(v)
             after[corners[(k + 1) % 4]] = corners[k - 1]
-        if not after or self.rim[v]:
+        if not after or self.at_boundary[v]:
             return []
         start = next(iter(after))
         ring, at = [start], after[start]
@@ -85,11 +85,11 @@ class Moves:
         """Merge corner k of a quad with the opposite one; None where that cannot be or is hopeless."""
         mesh, corners = self.mesh, self.mesh.quads[q]
         a, b, c, d = corners[k:] + corners[:k]
-        if mesh.held[c] > mesh.held[a] or (self.rim[c] and not self.rim[a]):
+        if mesh.held[c] > mesh.held[a] or (self.at_boundary[c] and not self.at_boundary[a]):
             a, b, c, d = c, d, a, b
         if mesh.held[c] != FREE:
             return None
-        if any(len(mesh.at[v]) <= (1 if self.rim[v] else FEWEST_QUADS) for v in (b, d)):
+        if any(len(mesh.at[v]) <= (1 if self.at_boundary[v] else FEWEST_QUADS) for v in (b, d)):
             return None
         quads = len(mesh.at[a]) + len(mesh.at[c]) - 2
         penalty = (
@@ -109,7 +109,7 @@ class Moves:
         both = sorted(mesh.at[a] & mesh.at[b])
         if len(both) != 2 or self.is_chain(a, b):
             return None
-        if any(len(mesh.at[v]) <= (1 if self.rim[v] else FEWEST_QUADS) for v in (a, b)):
+        if any(len(mesh.at[v]) <= (1 if self.at_boundary[v] else FEWEST_QUADS) for v in (a, b)):
             return None
         one, two = both
         i = mesh.quads[one].index(a)

@@ -60,10 +60,10 @@ class Search:
         if move.kind == "split":
             mesh.free.pop()
             mesh.add_node(kept, other)
-            self.moves.rim[other], self.moves.ideals[other] = False, 4
+            self.moves.at_boundary[other], self.moves.ideals[other] = False, 4
         after = [mesh.quads[q] for q in [*ids, *fresh] if mesh.quads[q]]
         join = move.pair if move.kind == "collapse" else NO_PAIR
-        growth = mesh.try_quads(before, after, self.moves.rim, TRIAL_SWEEPS, *join) - move.growth * self.price
+        growth = mesh.try_quads(before, after, self.moves.at_boundary, TRIAL_SWEEPS, *join) - move.growth * self.price
         if move.kind == "collapse":
             mesh.free.append(other)
         made = Made(move, old, fresh, places, old_nodes, old_arc, growth)

@@ -140,9 +140,9 @@ def _grid(like: Grid, nodes: np.ndarray, quads: np.ndarray, fixed: np.ndarray, c
         nodes=nodes, triangles=triangles_of(nodes, quads), panels=quads, fixed=fixed, lines=np.zeros((0, 2), np.int64),
         line_sets=(), deviation=None, desired=None,
     )  # fmt: skip
-    rim = np.zeros(len(nodes), np.bool_)
+    at_boundary = np.zeros(len(nodes), np.bool_)
     single = bare.edges[bare.edge_uses == 1]
-    rim[single.ravel()] = True
+    at_boundary[single.ravel()] = True
     count = len(nodes)
     inner = np.sort(chains, axis=1)
     inner = inner[~np.isin(inner @ [count, 1], single @ [count, 1])]

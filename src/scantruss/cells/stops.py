@@ -14,14 +14,14 @@ AT_STOP = 0.6  # distance up to which a node of the boundary is that of a corner
 
 def at_stops(grid: Grid, stops: np.ndarray, length: float) -> Grid:
     """Return a grid whose nodes at corners and ends of lines lie where these are on the boundary curve, which projection left."""
-    rim = np.unique(grid.edges[grid.edge_uses == 1])
-    if not len(stops) or not len(rim):
+    boundary_nodes = np.unique(grid.edges[grid.edge_uses == 1])
+    if not len(stops) or not len(boundary_nodes):
         return grid
     nodes = grid.nodes.copy()
     for place in stops:
-        away = np.linalg.norm(grid.nodes[rim] - place, axis=1)
+        away = np.linalg.norm(grid.nodes[boundary_nodes] - place, axis=1)
         if away.min() < AT_STOP * length:
-            nodes[rim[away.argmin()]] = place
+            nodes[boundary_nodes[away.argmin()]] = place
     return grid.replace(nodes=nodes)
 
 

@@ -64,9 +64,9 @@ def outs_of(values: Namespace) -> list[Path]:
 
     given = getattr(values, "outs", None) or []
     words = [*([given] if isinstance(given, str) else given), *values.more_outs]
-    if stray := next((word for word in words if VALUE.match(word) and not SUFFIX.search(word)), None):
+    if other := next((word for word in words if VALUE.match(word) and not SUFFIX.search(word)), None):
         raise UsageError(
-            f"{stray} is no file to write; if it belongs to the option before it, separate its values by commas, without blanks"
+            f"{other} is no file to write; if it belongs to the option before it, separate its values by commas, without blanks"
         )
     outs = [Path(word) for word in words]
     if not outs:

@@ -39,9 +39,9 @@ def layer_parts(grid: Grid, count: int, second: str, edges: str) -> LayerParts:
     """Return the parts of so many layers, the grid among them."""
     nodes, triangles = len(grid.nodes), len(grid.triangles)
     used = np.isin(np.arange(nodes), triangles_nodes := np.unique(grid.triangles))
-    rim = np.zeros(nodes, bool)
-    rim[grid.edges[grid.edge_uses == 1]] = True
-    meets = _meeting(grid, rim) if edges == "tapered" and second == "same" else np.zeros(nodes, bool)
+    at_boundary = np.zeros(nodes, bool)
+    at_boundary[grid.edges[grid.edge_uses == 1]] = True
+    meets = _meeting(grid, at_boundary) if edges == "tapered" and second == "same" else np.zeros(nodes, bool)
     none = np.full(triangles, -1)
     layers = [_Layer(np.arange(nodes), none)]
     owners, layer = [np.repeat(np.arange(nodes)[:, None], 3, axis=1)], [np.zeros(nodes, np.int64)]
@@ -49,7 +49,7 @@ def layer_parts(grid: Grid, count: int, second: str, edges: str) -> LayerParts:
     made = nodes
     for number in range(1, count):
         dual = second == "dual" and number % 2 == 1
-        here = rim & used if edges == "closed" else np.zeros(nodes, bool)
+        here = at_boundary & used if edges == "closed" else np.zeros(nodes, bool)
         own = np.flatnonzero(here if dual else used & ~meets)
         of_node = np.where(meets, np.arange(nodes), -1)
         faces = np.arange(triangles) if dual else np.zeros(0, np.int64)
@@ -72,10 +72,10 @@ def layer_parts(grid: Grid, count: int, second: str, edges: str) -> LayerParts:
     return LayerParts(np.concatenate(owners), np.concatenate(layer), chords, webs, tuple(panels), under)
 
 
-def _meeting(grid: Grid, rim: np.ndarray) -> np.ndarray:
+def _meeting(grid: Grid, at_boundary: np.ndarray) -> np.ndarray:
     """Return at which nodes layers that are the same meet: those of the boundary, but for corners of triangles without an inner node."""
-    meets = rim.copy()
-    meets[grid.triangles[rim[grid.triangles].all(axis=1)]] = False
+    meets = at_boundary.copy()
+    meets[grid.triangles[at_boundary[grid.triangles].all(axis=1)]] = False
     return meets
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SYMMETRY_TOLERANCE = 0.1  #: by how far 95 % of a scan may lie off its mirror image [member lengths]
 CELLS_ACROSS = 45  #: of the cells in each of which one place stands for the scan, along its longest side
-FEWEST_OF_SYMMETRY = 50  #: from which a symmetry can be told
+FEWEST_OF_SYMMETRY = 50  #: fewest places among which a symmetry is looked for
 PLACES_TRIED = 300  #: places with which a plane is tried first
 TURN_STEP = 2.0  #: between the directions tried about each principal axis [degree]
 PLANES_REFINED = 8  #: planes that are refined
@@ -129,7 +129,7 @@ def _places(points: np.ndarray) -> _Places:
     counts = np.bincount(inverse.ravel())
     at = np.stack([np.bincount(inverse.ravel(), points[:, k] - low[k]) / counts for k in range(3)], axis=1)
     if len(at) < FEWEST_OF_SYMMETRY:
-        raise InputError(f"the scan has too few points for its symmetry to be told: {len(points):,}")
+        raise InputError(f"the scan has too few points to find its symmetry: {len(points):,}")
     middle = at.mean(axis=0)
     at -= middle
     from scipy.spatial import cKDTree  # not needed by a grid without symmetry

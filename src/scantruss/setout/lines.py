@@ -66,7 +66,7 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
 
 
 def _set_out(grid: Grid) -> np.ndarray:
-    """Return of which members (E,) the heights are told: all but webs."""
+    """Return of which members (E,) the heights are set out: all but webs."""
     return grid.is_chord() if isinstance(grid, LayeredGrid) else np.ones(len(grid.edges), bool)
 
 

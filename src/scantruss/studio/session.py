@@ -93,7 +93,7 @@ class Session:
                 tell()
             except StoppedError:
                 raise
-            except Exception:  # of a page that has just closed; the others are still told
+            except Exception:  # of a page that has just closed; the others still hear of it
                 sys.excepthook(*sys.exc_info())
 
     # ---- steps

@@ -73,8 +73,9 @@ def node_energy(
     for i in range(begin, end):
         q = of[i]
         k = 0
-        while quads[q, k] != v:  # ends: v is one of the four
-            k += 1
+        for corner in range(4):
+            if quads[q, corner] == v:
+                k = corner
         ia, ic, ib = quads[q, (k + 1) % 4], quads[q, (k + 2) % 4], quads[q, (k + 3) % 4]
         a, b, c = row(nodes, ia), row(nodes, ib), row(nodes, ic)
         s, x, y, z = side_energy(place, a, 0.5 * (desired[v] + desired[ia]))
@@ -191,14 +192,14 @@ def energy_of_quads(
 
 
 @kernel
-def shares_of(quads: np.ndarray, rim: np.ndarray, share: np.ndarray) -> None:
+def shares_of(quads: np.ndarray, at_boundary: np.ndarray, share: np.ndarray) -> None:
     """Fill in the weight of each side of some quads (Q, 4): 1 on the boundary, 1/2 where another quad has it too or may have."""
     count = 4 * len(quads)
     for i in range(count):
         q, k = i // 4, i % 4
         a, b = quads[q, k], quads[q, (k + 1) % 4]
         share[q, k] = 0.5
-        if rim[a] and rim[b]:
+        if at_boundary[a] and at_boundary[b]:
             alone = True
             for j in range(count):
                 p, m = j // 4, j % 4
@@ -213,7 +214,7 @@ def try_quads(
     before: np.ndarray,
     after: np.ndarray,
     degree: np.ndarray,
-    rim: np.ndarray,
+    at_boundary: np.ndarray,
     held: np.ndarray,
     curve: np.ndarray,
     arc: np.ndarray,
@@ -237,14 +238,14 @@ def try_quads(
     join, joined : node that another was merged with, which starts between them; -1 for none
     """
     share, out = np.empty((len(before), 4)), np.empty(len(before))
-    shares_of(before, rim, share)
+    shares_of(before, at_boundary, share)
     old = energy_of_quads(nodes, before, share, patches, desired, lengths, angles, out)
     if join >= 0 and held[join] == 0:
         for k in range(3):
             nodes[join, k] = 0.5 * (nodes[join, k] + nodes[joined, k])
     count = len(after)
     share, out = np.empty((count, 4)), np.empty(count)
-    shares_of(after, rim, share)
+    shares_of(after, at_boundary, share)
     flat = after.copy().reshape(4 * count)
     order = np.argsort(flat, kind="mergesort")
     some, start, of = np.empty(4 * count, np.int64), np.zeros(4 * count + 1, np.int64), np.empty(4 * count, np.int64)

@@ -123,7 +123,7 @@ def _placed_meshes(path: Path, held: Gltf) -> Iterator[tuple[np.ndarray, int]]:
     scenes = held.get("scenes", [])
     roots = scenes[held.get("scene", 0)].get("nodes", ()) if scenes else range(len(nodes))
     waiting, visits = [(np.eye(4), root) for root in roots], 0
-    while waiting:  # a node has one parent, so each is visited once
+    while waiting:  # ends: no more visits than nodes
         parent, number = waiting.pop(0)
         visits += 1
         if visits > len(nodes):

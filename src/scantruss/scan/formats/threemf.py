@@ -34,7 +34,7 @@ def read_3mf(path: Path, wanted: Sequence[str] = ()) -> Content:
         items = [(item.get("objectid", ""), _frame(item), 0) for item in root.iter(f"{space}item")]
         waiting = items or [(name, np.vstack([np.eye(3), np.zeros(3)]), 0) for name in objects]
         visits = 0
-        while waiting:  # each turn is counted
+        while waiting:  # ends: no more visits than MOST_PARTS_3MF
             name, frame, depth = waiting.pop()
             visits += 1
             if depth > len(objects) or visits > MOST_PARTS_3MF:
