@@ -18,6 +18,7 @@ from scipy.sparse.linalg import splu
 
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
+from ..scan.vectors import dots
 from .fine_mesh import AT_REST_THERE, FineMesh
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
@@ -68,7 +69,7 @@ def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> La
     first, second = _frames(mesh.normals)
     i, j = mesh.edges.T
     way = mesh.nodes[j] - mesh.nodes[i]
-    bend = np.arctan2(_dot(way, second[j]), _dot(way, first[j])) - np.arctan2(_dot(way, second[i]), _dot(way, first[i]))
+    bend = np.arctan2(dots(way, second[j]), dots(way, first[j])) - np.arctan2(dots(way, second[i]), dots(way, first[i]))
     angle = _directions(mesh, first, second, bend, start.directions, guide)
     along = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
     across = np.cross(mesh.normals, along)
@@ -95,8 +96,8 @@ def spread_rows(rows: LatticeRows, coarse: FineMesh, fine: FineMesh) -> LatticeR
     total = np.zeros(len(fine.nodes), complex)
     for k in range(3):
         own = fine.owners[:, k]
-        aim = rows.along[own] - _dot(rows.along[own], fine.normals)[:, None] * fine.normals
-        total += fine.shares[:, k] * np.exp(4j * np.arctan2(_dot(aim, second), _dot(aim, first)))
+        aim = rows.along[own] - dots(rows.along[own], fine.normals)[:, None] * fine.normals
+        total += fine.shares[:, k] * np.exp(4j * np.arctan2(dots(aim, second), dots(aim, first)))
     angle = np.angle(total) / 4
     along = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
     across = np.cross(fine.normals, along)
@@ -122,10 +123,10 @@ def _passage(
     length: np.ndarray, other_length: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return the right angles from the axes at one place to those at another, and the way from the other to the one [members]."""
-    x, y = _dot(along, other_along), _dot(along, other_across)
+    x, y = dots(along, other_along), dots(along, other_across)
     turn = np.rint(np.arctan2(y, x) / (math.pi / 2)).astype(np.int64) % 4
-    u = 0.5 * (_dot(way, along) + _dot(way, _turned(other_along, other_across, turn)))
-    v = 0.5 * (_dot(way, across) + _dot(way, _turned(other_along, other_across, turn + 1)))
+    u = 0.5 * (dots(way, along) + dots(way, _turned(other_along, other_across, turn)))
+    v = 0.5 * (dots(way, across) + dots(way, _turned(other_along, other_across, turn + 1)))
     return turn, np.stack([u, v], axis=1) / (0.5 * (length + other_length))[:, None]
 
 
@@ -135,11 +136,6 @@ def _frames(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.cross(axis, normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return first, np.cross(normals, first)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    found: np.ndarray = np.einsum("ij,ij->i", a, b)
-    return found
 
 
 def _turned(along: np.ndarray, across: np.ndarray, turn: np.ndarray) -> np.ndarray:
@@ -171,13 +167,13 @@ def _directions(
     a, b = mesh.chains.T
     for v, w in ((a, b), (b, a)):
         run = mesh.nodes[w] - mesh.nodes[v]
-        np.add.at(aim, v, np.exp(4j * np.arctan2(_dot(run, second[v]), _dot(run, first[v]))))
+        np.add.at(aim, v, np.exp(4j * np.arctan2(dots(run, second[v]), dots(run, first[v]))))
     ends = np.bincount(mesh.chains.ravel(), minlength=count)
     size = np.abs(aim) / np.maximum(ends, 1)
     aim /= np.maximum(np.abs(aim), 1e-300)
     strength = np.where((ends > 0) & (size > LEAST_CHAIN_AGREEMENT), 1e4, 0.0)
     if guide is not None:
-        wanted = np.exp(4j * np.arctan2(_dot(guide.direction, second), _dot(guide.direction, first)))
+        wanted = np.exp(4j * np.arctan2(dots(guide.direction, second), dots(guide.direction, first)))
         aim, strength = wanted, guide.weight.copy()
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
@@ -216,7 +212,7 @@ def _lattice(
     a, b = mesh.chains.T
     for v, w in ((a, b), (b, a)):
         run = mesh.nodes[w] - mesh.nodes[v]
-        runs_along = np.abs(_dot(run, along[v])) > np.abs(_dot(run, across[v]))
+        runs_along = np.abs(dots(run, along[v])) > np.abs(dots(run, across[v]))
         weight[v[runs_along], 1] = HELD_WEIGHT
         weight[v[~runs_along], 0] = HELD_WEIGHT
     weight[mesh.held == AT_REST_THERE] = HELD_WEIGHT

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
+from ..scan.vectors import units
 from .layer_parts import LAYER_EDGES, SECOND_LAYERS, LayerParts, layer_parts
 
 DEPTH_WAYS = ("normal", "vertical")  #: along which the depth is measured
@@ -131,7 +132,7 @@ def _named(
     webs = [WEB] if count == 2 else [f"{WEB} {number}" for number in range(1, count)]
     starts = np.cumsum([0, *map(len, parts.chords), *map(len, parts.webs)]).tolist()
     groups = {name: np.arange(*starts[k : k + 2]) for k, name in enumerate([*names, *webs])}
-    below = _unit(normals[parts.owners].mean(axis=1))
+    below = units(normals[parts.owners].mean(axis=1))
     below[: len(normals)] = normals
     return DoubleLayer(
         nodes=nodes,
@@ -149,7 +150,7 @@ def _places(
     """Return the nodes of all layers, and which share of the depth each has."""
     depth = np.cumsum([0.0, *depths])[parts.layer]
     shares = np.where(parts.layer > 0, share[parts.owners].mean(axis=1), 1.0)
-    way = _unit(down[parts.owners].mean(axis=1))
+    way = units(down[parts.owners].mean(axis=1))
     alone = (parts.owners == parts.owners[:, :1]).all(axis=1)
     base = np.where(alone[:, None], grid.nodes[parts.owners[:, 0]], grid.nodes[parts.owners].mean(axis=1))
     way[alone] = down[parts.owners[alone, 0]]
@@ -198,16 +199,16 @@ def _eased(grid: Grid, share: np.ndarray) -> np.ndarray:
 def smoothed_normals(grid: Grid) -> np.ndarray:
     """Return (V, 3) unit normals of the nodes: those of the triangles by their angles, then the mean with those of all neighbours."""
     corners = grid.nodes[grid.triangles]
-    normal = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normal = units(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     at = np.zeros_like(grid.nodes, float)
     for k in range(3):
         np.add.at(at, grid.triangles[:, k], normal * grid.angles[:, [k]])
-    at = _unit(at)
+    at = units(at)
     smooth, neighbors = np.zeros_like(at), np.zeros((len(at), 1))
     for one, other in (grid.edges.T, grid.edges[:, ::-1].T):
         np.add.at(smooth, one, at[other])
         np.add.at(neighbors, one, 1.0)
-    return _unit(at + smooth / np.maximum(neighbors, 1.0))
+    return units(at + smooth / np.maximum(neighbors, 1.0))
 
 
 def _refuse(grid: Grid, nodes: np.ndarray, depth: float, why: str, share: np.ndarray) -> None:
@@ -222,9 +223,3 @@ def _refuse(grid: Grid, nodes: np.ndarray, depth: float, why: str, share: np.nda
     raise InputError(
         f"a depth of {depth:.4g}{unit}{reduced} is too much where the grid bends: {why} at {named}{more}; use a smaller depth"
     )
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors of length 1; those without length stay as they are."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)

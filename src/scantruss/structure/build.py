@@ -13,6 +13,7 @@ from ..grid.marks import member_marks, node_marks, numbered
 from ..grid.panels import turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
+from ..scan.vectors import units
 from ..settings import UNITS
 from .catalogue import Material, Section, find_material, find_section
 from .loads import cases_of, usual_combinations
@@ -72,8 +73,8 @@ def truss_of_grid(
         members=members,
         triangles=triangles,
         panels=None if grid.panels is None else turned_panels(grid.panels) if turned else grid.panels,
-        node_normals=_unit(node_normals),
-        member_normals=_unit(_at_members(grid, _unit(areas))),
+        node_normals=units(node_normals),
+        member_normals=units(_at_members(grid, units(areas))),
         sections=(find_section(section) if isinstance(section, str) else section,),
         section_of=np.zeros(len(members), np.int64),
         material=find_material(material) if isinstance(material, str) else material,
@@ -106,7 +107,7 @@ def _with_layers(truss: Truss, layers: DoubleLayer) -> Truss:
     """Return a structure of one layer with the second and the webs; what the first names stays."""
     count, members = len(layers.nodes), len(layers.members)
     spring = truss.end_stiffness[0, 0, 0]
-    normals = _unit(layers.normals[layers.members].sum(axis=1))
+    normals = units(layers.normals[layers.members].sum(axis=1))
     normals[: len(truss.members)] = truss.member_normals
     return truss.replace(
         nodes=layers.nodes,
@@ -168,9 +169,3 @@ def _at_members(grid: Grid, normals: np.ndarray) -> np.ndarray:
     at = grid.half_edge_edges
     np.add.at(total, at[at >= 0], np.tile(normals, (3, 1))[at >= 0])
     return total
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors of length 1; those without length stay as they are."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
