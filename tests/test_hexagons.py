@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-from marks import compiled_only
 from small_grids import dome, icosahedron
 from test_quads import bowl
 
 import scantruss as st
 from scantruss.cells.hexagons import dual_of
 from scantruss.grid.panels import sizes_of
-
-pytestmark = pytest.mark.kernels
 
 
 def test_the_dual_of_an_icosahedron_is_a_dodecahedron() -> None:
@@ -40,7 +37,6 @@ def test_the_dual_keeps_pieces_loops_and_direction() -> None:
     assert (upward > 0).all()
 
 
-@compiled_only
 def test_hexagons_of_a_scan() -> None:
     grid = st.grid_from_points(bowl(False), st.Settings(length=0.9, cells="hexagon", unit="m"))
     assert grid.certificate is not None and grid.certificate.passed

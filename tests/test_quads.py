@@ -27,7 +27,6 @@ from scantruss.grid.panels import (
 )
 from scantruss.structure.statics import solve
 
-pytestmark = pytest.mark.kernels
 LENGTH = 1.5
 
 
@@ -51,6 +50,8 @@ def quads(hole: bool = False) -> Grid:
     return st.grid_from_points(bowl(hole), st.Settings(length=LENGTH, cells="quad", unit="m"))
 
 
+@pytest.mark.kernels
+@compiled_only
 @pytest.mark.parametrize("hole", [False, True])
 def test_all_panels_are_quads_of_an_oriented_manifold_with_the_loops_of_the_scan(hole: bool) -> None:
     grid = quads(hole)
@@ -65,6 +66,8 @@ def test_all_panels_are_quads_of_an_oriented_manifold_with_the_loops_of_the_scan
     assert grid.certificate is not None and grid.certificate.passed
 
 
+@pytest.mark.kernels
+@compiled_only
 @pytest.mark.parametrize("hole", [False, True])
 def test_members_are_even_corners_nearly_right_and_nodes_have_four_members(hole: bool) -> None:
     grid = quads(hole)
@@ -86,7 +89,6 @@ def test_corners_are_nodes_and_the_boundary_is_kept() -> None:
     assert np.minimum(np.abs(np.abs(loop[:, 0]) - 8.0), np.abs(np.abs(loop[:, 1]) - 6.0)).max() < 0.06 * LENGTH
 
 
-@compiled_only
 def test_the_same_scan_gives_the_same_bytes_and_json_holds_all(tmp_path: Path) -> None:
     again = st.grid_from_points(bowl(False), st.Settings(length=LENGTH, cells="quad", unit="m"))
     text = encode_json(quads())
@@ -125,7 +127,6 @@ def test_files_hold_quads(tmp_path: Path) -> None:
     assert len(ezdxf.readfile(tmp_path / "quads.dxf").modelspace().query("3DFACE")) == len(faces)
 
 
-@compiled_only
 def test_the_command_makes_quads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.save(tmp_path / "bowl.npy", bowl(False))
     out = tmp_path / "quads.json"

@@ -1,0 +1,168 @@
+"""The energy of quads and how they settle: slopes against differences, sums against a slow twin, and squares as the lowest of all."""
+
+import numpy as np
+import pytest
+from rough import no_boundary
+
+from scantruss.kernels.boundary.curves import Curves
+from scantruss.kernels.cells.quads import (
+    FLAT,
+    corner_energy,
+    energy_of_quads,
+    node_energy,
+    settle_quads,
+    shares_of,
+    side_energy,
+    try_quads,
+)
+from scantruss.kernels.surface.local_surface import CENTRE, NORMAL, PATCH_COLUMNS, TANGENT
+
+pytestmark = pytest.mark.kernels
+SIZE = 4  # squares along a side
+LENGTHS, ANGLES = 3.0, 0.5
+FREE, ALONG, AT_REST = 0, 1, 2
+
+
+class Lattice:
+    """Squares of side 1 in a plane, whose boundary rests, with inner nodes that are moved in the plane."""
+
+    def __init__(self, seed: int, amount: float) -> None:
+        rng, row = np.random.default_rng(seed), SIZE + 1
+        at = np.arange(row * row)
+        self.squares = np.column_stack([at % row, at // row, 0 * at]).astype(float)
+        rim = (at % row % SIZE == 0) | (at // row % SIZE == 0)
+        self.at_boundary, self.held = rim, np.where(rim, AT_REST, FREE)
+        corner = np.array([x + row * y for y in range(SIZE) for x in range(SIZE)])
+        self.quads = np.column_stack([corner, corner + 1, corner + row + 1, corner + row])
+        self.nodes = self.squares.copy()
+        self.nodes[~rim, :2] += rng.uniform(-amount, amount, (int((~rim).sum()), 2))
+        self.patches = np.zeros((len(at), PATCH_COLUMNS))
+        self.patches[:, CENTRE : CENTRE + 3] = self.squares
+        self.patches[:, NORMAL + 2] = self.patches[:, TANGENT] = 1.0
+        self.desired = np.ones(len(at))
+        self.curves, self.curve, self.arc = no_boundary(), np.zeros(len(at), np.int64), np.zeros(len(at))
+        self.share = np.empty((len(self.quads), 4))
+        shares_of(self.quads, rim, self.share)
+        order = np.argsort(self.quads.ravel(), kind="stable")
+        self.of, self.degree = order // 4, np.bincount(self.quads.ravel())
+        self.start = np.concatenate([[0], np.cumsum(self.degree)])
+
+    def energy(self) -> float:
+        out = np.empty(len(self.quads))
+        total = energy_of_quads(
+            self.nodes, self.quads, self.share, self.patches, self.desired, LENGTHS, ANGLES, out
+        )  # fmt: skip
+        assert total == pytest.approx(out.sum())
+        return float(total)
+
+    def settle(self, sweeps: int) -> int:
+        made = settle_quads(
+            self.nodes, self.quads, self.share, self.of, self.start, np.arange(len(self.nodes)), self.held, self.curve,
+            self.arc, self.patches, self.curves, self.desired, LENGTHS, ANGLES, sweeps, 1.5, 1e-12,
+        )  # fmt: skip
+        return int(made)
+
+    def growth(self, after: np.ndarray, sweeps: int, join: int = -1, joined: int = -1) -> float:
+        return try_quads(
+            self.nodes, self.quads, after, np.bincount(after.ravel(), minlength=len(self.nodes)), self.at_boundary,
+            self.held, self.curve, self.arc, self.patches, self.curves, self.desired, LENGTHS, ANGLES, sweeps, 1.5, 1e-12,
+            join, joined,
+        )  # fmt: skip
+
+
+def slow_energy(lattice: Lattice) -> float:
+    """The energy by the words of the module: every member once, and every corner."""
+    total, members = 0.0, set()
+    for corners in lattice.quads.tolist():
+        for k in range(4):
+            before, here, after = (lattice.nodes[corners[(k + j) % 4]] for j in (-1, 0, 1))
+            members.add(tuple(sorted((corners[k], corners[(k + 1) % 4]))))
+            e, f = after - here, before - here
+            c = e @ f / np.linalg.norm(e) / np.linalg.norm(f)
+            value = c**2 + FLAT * c**8
+            total += ANGLES * (value if np.cross(e, f)[2] > 0 else 2 * (1 + FLAT) - value)
+    lengths = np.array([np.linalg.norm(lattice.nodes[a] - lattice.nodes[b]) for a, b in members])
+    return float(total + LENGTHS * ((lengths - 1) ** 2).sum())
+
+
+@pytest.mark.parametrize("amount", [0.2, 1.5])  # of which the second turns corners over
+def test_every_member_counts_once_and_every_corner_does(amount: float) -> None:
+    for seed in range(3):
+        lattice = Lattice(seed, amount)
+        assert lattice.energy() == pytest.approx(slow_energy(lattice))
+
+
+@pytest.mark.parametrize("amount", [0.2, 1.5])
+def test_the_slope_at_a_node_is_that_of_the_whole_energy(amount: float) -> None:
+    lattice, step = Lattice(7, amount), 1e-6
+    for v in np.flatnonzero(lattice.held == FREE).tolist():
+        place = lattice.nodes[v].copy()
+        begin, end = int(lattice.start[v]), int(lattice.start[v + 1])
+        found = node_energy(
+            lattice.nodes, lattice.quads, lattice.share, lattice.of, begin, end, v, tuple(place.tolist()), (0.0, 0.0, 1.0),
+            lattice.desired, LENGTHS, ANGLES,
+        )  # fmt: skip
+        for axis in range(2):
+            sides = []
+            for sign in (1, -1):
+                lattice.nodes[v] = place
+                lattice.nodes[v, axis] += sign * step
+                sides.append(slow_energy(lattice))
+            lattice.nodes[v] = place
+            assert found[1 + axis] == pytest.approx((sides[0] - sides[1]) / (2 * step), rel=1e-5, abs=1e-5)
+
+
+def test_sides_and_corners_by_hand() -> None:
+    assert side_energy((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0) == pytest.approx((0.25, 0.5, 0.0, 0.0))
+    east, north, up = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0)
+    assert corner_energy(east, north, up)[0] == 0.0
+    assert corner_energy(north, east, up)[0] == 2 * (1 + FLAT)  # turned over
+    assert corner_energy(east, (0.0, 0.0, 0.0), up)[0] == 1 + FLAT  # no corner at all
+    assert corner_energy(east, (1.0, 1.0, 0.0), up)[0] == pytest.approx(0.5 + FLAT / 16)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_settle_to_squares_and_what_rests_stays(seed: int) -> None:
+    lattice = Lattice(seed, 0.25)
+    resting, before = lattice.nodes[lattice.held == AT_REST].tobytes(), lattice.energy()
+    assert lattice.settle(200) < 200
+    assert lattice.energy() < 1e-6 * before
+    assert lattice.nodes == pytest.approx(lattice.squares, abs=1e-3)
+    assert lattice.nodes[lattice.held == AT_REST].tobytes() == resting
+
+
+def test_nodes_of_the_boundary_slide_along_it() -> None:
+    lattice = Lattice(1, 0.2)
+    corners = np.array([0, SIZE, (SIZE + 1) ** 2 - 1, SIZE * (SIZE + 1)])
+    arc = np.arange(4.0) * SIZE
+    lattice.curves = Curves(lattice.squares[corners], arc, np.array([0, 4]), np.array([4.0 * SIZE]))
+    lattice.held[1:SIZE] = ALONG
+    lattice.arc[1:SIZE] = np.arange(1, SIZE) + [0.2, -0.15, 0.25]
+    lattice.nodes[1:SIZE, 0] = lattice.arc[1:SIZE]
+    assert lattice.settle(200) < 200
+    assert lattice.nodes == pytest.approx(lattice.squares, abs=1e-3)
+    assert lattice.arc[1:SIZE] == pytest.approx(lattice.nodes[1:SIZE, 0])
+    assert (lattice.nodes[1:SIZE, 1] == 0.0).all()
+
+
+def test_a_trial_tells_how_the_energy_changes() -> None:
+    """Of the same quads: by what settling gains. A node joined with another starts between the two."""
+    lattice, other = Lattice(2, 0.2), Lattice(2, 0.2)
+    before = lattice.energy()
+    grown = lattice.growth(lattice.quads, 8)
+    assert grown < 0 and lattice.energy() == pytest.approx(before + grown)
+    other.settle(8)
+    assert lattice.nodes == pytest.approx(other.nodes, abs=1e-12)
+    middle = (SIZE + 1) * 2 + 2
+    still = Lattice(2, 0.2)
+    expected = (still.nodes[middle] + still.nodes[middle + 1]) / 2
+    still.growth(still.quads, 0, middle, middle + 1)
+    assert still.nodes[middle] == pytest.approx(expected)
+
+
+def test_quads_that_cross_their_places_cost_more() -> None:
+    """Two neighbours of which one is turned over have the energy of its four corners more."""
+    lattice = Lattice(0, 0.0)
+    after = lattice.quads.copy()
+    after[5] = after[5][::-1]
+    assert lattice.growth(after, 0) >= 4 * ANGLES * 2 * (1 + FLAT) - 1e-9
