@@ -92,11 +92,11 @@ def opened_body(
     wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
     for triangles in chain(_fans(found, length), _discs(found, at_gaps, length)):
         _mark(wall, triangles, lattice)
-    opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+    opened = _open_and_close(points, _enclosed(wall), lattice, length)
     if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
         for triangles in caps:
             _mark(wall, triangles, lattice)
-        opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+        opened = _open_and_close(points, _enclosed(wall), lattice, length)
     return opened
 
 
@@ -205,13 +205,14 @@ def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
                 wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
 
 
-def _enclosed(wall: Voxels, lattice: _Lattice) -> Voxels:
+def _enclosed(wall: Voxels) -> Voxels:
     """Return the voxels that cannot be reached from outside through a wall, those of the wall included."""
     from scipy import ndimage
 
-    label = ndimage.label(_distance(wall, lattice) > lattice.size)[0]
+    label = ndimage.label(~ndimage.binary_dilation(wall))[0]
     outside = label == label[0, 0, 0]
-    enclosed: Voxels = _distance(outside, lattice) > 1.5 * lattice.size  # a voxel's half, and the thickness of a wall
+    # farther from outside than 1.5 voxels: half of one, and the thickness of a wall
+    enclosed: Voxels = ~ndimage.binary_dilation(outside, ndimage.generate_binary_structure(3, 2))
     return enclosed
 
 
@@ -238,11 +239,11 @@ def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) 
 
 
 def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length: float) -> OpenedBody | None:
-    """Return what becomes of points (N, 3) around a body; None where it loses too much or nothing changes."""
+    """Return what becomes of points (N, 3) around a body; None where it is all thinner than a limb, loses too much or nothing changes."""
     from scipy import ndimage
     from scipy.spatial import cKDTree
 
-    if not body.any():
+    if not (_distance(~body, lattice) >= LIMB_RADIUS * length).any():  # pockets of an open sheet
         return None
     limbs = _beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body & ~limbs
