@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FIXED_COLOR = np.array((230, 97, 1), np.uint8)
 FIXED_RADIUS = 0.1  #: of a fixed node that is drawn [scene]
 NONE_CHOSEN = "-"
+FIX_MODE = "place fixed node"
 
 
 class FixedNodes:
@@ -26,11 +27,13 @@ class FixedNodes:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        gui.add_markdown('Set "a click" to "place fixed node" and click on the scan, or type coordinates.')
+        by_click = gui.add_button("Place by clicks", hint="then click on the scan")
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
         add, move, delete = gui.add_button("Add"), gui.add_button("Move there"), gui.add_button("Delete")
         self._handle: Any = None
+        by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
+        view.modes[FIX_MODE] = self.place
         self.chosen.on_update(view.step(self._choose))
         add.on_click(view.step(lambda: self._set(self._typed(), len(self._fixed))))
         move.on_click(view.step(lambda: self._set(self._typed(), self._number())))

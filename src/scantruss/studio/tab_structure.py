@@ -26,6 +26,7 @@ SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
 SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
+SUPPORT_MODE = "support"
 
 
 class StructureTab:
@@ -54,6 +55,7 @@ class StructureTab:
         run.on_click(view.step(self._run))
         animate.on_click(view.step(self._animate))
         self.case.on_update(view.step(self._choose))
+        view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(lambda: self._draw(view.session.state)))
 
@@ -70,10 +72,10 @@ class StructureTab:
         self.view.session.set_structure(**{name: each.value for name, each in self.words.items()})
         self.view.session.run_structure()
 
-    def support(self, found: tuple[str, int]) -> None:
+    def support(self, found: tuple[str, int] | None) -> None:
         """Hold the node under a click, or no longer."""
         shown = self.view.shown_model()
-        if shown is None or found[0] != "nodes":
+        if shown is None or found is None or found[0] != "nodes":
             raise InputError("no node is there; click on a node of the grid")
         mark = shown[0].node_marks[found[1]]
         words = [word for word in self.words["supports"].value.split("+") if word.strip()]
