@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..settings.records import EFFORTS, PREFER
 from .feature_list import FeatureList
+from .length_brush import LengthBrush
+from .rows_tool import RowsTool
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -27,6 +29,10 @@ class DesignTab:
         self.prefer = gui.add_dropdown("prefer", PREFER, hint="what matters more: equal members or regular triangles")
         with gui.add_folder("Holes and ridges", expand_by_default=False):
             self.features = FeatureList(view, gui)
+        with gui.add_folder("Direction of rows", expand_by_default=False):
+            self.rows = RowsTool(view, gui)
+        with gui.add_folder("Length brush", expand_by_default=False):
+            self.brush = LengthBrush(view, gui)
         self.slider.on_update(step(self._slide))
         self.length.on_update(step(self._typed))
         self.effort.on_update(
@@ -63,7 +69,8 @@ class DesignTab:
             )
         if before is None or before.grid is not state.grid or before.is_live != state.is_live:
             self._fill_grid(state)
-        self.features.fill(before, state)
+        for part in (self.features, self.rows, self.brush):
+            part.fill(before, state)
 
     def _fill_grid(self, state: StudioState) -> None:
         grid, unit = state.grid, f" {state.grid.unit}" if state.grid is not None and state.grid.unit else ""

@@ -36,7 +36,7 @@ SELECT = "select"
 NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
-PANEL_WIDTH = 440  #: [pixel]
+PANEL_WIDTH = 452  #: [pixel]
 STEPS = ("Generate", "Stop", "Undo", "Redo")
 
 
