@@ -21,7 +21,8 @@ from .scan_steps import ScanSteps
 from .solving import check_words, solved_state
 
 MOST_LIVE_MEMBERS = 60_000  #: of a quick grid that is made while the length changes
-STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads")  #: what the page asks for
+STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads", "size_by")  #: what the page asks for
+STRUCTURE_NUMBERS = ("scale", "size", "buckling", "frequencies")  #: and the numbers
 
 
 class Session(ScanSteps):
@@ -125,18 +126,18 @@ class Session(ScanSteps):
 
     # ---- the structure
 
-    def set_structure(self, **words: str) -> None:
-        """Take what the page says of supports, section, material and loads.
+    def set_structure(self, **words: str | float) -> None:
+        """Take what the page says of supports, section, material, loads, sizing and modes.
 
         Raises
         ------
         InputError
             It names a file, which the page may not read, or cannot be used.
         """
-        check_words(words)
+        check_words({name: word for name, word in words.items() if isinstance(word, str)})
         given: dict[str, Any] = dict(words)
         if "loads" in given:
-            given["loads"] = loads_of_words(given["loads"])
+            given["loads"] = loads_of_words(str(given["loads"]))
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
             self.change("structure", structure_settings=settings)
@@ -147,7 +148,7 @@ class Session(ScanSteps):
         def run(progress: Progress) -> None:
             progress("structure", 0.1)
             turn = self._turn
-            solved = solved_state(self.state)
+            solved = solved_state(self.state, progress)
             if turn != self._turn or solved.grid is not self.grid:
                 return
             self.change("run", solution=solved.solution, report=solved.report)

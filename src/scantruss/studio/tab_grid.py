@@ -141,6 +141,9 @@ class GridTab:
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
+        elif self.view.compare.is_over:
+            of_members = np.broadcast_to(DIMMED, of_members.shape)
+            self.count.content = "grey, while Compare draws another design over it"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         scene.members("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
